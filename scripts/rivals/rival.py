@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from rivals.house import ContactFPGAError, Derived, square
+from rivals.house import ContactFPGAError, square
 
 
 class RivalError(ContactFPGAError):
@@ -40,7 +40,7 @@ class Sheet:
     @property
     def moment_bits(self) -> tuple[int, int, int]:
         """Of area, sum x and sum y: those that our records have."""
-        derived = Derived(square(self.size))
+        derived = square(self.size).derived
         return derived.area_bits, derived.sum_x_bits, derived.sum_y_bits
 
 

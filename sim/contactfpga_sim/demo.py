@@ -14,7 +14,6 @@ from contactfpga.driver import driver
 from contactfpga.robot.haptics import LoadCells, WithReadings, felt
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools.console import interrupt, outputs, tables, terminal
 from contactfpga.wire.protocol import Frame
 from contactfpga_sim.lab import pool
@@ -73,12 +72,12 @@ class Outcome:
 
 def run(name: str, engine: str, skin: Skin) -> Outcome:
     """The scene from the second scan on; compared over all cycles."""
-    scan = Derived(skin).frame_clocks
+    scan = skin.derived.frame_clocks
     scene = scenes.scene(skin, name)
     untouched = np.zeros((skin.rows, skin.columns), bool)
     frames = [untouched, *(scene(index * scan / skin.clock_hz) for index in range(SCANS - 1))]
     timeline = dataclasses.replace(Timeline.frames(skin, frames), units=_readings(name, skin, scan))
-    cycles = SCANS * scan + Derived(skin).max_frame_bytes * 10 * Derived(skin).bit_clocks
+    cycles = SCANS * scan + skin.derived.max_frame_bytes * 10 * skin.derived.bit_clocks
     trace = ENGINES[engine](skin, timeline, cycles)
     try:
         events, difference = compare(predict(skin, timeline, cycles), trace), ""
@@ -142,7 +141,7 @@ def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | Non
     """Cycle of the start bit of its first byte, end of its last one, its bytes on the wire, the frame."""
     for got in frames_in(skin, trace.bytes):
         if got.frame.cells:
-            return got.first + 1, got.last + 1 + 10 * Derived(skin).bit_clocks, got.size, got.frame
+            return got.first + 1, got.last + 1 + 10 * skin.derived.bit_clocks, got.size, got.frame
     return 0, 0, 0, None
 
 

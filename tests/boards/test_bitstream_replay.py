@@ -10,7 +10,6 @@ from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import bitstream_path
 from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin, SkinError
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import build
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.board.compiled import model_of
@@ -85,7 +84,7 @@ def test_frames_are_shapes_recordings_and_random_ones():
 def test_the_sheets_fit_their_boards():
     for name, skin in RUNS:
         BOARDS[name].check(skin)
-    every = Derived(RUNS[0][1])
+    every = RUNS[0][1].derived
     assert every.frame_clocks >= every.max_frame_bytes * 10 * every.bit_clocks
 
 

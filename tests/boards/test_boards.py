@@ -9,7 +9,6 @@ from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import Bridge
 from contactfpga.driver import finding
 from contactfpga.skin import Skin, SkinError
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board.build import plan_for
 from contactfpga_hdl.board.constraints import PAGE
 from contactfpga_hdl.board.sites import connector_sites
@@ -251,7 +250,7 @@ def test_the_example_of_64x64_fits_the_pins_of_the_icebreaker():
     ICEBREAKER.check(skin)
     text = (ROOT / PAGE).read_text()
     wires = sum(len(pins) for pins in ICEBREAKER.pins(skin).values())
-    assert f"with {wires} wires and a scan in {Derived(skin).frame_clocks / 12:g} us" in text
+    assert f"with {wires} wires and a scan in {skin.derived.frame_clocks / 12:g} us" in text
 
 
 def test_unknown_board_is_named_with_the_known_ones():

@@ -9,7 +9,6 @@ from sample import sample
 
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.design.circuit import Circuit
-from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga.tools.commands.build import WiringTable, ohms
 from contactfpga_hdl.board import placed, sites
@@ -123,7 +122,7 @@ def test_chips_and_outputs_are_those_of_the_data_sheets():
 @pytest.mark.parametrize("name", ["chained", "two and three chains", "guard, chained"])
 def test_chains_are_as_long_as_the_gateware_shifts(name):
     skin = skin_of(BOARDS["ulx3s-85f"], name)
-    for chip, lines in (("74HC595", Derived(skin).row_chain_lines), ("74HC165", Derived(skin).column_chain_lines)):
+    for chip, lines in (("74HC595", skin.derived.row_chain_lines), ("74HC165", skin.derived.column_chain_lines)):
         chained = [one for one in wiring.outputs(skin) if one.chip == chip]
         assert max(sum(one.chain == chain for one in chained) for chain in {one.chain for one in chained}) == lines
 

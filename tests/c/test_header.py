@@ -18,7 +18,7 @@ from wire import digits, last_byte, old_frame, old_hello
 
 from contactfpga import Skin
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.skin.widths import LONGEST_PACKET
+from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import FLAGS, may_number

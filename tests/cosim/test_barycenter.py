@@ -16,7 +16,6 @@ from scipy import ndimage
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga.zones.zone import Zones
 from contactfpga_hdl.top import Top
@@ -131,7 +130,7 @@ def test_read_zones_needs_no_skin_and_gives_what_scipy_says_rounded(scene):
 
 
 def test_the_compiled_board_is_the_golden_models_in_every_clock():
-    cycles = 40 * SHEET.rows * Derived(SHEET).row_clocks
+    cycles = 40 * SHEET.rows * SHEET.derived.row_clocks
     timeline = stimulus(SHEET, cycles, seed=6)
     expected = predict(SHEET, timeline, cycles)
     assert len(expected.items) > 100
@@ -242,7 +241,7 @@ def late_frames(skin, rng):
 def test_the_last_byte_is_never_later_than_with_exact_moments(name):
     moments = SKINS[name].replace(zone_capacity=64)
     divided = moments.replace(report="barycenter", zone_capacity=64)
-    saved = Derived(moments).record_bytes - Derived(divided).record_bytes
+    saved = moments.derived.record_bytes - divided.derived.record_bytes
     assert saved == (2 if moments.rows == 64 else 1)
     sooner = []
     for number, cells in enumerate(late_frames(moments, np.random.default_rng(1))):
@@ -251,7 +250,7 @@ def test_the_last_byte_is_never_later_than_with_exact_moments(name):
         assert saved * zones <= longer - shorter <= saved * zones + 1, "a stuffing byte may go, too"
         sooner.append(before - after)
         assert after <= before
-    assert max(sooner) > 10 * Derived(moments).bit_clocks
+    assert max(sooner) > 10 * moments.derived.bit_clocks
 
 
 @pytest.mark.parametrize(("row", "added"), [(0, 0), (15, 9)])

@@ -7,7 +7,6 @@ import pytest
 from sample import sample
 
 from contactfpga import Batch, Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.many import decode
@@ -62,7 +61,7 @@ def frames_of(skin, trace):
     packets = bytes(value for _, value in trace.bytes).split(b"\0")[:-1]
     for packet in packets:
         try:
-            yield packet, decode_frame(unseal(packet, check_prefix(skin)), Derived(skin))
+            yield packet, decode_frame(unseal(packet, check_prefix(skin)), skin.derived)
         except PacketError:
             continue
 
@@ -107,7 +106,7 @@ def expected_zones(skin, cells):
 
 def check_arrays(skin, found):
     """Read many at once, the same."""
-    table = decode(list(found), Derived(skin), check_prefix(skin))
+    table = decode(list(found), skin.derived, check_prefix(skin))
     assert table.packets["valid"].all()
     run = Run(skin.sheet, table.packets, table.starts, table.records, table.packets["time_us"], None)
     batch, one_by_one = Batch.of([run]), Batch.of([Zones(frame, skin.sheet) for frame in found.values()])

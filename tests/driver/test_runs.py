@@ -13,7 +13,7 @@ from wire import old_frame
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.subscription import FrameQueue
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga.wire import framing, many, protocol
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run

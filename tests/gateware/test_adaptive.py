@@ -6,7 +6,6 @@ import pytest
 from sample import each_choice, sample
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import BOUNDARIES, Timeline, driven, predict, requests
 from contactfpga_sim.model.golden.facts import facts
@@ -144,8 +143,8 @@ def crowds(skin: Skin, cycles: int, seed: int) -> Timeline:
 @pytest.mark.parametrize(("size", "connectivity", "report"), CROWDED)
 def test_the_shortest_row_time_that_is_accepted_is_enough(size, connectivity, report):
     fields = {"rows": size[0], "columns": size[1], "connectivity": connectivity, "report": report}
-    needed = Derived(Skin(scan="adaptive", settle_us=200.0, **fields)).min_row_clocks
+    needed = Skin(scan="adaptive", settle_us=200.0, **fields).derived.min_row_clocks
     skin = Skin(scan="adaptive", settle_us=(needed - 12) / 12, **fields)
-    assert Derived(skin).row_clocks == needed
+    assert skin.derived.row_clocks == needed
     with CompiledBoard(skin, (*BOUNDARIES, "driven")) as board:
         assert sum(play(board, crowds(skin, 40_000, seed), 40_000) for seed in range(6)) > 30_000

@@ -8,7 +8,6 @@ import pytest
 from decoded import decoded
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire.hello import HelloReader
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import Timeline, predict, requests, seek
@@ -75,7 +74,7 @@ def test_row_times_of_random_frames_of_large_sheets(rng, record_property, rows):
 
 def slots_of_frames(skin: Skin, cells: np.ndarray, frames: int) -> list[int]:
     """Row times between the last rows of the gateware's frames with these cells pressed from power-up on."""
-    cycles = (frames + 1) * (int(cells.any(axis=1).sum()) + 2) * Derived(skin).row_clocks
+    cycles = (frames + 1) * (int(cells.any(axis=1).sum()) + 2) * skin.derived.row_clocks
     if skin == TALL:
         with CompiledBoard(skin, ("rows",)) as board:
             board.hold(cells[None], cycles)
@@ -84,7 +83,7 @@ def slots_of_frames(skin: Skin, cells: np.ndarray, frames: int) -> list[int]:
         rows = bench_amaranth.run(skin, Timeline([(0, cells, None)]), cycles).rows
         lasts = [cycle for cycle, _, last in rows if last]
     assert len(lasts) >= frames
-    return [round(int(gap) / Derived(skin).row_clocks) for gap in np.diff(lasts[:frames])]
+    return [round(int(gap) / skin.derived.row_clocks) for gap in np.diff(lasts[:frames])]
 
 
 @pytest.mark.slow
@@ -135,7 +134,7 @@ def test_a_masked_switch_that_is_closed_costs_a_row_time_and_nothing_else():
     assert set(slots_of_frames(skin, cells, 12)[3:]) == {2}
     both = cells.copy()
     both[0, 1] = True  # the same column
-    change = 40 * Derived(skin).row_clocks
+    change = 40 * skin.derived.row_clocks
     trace = bench_amaranth.run(skin, Timeline([(0, cells, None), (change, both, None)]), 2 * change)
     assert not any(row for cycle, row, _ in trace.rows if cycle < change)
     whole = len(trace.rows) // 4 * 4
@@ -154,7 +153,7 @@ def test_a_column_that_is_masked_in_every_row_never_wakes_the_scan():
 def test_stuck_columns_are_counted_as_soon_as_they_read_pressed():
     skin = Skin(**SMALL | {"baud": 6_000_000})
     stuck = np.array([True, False, True])
-    cycles = 200 * Derived(skin).row_clocks
+    cycles = 200 * skin.derived.row_clocks
     timeline = Timeline([(0, np.zeros((4, 3), bool), stuck)], requests([cycles // 8], facts(skin).bit_clocks))
     trace = predict(skin, timeline, cycles)
     assert compare(trace, bench_amaranth.run(skin, timeline, cycles))
@@ -191,6 +190,6 @@ def test_unchanged_frames_come_again_within_the_keep_alive_and_hellos_twice_a_se
     ends = [cycle for cycle, value in trace.bytes if value == 0]
     frames = [end for end in ends[6:] if end]
     assert max(np.diff(frames)) <= 1000 * keep_alive_ms
-    assert max(np.diff(frames)) > 1000 * keep_alive_ms - 2 * Derived(skin).max_frame_slots * 100
+    assert max(np.diff(frames)) > 1000 * keep_alive_ms - 2 * skin.derived.max_frame_slots * 100
     data = bytes(value for _, value in trace.bytes)
     assert len(decoded(data, skin)[1]) == 3, "at power-up and twice after that"

@@ -8,7 +8,6 @@ from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
 from contactfpga import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.dual import PAUSE_BITS, Dual
 from contactfpga_hdl.top import Top
@@ -24,7 +23,7 @@ def test_without_a_difference_each_clock_is_that_of_the_plain_gateware(changes):
     skin = SMALL.replace(**changes)
     rng = np.random.default_rng(4)
     timeline = Timeline.frames(skin, list(rng.random((12, skin.rows, skin.columns)) < 0.4))
-    cycles = 12 * Derived(skin).frame_clocks + 1200
+    cycles = 12 * skin.derived.frame_clocks + 1200
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles, limit_s=300)) > 100
 
 
@@ -49,7 +48,7 @@ def test_a_difference_of_any_output_breaks_the_line_and_starts_both_anew(said, f
     skin = SMALL.replace(fail_safe=fail_safe)
     first, second = Core(), Core()
     dut = Dual(skin, first, second)
-    pause, scan = PAUSE_BITS * Derived(skin).bit_clocks, Derived(skin).frame_clocks
+    pause, scan = PAUSE_BITS * skin.derived.bit_clocks, skin.derived.frame_clocks
     seen = []
 
     async def bench(ctx):
@@ -65,7 +64,7 @@ def test_a_difference_of_any_output_breaks_the_line_and_starts_both_anew(said, f
     line, contact, *clocks = zip(*seen)
     low = [clock for clock, level in enumerate(line) if not level]
     assert low == list(range(11, 12 + pause))
-    assert pause >= 10 * Derived(skin).bit_clocks
+    assert pause >= 10 * skin.derived.bit_clocks
     high = [clock for clock, level in enumerate(contact) if level]
     assert high == (list(range(11, 12 + 2 * pause + scan)) if fail_safe else [])
     starts = [[clock for clock in range(1, len(seen)) if one[clock] < one[clock - 1]] for one in clocks]

@@ -10,7 +10,6 @@ from sample import sample
 
 from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import place_of
 
 EXACT = [name for name, labeller in LABELLERS.items() if labeller.exact]
@@ -315,7 +314,7 @@ def test_open_zones_never_share_a_place_in_the_table(connectivity, labeller):
     Only zones with runs in the row before or in the new row are open. Those of one cluster become one zone, and
     their places are read before its place is written; so what counts are runs of one row, and of two clusters.
     """
-    derived = Derived(skin_of(2, 8, connectivity, labeller))
+    derived = skin_of(2, 8, connectivity, labeller).derived
     places = [place_of(derived, x) for x in range(8)]
     assert max(places) < derived.open_zones
     starts_of = [[x for x in range(8) if (word & ~(word << 1)) >> x & 1] for word in range(256)]

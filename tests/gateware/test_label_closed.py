@@ -6,7 +6,6 @@ import unrolled
 from unrolled import RING, RULES, WOUND, every_frame, recorded, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.golden import all_departures, cylinder, label
 
 SHAPES = {
@@ -53,7 +52,7 @@ def simulated(bench, frames, connectivity, labeller, rng=None, gap=0.0, stall=0.
         for y, row in enumerate(one)
     ]
     source, sink = sim.source(dut.rows, words, rng, gap=gap), sim.sink(dut.records, rng, stall=stall)
-    widths = Derived(skin).record_bits
+    widths = skin.derived.record_bits
     end = sum(widths)
     sim.run(
         80 * len(words) * (columns + 2), until=lambda: sum(word >> end for _, word in sink.transfers) == len(frames)

@@ -7,7 +7,6 @@ import unrolled
 from sample import sample
 from unrolled import RULES, every_frame, recorded, skin_of
 
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.golden import all_departures, row_clocks
 from contactfpga_sim.model.scenes import shapes
 from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
@@ -44,8 +43,8 @@ def check_compiled(frames, connectivity, labeller):
     busy, end = row_clocks(frames, connectivity, labeller, True)
     handed = handed_over(got, busy)
     assert np.array_equal(got.end, handed[:, -1] + end[:, -1])
-    assert busy.max() <= Derived(skin).label_row_clocks
-    assert got.last_record_clocks.max() <= Derived(skin).label_clocks - 1
+    assert busy.max() <= skin.derived.label_row_clocks
+    assert got.last_record_clocks.max() <= skin.derived.label_clocks - 1
     if labeller == "run" and connectivity == 8:
         assert got.last_record_clocks.max() <= columns / 2 + 5
     return got, expected

@@ -23,7 +23,7 @@ from link_bench import (
 from sample import sample
 
 from contactfpga import Skin
-from contactfpga.skin.derived import KEEP_ALIVE_BIT, Derived
+from contactfpga.skin.derived import KEEP_ALIVE_BIT
 from contactfpga_hdl.link import link as link_module
 from contactfpga_hdl.link import odometer
 
@@ -264,7 +264,7 @@ def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng
     sim.drive(dut.time, lambda cycle: turns[cycle] << KEEP_ALIVE_BIT)
     due, send = sim.watch(dut.due), sim.watch(dut.frames.verdict.send)
     sim.run(cycles - 1)
-    most = Derived(skin).keep_alive_turns
+    most = skin.derived.keep_alive_turns
     passed = most
     for cycle in range(cycles - 1):
         is_due = passed >= most

@@ -21,7 +21,7 @@ from reversal import (
 from toy_labeller import TOY
 
 from contactfpga.skin import Skin
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga_sim.model.golden import Timeline, Trace, driven, predict
 from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare

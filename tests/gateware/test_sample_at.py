@@ -10,7 +10,7 @@ from amaranth.lib.wiring import In, Out
 from sample import sample
 
 from contactfpga import Skin
-from contactfpga.skin.derived import SAMPLE_AT, Derived
+from contactfpga.skin.derived import SAMPLE_AT
 from contactfpga_hdl.scan.pins import sample_at_ports
 from contactfpga_hdl.scan.sample_at import SampleAt
 from contactfpga_sim.model.golden import Timeline, predict
@@ -80,7 +80,7 @@ def commanded(skin: Skin, seed: int, frames: int) -> Timeline:
 @pytest.mark.parametrize("name", sample(SKINS, quick=QUICK))
 def test_the_whole_board_is_the_golden_models_in_every_clock(name):
     skin = SKINS[name]
-    assert SAMPLE_AT in Derived(skin).commands
+    assert SAMPLE_AT in skin.derived.commands
     cycles = max(25 * facts(skin).scan_clocks, 5_000)
     timeline = commanded(skin, len(name), cycles // facts(skin).scan_clocks)
     expected = predict(skin, timeline, cycles)
@@ -93,7 +93,7 @@ class Alone(wiring.Component):
     """What obeys the command, without a scan."""
 
     def __init__(self, skin: Skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         outputs = {"begins": In(1), "clock": Out(range(self.derived.settle_clocks + 1)), "early": Out(1)}
         super().__init__(sample_at_ports(self.derived) | outputs)
 

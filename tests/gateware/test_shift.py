@@ -181,7 +181,7 @@ def test_derived_clocks_are_those_of_the_rules():
         registers = not (isinstance(rows, int) and isinstance(columns, int))
         options = {"shift_hz": shift_hz} if registers else {}
         skin = skin_of(rows, columns, megahertz, settle_us=20.0, release_us=1.0, **options)
-        mine, theirs = times(skin), Derived(skin)
+        mine, theirs = times(skin), skin.derived
         assert (mine.settle, mine.release) == (theirs.settle_clocks, theirs.release_clocks)
         assert (mine.first, mine.late) == (theirs.row_shift_clocks, theirs.column_shift_clocks)
         if registers:
@@ -374,7 +374,7 @@ def test_a_slip_in_the_gatewares_clocks_is_seen(bench, rng, monkeypatch, name):
     skin = skin_of((10, 2), (10, 2), settle_us=4.0, release_us=1.5)
     cells = changing(rng, skin, slots(skin, 12))
     wanted = expected_driven(skin, len(cells)), expected_rows(skin, cells)
-    slipped = getattr(Derived(skin), name) + 1
+    slipped = getattr(skin.derived, name) + 1
     monkeypatch.setattr(Derived, name, property(lambda self: slipped))
     got = run(bench, skin, cells)
     assert (got.driven, got.rows) != wanted

@@ -9,7 +9,6 @@ from amaranth.hdl import Value
 from sample import sample
 
 from contactfpga import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan import raster
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.units import Units
@@ -146,7 +145,7 @@ def test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it(bench, rn
     """Each sweep reads numbers that say which one it is. Some are complete in the clock in which the one before is
     taken."""
     skin, cycles = SKINS["sums"], 9_000
-    sweep = Derived(skin).units.sweep_clocks
+    sweep = skin.derived.units.sweep_clocks
     timeline = Timeline([], units=[(3 + n * sweep, [3 * n, 3 * n + 1, 3 * n + 2]) for n in range(cycles // sweep)])
     ready = [cycle for cycle, _ in units.play(facts(skin), timeline, [], cycles).packets]
     dut = Units(skin)
@@ -192,7 +191,7 @@ def test_pins_keep_the_times_of_the_data_sheet(bench, clock_hz, supply_v):
     dut = Mcp3208(skin)
     sim = bench(dut)
     clock, select_n, mosi = (sim.watch(getattr(dut.pins, name)) for name in converter.Mcp3208.reads)
-    sim.run(4 * Derived(skin).units.spacing_clocks)
+    sim.run(4 * skin.derived.units.spacing_clocks)
     s, most_hz = 1 / clock_hz, LIMITS[supply_v][0]
     edges = changes(clock.values)
     rises = [cycle for cycle, level in edges if level]
@@ -228,7 +227,7 @@ def test_a_converter_that_answers_late_is_read(bench, delay_ns):
 def test_contact_rises_within_a_sweep_and_eight_clocks():
     """Of a sweep in which all units see it; of a touch at any other moment, within a conversion more."""
     skin = SKINS["sums"].replace(fail_safe=True)
-    derived = Derived(skin).units
+    derived = skin.derived.units
     begun, sweep = 2 * derived.level_clocks + 1, derived.sweep_clocks
     set_all = [
         Request(0, 1, False, one) for one in ((THRESHOLD, 2 | 900 << 3), (SUM_THRESHOLD, 3 | 900 // 8 << 3))
@@ -331,7 +330,7 @@ def test_a_converter_with_its_own_pace_in_every_clock(bench, rng):
 @pytest.mark.parametrize("hz", [1_000_000, 12_000_000, 25_000_000, 48_000_000])
 def test_a_board_with_such_a_converter_does_what_the_golden_model_says(hz):
     skin = PACED.replace(clock_hz=hz, baud=hz // 4, units=8, unit_sums=[[1] * 8])
-    cycles = 6 * Derived(skin).units.sweep_clocks
+    cycles = 6 * skin.derived.units.sweep_clocks
     rng = random.Random(5)
     command_bytes = command(129 * 128 + 1, THRESHOLD, 1 | 2**12 << 3, bit_clocks=4)
     timeline = Timeline([], [(300, command_bytes)], units=wide_readings(rng, skin, cycles))

@@ -1,9 +1,11 @@
 """The golden model of the whole chain: rules of docs/timing.md worked by hand, and packets read back."""
 
 import math
+import re
 import subprocess
 import sys
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,6 @@ from cobs import cobs
 from shadows import zones_by_image_tools
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.golden import Timeline, predict
@@ -49,7 +50,7 @@ def packets(skin: Skin, trace: golden.Trace) -> list[tuple[int, bytes]]:
 
 def sent_frames(skin: Skin, trace: golden.Trace) -> list[protocol.Frame]:
     plain = [packet for _, packet in packets(skin, trace) if protocol.kind_of(packet) != protocol.KIND_HELLO]
-    return [protocol.decode_frame(packet, Derived(skin)) for packet in plain]
+    return [protocol.decode_frame(packet, skin.derived) for packet in plain]
 
 
 def test_rows_records_and_contact_of_the_reference_skin_by_hand():
@@ -79,7 +80,7 @@ def test_bytes_and_line_of_the_reference_skin_by_hand():
     delimiter = 2 + 40 * (len(hello) - 1)
     assert trace.bytes[len(hello)][0] == delimiter + 40
     (begun, plain), *_ = packets(skin, trace)[1:]
-    frame = protocol.decode_frame(plain, Derived(skin))
+    frame = protocol.decode_frame(plain, skin.derived)
     assert (begun, frame.sequence, frame.time_us, frame.cells, frame.zones) == (
         delimiter + 40,
         0,
@@ -244,7 +245,7 @@ def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
         if protocol.kind_of(plain) == protocol.KIND_HELLO:
             assert protocol.HelloReader().take(plain).sheet == skin.sheet
             continue
-        frame = protocol.decode_frame(plain, Derived(skin))
+        frame = protocol.decode_frame(plain, skin.derived)
         scans = [  # a few, where a scan takes less than a microsecond
             number
             for number in range(len(rows) // skin.rows)
@@ -286,7 +287,7 @@ def test_widths_of_barycenters_agree_with_the_gatewares_table_for_every_sheet():
         for columns in (1, 2, 3, rows, 31, 64):
             for bits in (0, 4, 8):
                 skin = Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=bits, settle_us=500.0)
-                mine, theirs = facts(skin), Derived(skin)
+                mine, theirs = facts(skin), skin.derived
                 assert mine.barycenter_bits == theirs.record_bits, (rows, columns, bits)
                 assert (mine.division, mine.item_bytes) == (theirs.quotient_bits, theirs.item_bytes)
 
@@ -296,7 +297,7 @@ def test_widths_agree_with_the_gatewares_table_for_every_sheet():
         for columns in (1, 2, 3, rows, 31, 64):
             for connectivity in (4, 8):
                 skin = Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=500.0)
-                mine, theirs = facts(skin), Derived(skin)
+                mine, theirs = facts(skin), skin.derived
                 for name in ("area_bits", "sum_x_bits", "sum_y_bits", "zones_bits", "item_bytes"):
                     assert getattr(mine, name) == getattr(theirs, name), (rows, columns, connectivity, name)
 
@@ -319,7 +320,7 @@ def test_clocks_agree_with_the_gatewares_table_where_decimals_are_not_exact(mega
                 send="on_change",
                 keep_alive_ms=scans * scan_us / 1000,
             )
-            mine, theirs = facts(skin), Derived(skin)
+            mine, theirs = facts(skin), skin.derived
             assert mine.scan_clocks == theirs.frame_clocks == rows * row_clocks
             assert (mine.press_scans, mine.release_scans) == (theirs.press_scans, theirs.release_scans)
             assert (mine.press_scans, mine.release_scans) == (scans, scans + 1)
@@ -331,3 +332,9 @@ def test_golden_model_runs_without_amaranth():
     code = "import sys, contactfpga_sim.model.golden; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not [name for name in loaded if name.split(".")[0] in ("amaranth", "contactfpga_hdl")]
+
+
+def test_the_golden_model_asks_a_skin_for_nothing_derived():
+    """It computes widths and times itself; the linter sees imports alone."""
+    folder = Path(golden.__file__).parent
+    assert [path.name for path in folder.rglob("*.py") if re.search(r"\bderived\b", path.read_text())] == []

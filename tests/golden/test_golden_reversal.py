@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from reversal import small, zones
 
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga_sim.model.golden import Timeline, predict
 
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from refused_skins import CLOSED, REFUSED, REVERSAL
 
 from contactfpga import Skin, SkinError
-from contactfpga.skin.derived import Derived
 
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
 
@@ -99,7 +98,7 @@ def test_a_closed_sheet_is_read_from_the_file_that_is_written_of_it(tmp_path):
 
 
 def test_a_small_baud_error_is_accepted():
-    assert Derived(Skin(baud=921_600)).bit_clocks == 13
+    assert Skin(baud=921_600).derived.bit_clocks == 13
 
 
 @pytest.mark.parametrize(("baud", "good"), [(2_960_000, True), (2_950_000, False)])
@@ -140,7 +139,7 @@ def test_the_reference_skin():
     assert (skin.rows, skin.columns, skin.connectivity, skin.report) == (16, 16, 8, "moments")
     assert (skin.clock_hz, skin.baud, skin.settle_us, skin.release_us) == (12_000_000, 3_000_000, 5.0, 1.0)
     assert (skin.debounce, skin.send, skin.scan) == ("none", "always", "raster")
-    assert Derived(skin).frame_clocks == 16 * 72
+    assert skin.derived.frame_clocks == 16 * 72
 
 
 def test_a_skin_does_not_change():

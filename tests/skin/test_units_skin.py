@@ -4,7 +4,6 @@ import pytest
 import toy_converter
 
 from contactfpga import Skin, SkinError
-from contactfpga.skin.derived import Derived
 
 
 def test_a_converter_of_ones_own_is_found_and_has_its_own_channels():
@@ -30,6 +29,6 @@ def test_a_file_keeps_units(tmp_path):
 def test_eight_units_take_80_us_at_5_v_and_160_us_below(clock_hz, supply_v, level, sweep_us):
     """A level is a whole number of clocks."""
     skin = Skin(clock_hz=clock_hz, baud=clock_hz // 10, units=8, converter_v=supply_v, settle_us=50.0)
-    units = Derived(skin).units
+    units = skin.derived.units
     assert units.level_clocks == level
     assert units.sweep_clocks / clock_hz * 1e6 == pytest.approx(sweep_us)

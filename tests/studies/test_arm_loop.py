@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.latency import latency_s
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
@@ -52,12 +51,12 @@ def golden():
     cells = np.zeros((SKIN.rows, SKIN.columns), bool)
     cells[8, 8] = True
     closes = round((paper("pin").outcome.closes_s + LEAD) * SKIN.clock_hz)
-    return predict(SKIN, Timeline([(closes, cells, None)]), closes + 8 * Derived(SKIN).frame_clocks)
+    return predict(SKIN, Timeline([(closes, cells, None)]), closes + 8 * SKIN.derived.frame_clocks)
 
 
 def frame_ends(trace):
     """Times in s from the touch at which the stop bits of frames with a zone end."""
-    end = 1 + 10 * Derived(SKIN).bit_clocks
+    end = 1 + 10 * SKIN.derived.bit_clocks
     return [(got.last + end) / SKIN.clock_hz - LEAD for got in frames_in(SKIN, trace.bytes) if got.frame.cells]
 
 
@@ -87,7 +86,7 @@ def test_what_comes_together_in_a_usb_packet_is_heard_at_once(by_uart):
 
 
 def test_detection_is_no_later_than_the_sum_of_its_bounds(by_pin, by_uart):
-    scan = Derived(SKIN).frame_clocks / SKIN.clock_hz
+    scan = SKIN.derived.frame_clocks / SKIN.clock_hz
     assert by_pin.outcome.detected_s - by_pin.outcome.closes_s <= scan + 3e-6
     usb = PAPER.usb
     bound = latency_s(SKIN) + usb.timer_s + usb.frame_s + usb.host_s
@@ -121,7 +120,7 @@ def test_the_arm_goes_back_until_nothing_is_closed_then_slows_to_rest(way):
 def test_a_byte_damaged_on_the_wire_costs_a_frame(golden):
     """One byte of the first frame that tells of the contact: the next frame does, 96 us later."""
     first, second = frame_ends(golden)[:2]
-    byte = 10 * Derived(SKIN).bit_clocks / SKIN.clock_hz
+    byte = 10 * SKIN.derived.bit_clocks / SKIN.clock_hz
     clean = direct()
     noisy = run(DIRECT, "uart", faults=Faults(noise_s=(first - 8.5 * byte, first - 7.5 * byte))).outcome
     assert noisy.detected_s - clean.detected_s == pytest.approx(second - first, abs=2 * STEP)
@@ -160,7 +159,7 @@ def test_a_latency_timer_left_at_16_ms_costs_what_a_full_packet_takes(golden, by
     """A frame of 17 bytes every 96 us fills a packet in 3 ms, which is sooner; still it costs force."""
     leads = [LEAD + 4 * number * PAPER.control.period_s for number in range(3)]
     outcomes = [run(PAPER.but(usb={"timer_s": 16e-3}, run={"lead_s": lead}), "uart").outcome for lead in leads]
-    full = 510 / 17 * Derived(SKIN).frame_clocks / SKIN.clock_hz
+    full = 510 / 17 * SKIN.derived.frame_clocks / SKIN.clock_hz
     worst = max(one.detected_s for one in outcomes) - frame_ends(golden)[0]
     assert PAPER.usb.timer_s + PAPER.usb.frame_s + PAPER.usb.host_s < worst < full + 3 * PAPER.usb.frame_s
     assert max(one.peak_force_n for one in outcomes) > by_uart.outcome.peak_force_n + 1

@@ -14,7 +14,6 @@ from scipy.stats import binomtest
 from study_pages import section
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
 from contactfpga_sim.lab import kept
@@ -120,7 +119,7 @@ def test_the_time_is_that_of_the_compiled_board():
             board.hold(cells[None], clocks + 1)
             got = board.take("received")
         assert got["data"][-1] == protocol.DELIMITER
-        assert int(got["cycle"][-1]) == pytest.approx(start + clocks, abs=Derived(SMALL).bit_clocks)
+        assert int(got["cycle"][-1]) == pytest.approx(start + clocks, abs=SMALL.derived.bit_clocks)
         assert list(got["data"][-size:]).count(protocol.DELIMITER) == 1
 
 
@@ -147,7 +146,7 @@ def test_a_frame_of_an_adaptive_scan_takes_at_most_2_percent_more_than_the_bound
         if not cells.any():  # fingers between switches 20 mm apart
             continue
         _, size = speed.touch(skin, cells, 0.3)
-        bound = (int(cells.any(axis=1).sum()) + 1) * Derived(skin).row_clocks + size * 10 * Derived(skin).bit_clocks
+        bound = (int(cells.any(axis=1).sum()) + 1) * skin.derived.row_clocks + size * 10 * skin.derived.bit_clocks
         over.append(steady.frame_clocks(skin, cells, size) / bound - 1)
     assert min(over) > 0
     assert max(over) <= 0.02

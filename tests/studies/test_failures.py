@@ -15,7 +15,6 @@ from shadows import zones_by_image_tools
 from study_pages import section
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, tables, touch
@@ -301,7 +300,7 @@ def test_a_row_is_missed_where_its_switches_do_not_lift_it_to_vih(turn):
 @pytest.mark.parametrize("method", ["sym_defer_pk", "asym_eager_defer_pk"])
 def test_a_bounce_is_seen_once_it_lasts_longer_than_the_release_time(turn, method):
     found = turn("bounce", f"`{method}`")
-    assert between(found, Derived(touch.debounced(method)).skin.debounce_release_us)
+    assert between(found, touch.debounced(method).derived.skin.debounce_release_us)
     assert max(outcome.amount for outcome in found.outcomes) == 2
 
 

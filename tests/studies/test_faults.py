@@ -7,7 +7,6 @@ import pytest
 from study_pages import outdated, section
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
 from contactfpga_sim.lab.safety import compute, start, tables, trial
 from contactfpga_sim.lab.safety.catalogue import FAULTS
@@ -20,7 +19,7 @@ pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
 
-LIMIT_US = 2 * Derived(GUARDED).frame_clocks // Derived(GUARDED).clocks_per_us + 1000
+LIMIT_US = 2 * GUARDED.derived.frame_clocks // GUARDED.derived.clocks_per_us + 1000
 """Two frames and a millisecond: what guard lines promise."""
 
 GUARDED_TELLS = {"broken row", "broken column", "row connector", "column connector", "selected row", "stuck column"}
@@ -160,5 +159,5 @@ def test_a_self_test_at_power_up_tells_joined_lines_and_shorted_diodes(fault):
     times = list(start.found(fault).values())
     assert len(times) > 10
     assert None not in times
-    assert max(times) < start.clocks(start.TESTED) / Derived(start.TESTED).clocks_per_us < 100
+    assert max(times) < start.clocks(start.TESTED) / start.TESTED.derived.clocks_per_us < 100
     assert start.told_us(Hurt()) is None

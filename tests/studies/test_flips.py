@@ -11,7 +11,6 @@ import pytest
 from study_pages import section
 
 from contactfpga import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept, registry
 from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, touches
@@ -185,7 +184,7 @@ def test_contact_is_high_from_a_restart_until_a_frame_after_it():
     rises, falls = board.take("contact")
     assert (rises["data"], falls["data"]) == (1, 0)
     assert rises["cycle"] - 10_003 <= 3
-    scan = Derived(PLAIN).frame_clocks
+    scan = PLAIN.derived.frame_clocks
     assert scan < falls["cycle"] - rises["cycle"] < 2 * scan + 100
     board.close()
 

@@ -1,6 +1,6 @@
 """What the product reads in bytes that a board sent."""
 
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga.wire import framing, protocol
 from contactfpga.wire.hello import KIND_HELLO
 

@@ -2,7 +2,7 @@
 
 from wire import Wire
 
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga.wire import protocol
 
 

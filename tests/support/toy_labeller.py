@@ -5,7 +5,6 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
 
 from contactfpga.choices.labellers import Labeller
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import labeller_ports, row_number
 from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
 
@@ -25,7 +24,7 @@ class RowLabeller(wiring.Component):
     """A row handed over in clock h leaves as a zone in clock h + 1; the end mark comes a clock after the last one."""
 
     def __init__(self, skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):

@@ -1,6 +1,6 @@
 """Packets without their delimiter and check bytes."""
 
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga.wire import protocol
 
 

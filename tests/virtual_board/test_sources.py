@@ -124,7 +124,7 @@ def test_each_file_that_python_loads_for_the_gateware_changes_the_key_of_a_board
     now, changed = keys(copy, BOARD, loaded)
     assert [str(file) for file, key in changed.items() if key == now] == []
     assert len(set(changed.values())) == len(loaded)
-    for named in ("row_times", "rates", "limits"):
+    for named in ("derived", "checks", "limits"):
         assert copy / f"py/contactfpga/skin/{named}.py" in changed
 
 
@@ -174,7 +174,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
                 "chart/errors.py",
                 "chart/speed.py",
                 "../model/golden/label.py",
-                "../../../py/contactfpga/skin/row_times.py",
+                "../../../py/contactfpga/skin/derived.py",
             ],
         ),
         ("contactfpga_sim.lab.fit.measuring", ["fit/sources.py", "chart/compute.py", "../model/scenes/shapes.py"]),
@@ -307,27 +307,26 @@ def test_another_compiler_version_or_option_is_another_library(tmp_path, monkeyp
 COUNTED = """
 import numpy as np
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.board.compiled import CompiledBoard
 skin = Skin(rows=2, columns=2)
 with CompiledBoard(skin, capture=("rows",)) as board:
     board.run(2000)
-    print(Derived(skin).row_clocks, int(np.diff(board.take("rows")["cycle"])[4]))
+    print(skin.derived.row_clocks, int(np.diff(board.take("rows")["cycle"])[4]))
 """
 
 
 @pytest.mark.slow  # it compiles two boards
 def test_host_and_board_count_the_same_clocks_when_the_settle_time_is_changed(copy, tmp_path):
-    row_times = copy / "py/contactfpga/skin/row_times.py"
-    before = row_times.read_text(encoding="utf-8")
+    derived = copy / "py/contactfpga/skin/derived.py"
+    before = derived.read_text(encoding="utf-8")
     counted = [run(copy, COUNTED, CONTACTFPGA_CACHE=str(tmp_path / "cache"))]
     longer = before.replace(
         "return max(self.clocks(self.skin.settle_us),", "return 3 + max(self.clocks(self.skin.settle_us),"
     )
     assert longer != before
-    row_times.write_text(longer, encoding="utf-8")
+    derived.write_text(longer, encoding="utf-8")
     counted.append(run(copy, COUNTED, CONTACTFPGA_CACHE=str(tmp_path / "cache")))
-    row_times.write_text(before, encoding="utf-8")
+    derived.write_text(before, encoding="utf-8")
     (host, board), (later_host, later_board) = (map(int, lines[-1].split()) for lines in counted)
     assert (host, later_host) == (board, later_board)
     assert later_host == host + 3

@@ -22,7 +22,7 @@ from wire import (
 )
 
 from contactfpga import Skin
-from contactfpga.skin.widths import LONGEST_PACKET, Widths
+from contactfpga.skin.derived import LONGEST_PACKET, Widths
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import HelloReader, OldPacket, PacketError
 

@@ -6,7 +6,6 @@ import pytest
 from wire import digits
 
 from contactfpga import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.wire.framing import PacketError
 from contactfpga.wire.units import (
@@ -20,7 +19,7 @@ from contactfpga.wire.units import (
 )
 
 SKIN = Skin(units=6, unit_sums=[[1] * 6, [127] * 6])
-FACTS = UnitFacts.of(Derived(SKIN).units)
+FACTS = UnitFacts.of(SKIN.derived.units)
 WIDE = dataclasses.replace(FACTS, bits=24, sum_bits=30)
 
 

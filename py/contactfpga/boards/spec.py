@@ -14,7 +14,6 @@ from pathlib import Path
 
 from contactfpga.boards import pll
 from contactfpga.skin import Skin, SkinError
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several
 
 NAME = "contactfpga"
@@ -28,7 +27,7 @@ def unit_ports(skin: Skin) -> tuple[str, ...]:
     """Those of a Skin's converter; none without units."""
     if not skin.units:
         return ()
-    return UNIT_PORTS if Derived(skin).units.converter.pace is not None else UNIT_PORTS[2:]
+    return UNIT_PORTS if skin.derived.units.converter.pace is not None else UNIT_PORTS[2:]
 
 
 MAX_BRIDGE_ERROR = 0.03

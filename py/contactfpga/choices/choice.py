@@ -7,16 +7,15 @@ import contextvars
 import dataclasses
 import importlib
 import importlib.util
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import shown
 
-if TYPE_CHECKING:
-    from contactfpga.skin import Skin
-
+Bound = Callable[[Any], int]
+"""Clocks or slots that a choice takes at most, from the :class:`~contactfpga.skin.derived.Derived` of a Skin."""
 
 FIELDS = ("labeller", "scan", "debounce", "converter")
 """Fields of a Skin that may name a choice of your own, ``module:attribute``."""
@@ -115,8 +114,8 @@ def load_own(place: str, what: str) -> Any:
         raise SkinError(f"{what} cannot be loaded: {type(error).__name__}: {error}") from error
 
 
-def own_files(skin: Skin) -> set[Path]:
-    """Files of the modules that the Skin's choices of your own name, for keys of what is kept."""
+def own_files(skin: object) -> set[Path]:
+    """Files of the modules that a Skin's choices of your own name, for keys of what is kept."""
     own = [
         load(value) for value in (getattr(skin, field) for field in FIELDS) if isinstance(value, str) and ":" in value
     ]

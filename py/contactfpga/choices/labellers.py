@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from contactfpga.choices.choice import Choice
+from contactfpga.choices.choice import Bound, Choice
 from contactfpga.choices.choice import find as find_choice
-
-if TYPE_CHECKING:
-    from contactfpga.skin.derived import Derived
-
-Clocks = Callable[["Derived"], int]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -26,11 +20,11 @@ class Labeller(Choice):
     exact: bool
     """Zones are the connected components of the cells, with the Skin's connectivity. Connectivity makes no difference
     to a labeller that is not exact."""
-    end_clocks: Clocks
+    end_clocks: Bound
     """The most clocks from a frame's last row to its end mark; the last record leaves earlier."""
-    row_clocks: Clocks
+    row_clocks: Bound
     """The most clocks from a row to the next one it can take."""
-    empty_row_clocks: Clocks = lambda derived: 1
+    empty_row_clocks: Bound = lambda derived: 1
     """The same for an empty row below an empty row."""
     closed: bool = False
     """It joins zones over the seam of a sheet whose ends meet."""

@@ -5,18 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
-from contactfpga.choices.choice import Choice
+from contactfpga.choices.choice import Bound, Choice
 from contactfpga.choices.choice import find as find_choice
 from contactfpga.errors import SkinError
-
-if TYPE_CHECKING:
-    from contactfpga.skin import Skin
-    from contactfpga.skin.derived import Derived
-    from contactfpga.skin.row_times import RowTimes
-
-Count = Callable[["Derived"], int]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -40,20 +33,20 @@ class Scan(Choice):
     """It looks at the guard lines of a Skin with ``guard``, and has the port ``faults``."""
     moves_sample: bool = False
     """It obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
-    check: Callable[[Skin], None]
+    check: Callable[[Any], None]
     """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
-    choice_clocks: Callable[[RowTimes], int]
+    choice_clocks: Bound
     """From a strobe until the next rows to drive are known; 0 where they are known beforehand."""
-    max_frame_slots: Count
+    max_frame_slots: Bound
     """The most row times that a frame can take."""
-    max_frame_clocks: Count
+    max_frame_clocks: Bound
     """The most clocks that a frame can take, from its first sample to its last."""
-    min_row_clocks: Count
+    min_row_clocks: Bound
     """The least clocks of a row time in which the later stages keep up, end mark and all; the scanner's tag is kept
     until the frame before it is packed, and no longer."""
 
 
-def _check_adaptive(skin: Skin) -> None:
+def _check_adaptive(skin: Any) -> None:
     if skin.rows < 2:
         raise SkinError(f"rows is {skin.rows}; scan = 'adaptive' needs at least 2")
     if skin.column_read != "direct":
@@ -68,7 +61,7 @@ def _check_adaptive(skin: Skin) -> None:
         )
 
 
-def _check_reversal(skin: Skin) -> None:
+def _check_reversal(skin: Any) -> None:
     if skin.row_drive != "direct":
         raise SkinError(
             f"row_drive is {skin.row_drive!r}; scan = 'reversal' needs row_drive = 'direct', as it reads the rows"
@@ -77,28 +70,31 @@ def _check_reversal(skin: Skin) -> None:
         raise SkinError("precharge_us is 0; scan = 'reversal' drives the columns, and needs a time for it")
 
 
-def _reversal_frame_clocks(derived: Derived) -> int:
+def _reversal_frame_clocks(derived: Any) -> int:
     """All rows are touched, and each waits until the one before it is debounced, labelled and counted; then guard lines
     are checked."""
     handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones) + 16
     checked = max(derived.project_clocks, derived.row_clocks) + 1 if derived.skin.guard else 0
-    return derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed) + checked
+    clocks: int = derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed) + checked
+    return clocks
 
 
-def _raster_min_row_clocks(derived: Derived) -> int:
+def _raster_min_row_clocks(derived: Any) -> int:
     packed = derived.packed_clocks + derived.items_clocks(derived.max_items)
-    return max(derived.skin.columns + 6, 10, derived.label_clocks + 1, math.ceil(packed / derived.skin.row_lines))
+    least: int = max(derived.skin.columns + 6, 10, derived.label_clocks + 1, math.ceil(packed / derived.skin.row_lines))
+    return least
 
 
-def _adaptive_min_row_clocks(derived: Derived) -> int:
+def _adaptive_min_row_clocks(derived: Any) -> int:
     """All that a slot tells is handed on before the next strobe: a row that was driven alone, then all others as empty,
     up to the end mark. And a frame with any number of pressed rows is packed before the next frame ends."""
     rows = derived.skin.rows
     handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
-    return max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
+    least: int = max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
+    return least
 
 
-def _adaptive_packing_clocks(derived: Derived, pressed: int) -> int:
+def _adaptive_packing_clocks(derived: Any, pressed: int) -> int:
     """The next frame drives the same rows again one by one, and all others together."""
     skin = derived.skin
     if not derived.report.zones:
@@ -108,7 +104,8 @@ def _adaptive_packing_clocks(derived: Derived, pressed: int) -> int:
     else:
         items = math.ceil(pressed * skin.columns / 2)
     clocks = derived.packed_clocks + skin.rows + derived.items_clocks(min(items, derived.max_items))
-    return math.ceil(clocks / min(pressed + 1, skin.rows))
+    least: int = math.ceil(clocks / min(pressed + 1, skin.rows))
+    return least
 
 
 ScanName = Literal["raster", "adaptive", "reversal"]

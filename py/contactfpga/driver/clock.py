@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.driver.stats import Stats
-from contactfpga.skin.derived import EPOCH_BITS
-from contactfpga.skin.widths import SEQUENCE_BITS, TIME_BITS, Widths
+from contactfpga.skin.derived import EPOCH_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import Frame, may_number
 from contactfpga.zones.host_line import HostLine

@@ -18,8 +18,8 @@ from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import LONGEST_PACKET, Widths
 from contactfpga.skin.sheet import Sheet
-from contactfpga.skin.widths import LONGEST_PACKET, Widths
 from contactfpga.wire import framing, many, protocol
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_slot, is_slot

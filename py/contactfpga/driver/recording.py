@@ -18,7 +18,7 @@ from contactfpga.driver.mcap import MAGIC, McapStream, files_of
 from contactfpga.driver.transport import Transport, counters_of
 from contactfpga.errors import ContactFPGAError, PortNotFound, ReplayEnded
 from contactfpga.inputs.files import open_regular, told
-from contactfpga.skin.widths import LONGEST_PACKET
+from contactfpga.skin.derived import LONGEST_PACKET
 
 if TYPE_CHECKING:
     pass

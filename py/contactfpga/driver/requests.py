@@ -6,7 +6,7 @@ import collections
 import enum
 import random
 
-from contactfpga.skin.widths import HEARD_BITS
+from contactfpga.skin.derived import HEARD_BITS
 from contactfpga.wire import protocol
 from contactfpga.wire.command import Command, encode_command
 

@@ -16,7 +16,7 @@ from contactfpga.driver.address import SheetOf
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.transport import Transport, connect
 from contactfpga.errors import ContactFPGAError, PortNotFound
-from contactfpga.skin.widths import LONGEST_PACKET
+from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire import framing
 from contactfpga.wire.framing import PacketError
 from contactfpga.wire.hello import Hello, HelloReader

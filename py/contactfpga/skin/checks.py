@@ -13,12 +13,12 @@ from contactfpga.choices.reports import REPORTS
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.skin import limits
-from contactfpga.skin.check_surface import check_surface
-from contactfpga.skin.check_units import check_units
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.units import MAX_SUMS, MAX_WEIGHT
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
+
 
 Mask = tuple[tuple[int, int], ...]
 
@@ -243,7 +243,7 @@ def check_timing(skin: Skin) -> None:
     _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
     for name in ("settle_us", "release_us", "precharge_us", "project_us"):
         _within(name, getattr(skin, name), 0.0, limits.MAX_ROW_US, "us")
-    derived = Derived(skin)
+    derived = skin.derived
     megahertz = skin.clock_hz // 1_000_000
     for name in ("settle_us", "release_us", "project_us", *(["precharge_us"] if skin.precharge_us else [])):
         if derived.clocks(getattr(skin, name)) < 1:
@@ -281,3 +281,95 @@ def _check_keep_alive(skin: Skin, derived: Derived) -> None:
 def _within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     if not low <= value <= high:
         raise SkinError(f"{name} is {shown(value)}; it must lie between {low} and {high} {unit}".rstrip())
+
+
+_MIN_RADIUS_MM, _MAX_RADIUS_MM = 0.1, 100_000.0
+_PITCH_TOLERANCE = 1e-3
+"""By which share a pitch may miss the one that the radius gives."""
+
+
+def check_surface(skin: Skin) -> dict[str, float]:
+    """Surface, radius and pitch go together; returns the pitch of a closed sheet."""
+    if skin.surface == "plane":
+        if skin.closed:
+            raise SkinError("surface is 'plane'; closed = true needs surface = 'cylinder' and radius_mm")
+        if skin.radius_mm is not None:
+            raise SkinError(f"radius_mm is {skin.radius_mm}; a plane has none, leave it out")
+        return {}
+    if skin.radius_mm is None:
+        raise SkinError("radius_mm is missing; surface = 'cylinder' needs it")
+    if not _MIN_RADIUS_MM <= skin.radius_mm <= _MAX_RADIUS_MM:
+        raise SkinError(
+            f"radius_mm is {shown(skin.radius_mm)}; it must lie between {_MIN_RADIUS_MM} and {_MAX_RADIUS_MM} mm"
+        )
+    around_mm = 2 * math.pi * skin.radius_mm
+    return _check_closed(skin, around_mm) if skin.closed else _check_gap(skin, around_mm)
+
+
+def _check_gap(skin: Skin, around_mm: float) -> dict[str, float]:
+    """The ends do not meet."""
+    if skin.columns * skin.pitch_x_mm >= around_mm:
+        most = math.ceil(around_mm / skin.pitch_x_mm) - 1
+        advice = f"use at most {most} columns" if most else "use a larger radius_mm or a smaller pitch_x_mm"
+        raise SkinError(
+            f"{skin.columns} columns of {skin.pitch_x_mm} mm take {skin.columns * skin.pitch_x_mm:g} mm of a "
+            f"circumference of {around_mm:g} mm: the sheet's ends meet; set closed = true, or {advice}"
+        )
+    return {}
+
+
+def _check_closed(skin: Skin, around_mm: float) -> dict[str, float]:
+    if skin.columns < limits.MIN_AROUND:
+        raise SkinError(f"columns is {skin.columns}; closed = true needs at least {limits.MIN_AROUND}")
+    if skin.ghosts:
+        raise SkinError("diodes is 'none'; closed = true needs 'col2row' or 'row2col'")
+    if skin.report == "barycenter":
+        raise SkinError("report is 'barycenter'; closed = true needs report = 'moments' or 'cells'")
+    if skin.report == "moments" and not labellers.find(skin.labeller).closed:
+        able = " or ".join(repr(name) for name, labeller in labellers.LABELLERS.items() if labeller.closed)
+        raise SkinError(f"labeller is {str(skin.labeller)!r}; closed = true needs labeller = {able}")
+    pitch_mm = around_mm / skin.columns
+    given = skin.pitch_x_mm != type(skin).pitch_x_mm
+    if given and abs(skin.pitch_x_mm / pitch_mm - 1) > _PITCH_TOLERANCE:
+        raise SkinError(
+            f"pitch_x_mm is {skin.pitch_x_mm}; {skin.columns} columns around a radius of {skin.radius_mm:g} mm have "
+            f"{pitch_mm:g} mm, leave it out"
+        )
+    if not limits.MIN_PITCH_MM <= pitch_mm <= limits.MAX_PITCH_MM:
+        raise SkinError(
+            f"{skin.columns} columns around a radius of {skin.radius_mm:g} mm have a pitch of {pitch_mm:g} mm; it must "
+            f"lie between {limits.MIN_PITCH_MM} and {limits.MAX_PITCH_MM} mm"
+        )
+    return {"pitch_x_mm": pitch_mm}
+
+
+def check_units(skin: Skin) -> dict[str, Any]:
+    """Units, converter and sums go together; returns the sums as tuples."""
+    converter = converters.find(skin.converter)
+    if not 0 <= skin.units <= converter.channels:
+        raise SkinError(f"units is {skin.units}; {converter.title} has {converter.channels} channels")
+    sums = _sums(skin.unit_sums, skin.units)
+    if not skin.units:
+        if skin.converter_v != limits.CONVERTER_V:
+            raise SkinError(f"converter_v is {skin.converter_v}; leave it out, or set units")
+        return {"unit_sums": sums}
+    least_v = converter.limits[0][0]
+    if not least_v <= skin.converter_v <= converter.most_v:
+        raise SkinError(f"converter_v is {skin.converter_v}; {converter.title} needs {least_v} to {converter.most_v} V")
+    return {"unit_sums": sums}
+
+
+def _sums(value: Any, units: int) -> tuple[tuple[int, ...], ...]:
+    if not isinstance(value, list | tuple) or len(value) > MAX_SUMS:
+        raise SkinError(f"unit_sums is {shown(value)}; it must be a list of at most {MAX_SUMS} lists of weights")
+    return tuple(_weights(row, units) for row in value)
+
+
+def _weights(row: Any, units: int) -> tuple[int, ...]:
+    weights = [whole(weight) for weight in row] if isinstance(row, list | tuple) else []
+    if len(weights) != units or not any(weights):
+        raise SkinError(f"unit_sums holds {shown(row)}; it must hold a weight for each of {units} units, not all 0")
+    found = tuple(weight for weight in weights if weight is not None and abs(weight) <= MAX_WEIGHT)
+    if len(found) != units:
+        raise SkinError(f"unit_sums holds {shown(row)}; weights are whole numbers from -{MAX_WEIGHT} to {MAX_WEIGHT}")
+    return found

@@ -1,18 +1,30 @@
-"""Everything that follows from a Skin: clocks, widths and depths, computed here and in the classes that it extends."""
+"""Everything that follows from a Skin or its sheet: widths in bits, sizes in bytes, clocks and depths."""
 
 from __future__ import annotations
 
 import functools
 import math
+from typing import TYPE_CHECKING
 
-from contactfpga.choices import debounces, labellers
+from contactfpga.choices import debounces, labellers, scans
 from contactfpga.choices.labellers import Labeller
-from contactfpga.skin.row_times import RowTimes, whole
+from contactfpga.choices.reports import REPORTS, Report
+from contactfpga.choices.scans import Scan
+from contactfpga.skin.limits import MAX_LINES
+from contactfpga.skin.sheet import Sheet
 from contactfpga.skin.units import Units
-from contactfpga.skin.widths import CHECK_BYTES as CHECK_BYTES
-from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
-from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
-from contactfpga.skin.widths import TIME_BITS as TIME_BITS
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+
+CHECK_BYTES = 3
+TIME_BITS = 24
+SEQUENCE_BITS = 8
+HEARD_BITS = 3
+"""Of a request's number, in each frame."""
+
+MIN_OVERWRITTEN_BITS = 4
 
 HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can wait for a frame and still come every second."""
@@ -34,8 +46,144 @@ SAMPLE_AT = 2
 """Of another one: sample the columns at another clock of the time for which a row is driven."""
 
 
-class Derived(RowTimes):
-    """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
+class Widths:
+    """Widths and sizes of a sheet's frames (docs/protocol.md)."""
+
+    def __init__(self, sheet: Sheet):
+        self.sheet = sheet
+
+    @property
+    def report(self) -> Report:
+        return REPORTS[self.sheet.report]
+
+    @functools.cached_property
+    def cells(self) -> int:
+        return self.sheet.rows * self.sheet.columns
+
+    @property
+    def zone_capacity(self) -> int:
+        return self.sheet.zone_capacity
+
+    @functools.cached_property
+    def area_bits(self) -> int:
+        return self.cells.bit_length()
+
+    @functools.cached_property
+    def sum_x_bits(self) -> int:
+        return max(1, (self.sheet.rows * math.comb(self.sheet.columns, 2)).bit_length())
+
+    @functools.cached_property
+    def sum_y_bits(self) -> int:
+        return max(1, (self.sheet.columns * math.comb(self.sheet.rows, 2)).bit_length())
+
+    @functools.cached_property
+    def zones_bits(self) -> int:
+        return self.sheet.max_zones().bit_length()
+
+    @functools.cached_property
+    def record_bits(self) -> tuple[int, ...]:
+        """Of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter; on a sheet whose ends meet
+        after them the cells past the seam.
+
+        An area that a barycenter goes with is never 0. So where the sheet's cells are a power of two all of them are
+        sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
+        """
+        if not self.report.divided:
+            turned = (self.area_bits,) if self.sheet.closed else ()
+            return self.area_bits, self.sum_x_bits, self.sum_y_bits, *turned
+        x_bits, y_bits = (
+            max(1, (lines - 1 << self.sheet.barycenter_bits).bit_length())
+            for lines in (self.sheet.columns, self.sheet.rows)
+        )
+        return max(1, (self.cells - 1).bit_length()), x_bits, y_bits
+
+    @functools.cached_property
+    def record_bytes(self) -> int:
+        """Bytes of one zone on the wire."""
+        return math.ceil(sum(self.record_bits) / 8)
+
+    @functools.cached_property
+    def bitmap_row_bytes(self) -> int:
+        """Bytes of one row on the wire with ``report = "cells"``."""
+        return math.ceil(self.sheet.columns / 8)
+
+    @functools.cached_property
+    def trailer_bytes(self) -> int:
+        """Bytes that close a frame, its kind byte among them."""
+        return math.ceil((self._counted_bits + MIN_OVERWRITTEN_BITS) / 8) + 1
+
+    @functools.cached_property
+    def overwritten_bits(self) -> int:
+        """What the other fields leave of the trailer: four bits or more."""
+        return 8 * (self.trailer_bytes - 1) - self._counted_bits
+
+    @property
+    def _counted_bits(self) -> int:
+        return TIME_BITS + SEQUENCE_BITS + HEARD_BITS + self.area_bits + self.zones_bits
+
+    @functools.cached_property
+    def item_bytes(self) -> int:
+        """Bytes of one item of a frame: a zone or a bitmap row."""
+        return self.record_bytes if self.report.zones else self.bitmap_row_bytes
+
+    @functools.cached_property
+    def max_items(self) -> int:
+        return self.zone_capacity if self.report.zones else self.sheet.rows
+
+    @functools.cached_property
+    def max_stored_bytes(self) -> int:
+        """The longest frame as the board keeps it: items and trailer, stuffed."""
+        plain = self.max_items * self.item_bytes + self.trailer_bytes
+        return plain + math.ceil(plain / 254)
+
+    @functools.cached_property
+    def max_frame_bytes(self) -> int:
+        """The longest frame on the wire: with its check bytes and its delimiter."""
+        return self.max_stored_bytes + CHECK_BYTES + 1
+
+
+LONGEST_PACKET = Widths(
+    Sheet(
+        rows=MAX_LINES,
+        columns=MAX_LINES,
+        connectivity=4,
+        report="moments",
+        barycenter_bits=0,
+        zone_capacity=MAX_LINES * MAX_LINES // 2,
+        pitch_x_mm=1.0,
+        pitch_y_mm=1.0,
+        radius_mm=1.0,
+        closed=True,
+        ghosts=False,
+    )
+).max_frame_bytes
+"""No frame of any Skin takes more bytes on the wire."""
+
+
+SAMPLED_BIT_CLOCKS = 4
+"""From this many clocks per bit on, a receiver can sample near the middle of each bit."""
+
+
+def bit_clocks(clock_hz: int, baud: int) -> int:
+    """Clocks of the gateware per bit on the wire."""
+    return round(clock_hz / baud)
+
+
+def pulsed(clock_hz: int, baud: int) -> bool:
+    """Whether the board is sent pulses instead of bytes (docs/protocol.md): it has too few clocks per bit to sample."""
+    return bit_clocks(clock_hz, baud) < SAMPLED_BIT_CLOCKS
+
+
+class Derived(Widths):
+    """Clocks, widths and depths of a :class:`~contactfpga.Skin`, which has them as its ``derived``."""
+
+    def __init__(self, skin: Skin):
+        super().__init__(skin.sheet)
+        self.skin = skin
+
+    @functools.cached_property
+    def scan(self) -> Scan:
+        return scans.find(self.skin.scan)
 
     @functools.cached_property
     def labeller(self) -> Labeller:
@@ -56,6 +204,108 @@ class Derived(RowTimes):
     def units(self) -> Units:
         """What follows from its pressure units."""
         return Units(self.skin)
+
+    # ---- clocks in which lines are driven and read, and those of a bit on the link
+
+    @property
+    def clocks_per_us(self) -> int:
+        return self.skin.clock_hz // 1_000_000
+
+    def clocks(self, us: float) -> int:
+        """Clocks that last at least this many microseconds."""
+        return whole(us * self.clocks_per_us)
+
+    @property
+    def settle_clocks(self) -> int:
+        """How long a row is driven: as asked, until the columns of the slot before and the next row are shifted."""
+        row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
+        return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
+
+    @property
+    def first_sample_clocks(self) -> int:
+        """The least value of the command "sample at": with shift registers the columns of the slot before are in by
+        then."""
+        return max(2, self.column_load_clocks + self.column_shift_clocks)
+
+    @property
+    def release_clocks(self) -> int:
+        """How long no row is driven: as asked, until the columns are shifted, the next row is latched, or chosen and
+        then shifted."""
+        column = self.column_load_clocks + self.column_shift_clocks
+        row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
+        precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
+        return max(self.clocks(self.skin.release_us), column, row, precharge)
+
+    @property
+    def precharge_clocks(self) -> int:
+        """How long columns are driven at least before a row is; 0: they never are."""
+        return self.clocks(self.skin.precharge_us)
+
+    @property
+    def project_clocks(self) -> int:
+        """How long all columns are driven and rows let go before these are sampled."""
+        return self.clocks(self.skin.project_us)
+
+    @property
+    def row_clocks(self) -> int:
+        return self.settle_clocks + self.release_clocks
+
+    @property
+    def shift_clocks(self) -> int:
+        """A bit on a chain of shift registers; two at least, as its clock has to rise and fall."""
+        return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
+
+    @property
+    def row_latch_clocks(self) -> int:
+        """The pulse that puts a shifted row pattern on the outputs; 0 with direct rows."""
+        return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
+
+    @property
+    def row_shift_clocks(self) -> int:
+        """From the order to shift a row pattern until it can be driven; 0 with direct rows."""
+        return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
+
+    @property
+    def column_load_clocks(self) -> int:
+        """The pulse that takes all columns at once, in whose last clock they are sampled; 0 with direct columns."""
+        return self.shift_clocks if self.skin.column_read == "74hc165" else 0
+
+    @property
+    def column_shift_clocks(self) -> int:
+        """How much later than direct ones the columns of a sample are known; 0 with direct columns."""
+        return self.column_chain_lines * self.column_load_clocks
+
+    @property
+    def row_levels(self) -> int:
+        """ceil(log2 rows): how often the rows can be halved until one is left."""
+        return (self.skin.rows - 1).bit_length()
+
+    @property
+    def choice_clocks(self) -> int:
+        """From a strobe until the scan can drive its next rows; 0 where it knows them beforehand."""
+        return self.scan.choice_clocks(self)
+
+    @property
+    def row_chain_lines(self) -> int:
+        return math.ceil(self.skin.row_lines / self.skin.row_chains)
+
+    @property
+    def column_chain_lines(self) -> int:
+        return math.ceil(self.skin.column_lines / self.skin.column_chains)
+
+    @property
+    def frame_clocks(self) -> int:
+        """One scan period: every row once, a guard row too. Frames of an adaptive scan take fewer or more clocks."""
+        return self.row_clocks * self.skin.row_lines
+
+    @property
+    def bit_clocks(self) -> int:
+        return bit_clocks(self.skin.clock_hz, self.skin.baud)
+
+    @property
+    def pulsed(self) -> bool:
+        """Requests come as pulses: a bit is too short to be sampled."""
+        return pulsed(self.skin.clock_hz, self.skin.baud)
 
     # ---- times, in clocks unless named otherwise
 
@@ -219,3 +469,8 @@ class Derived(RowTimes):
         busy = self.open_zones * self.item_clocks
         late = max(0.0, 1 - (2 if self.scan.even else 1) * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
+
+
+def whole(value: float) -> int:
+    """The next whole number upward, not counting what a float's rounding added."""
+    return math.ceil(value - 1e-9)

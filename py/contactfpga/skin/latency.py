@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contactfpga.choices import debounces
-from contactfpga.skin.derived import CHECK_BYTES, Derived
+from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.skin.skin import Skin
 
 AROUND_S = 3e-6
@@ -16,7 +16,7 @@ def latency_s(skin: Skin) -> float:
     A frame counts at its longest. Debounce adds the time that a press must last, a labeller that takes a
     cell per clock its clocks after the last row, and a board that divides those of a division.
     """
-    derived = Derived(skin)
+    derived = skin.derived
     items = 1 if derived.report.zones else derived.max_items
     plain = items * derived.item_bytes + derived.trailer_bytes
     packet = plain + -(-plain // 254) + CHECK_BYTES + 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 from pathlib import Path
@@ -19,6 +20,7 @@ from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 from contactfpga.skin import checks, limits
+from contactfpga.skin.derived import Derived
 from contactfpga.skin.sheet import Sheet, max_zones
 
 
@@ -264,6 +266,15 @@ class Skin:
             closed=self.closed,
             ghosts=self.ghosts,
         )
+
+    @functools.cached_property
+    def derived(self) -> Derived:
+        """Clocks, widths and depths of this Skin's board."""
+        return Derived(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what follows from them is worked out anew in another process."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def max_zones(self) -> int:
         """The most zones a frame of this sheet can hold; see :meth:`Sheet.max_zones`."""

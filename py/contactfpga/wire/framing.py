@@ -6,7 +6,7 @@ from __future__ import annotations
 import binascii
 
 from contactfpga.choices.reports import REPORTS
-from contactfpga.skin.widths import CHECK_BYTES
+from contactfpga.skin.derived import CHECK_BYTES
 
 VERSION = 2
 DELIMITER = 0

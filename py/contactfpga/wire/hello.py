@@ -8,8 +8,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from contactfpga.choices.reports import REPORTS
-from contactfpga.skin.derived import SELF_TEST, Derived
-from contactfpga.skin.rates import pulsed
+from contactfpga.skin.derived import SELF_TEST, pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
 from contactfpga.wire.numbered import Place
@@ -118,10 +117,10 @@ def encode_hello(
     facts += [(FINGERPRINT, skin.fingerprint), (RATES, _RATES.pack(skin.clock_hz, skin.baud))]
     if skin.name:
         facts.append((NAME, skin.name.encode()))
-    if commands := Derived(skin).commands:
+    if commands := skin.derived.commands:
         facts.append((COMMANDS, bytes(commands)))
     if skin.units:
-        facts.append((UNITS, UnitFacts.of(Derived(skin).units).encode()))
+        facts.append((UNITS, UnitFacts.of(skin.derived.units).encode()))
     if place is not None:
         facts.append((PLACE, bytes(place)))
     fixed = [bytes([kind, len(value)]) + value for kind, value in facts]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga.skin.widths import CHECK_BYTES
+from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import framing
 from contactfpga.wire.framing import PacketError
 from contactfpga.wire.hello import SHEET

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from contactfpga.skin.widths import CHECK_BYTES, HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
+from contactfpga.skin.derived import CHECK_BYTES, HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire.framing import FLAG_BITS, check_bytes
 from contactfpga.wire.protocol import FLAGS, KINDS
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from contactfpga.skin.widths import CHECK_BYTES
+from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import framing
 from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
 

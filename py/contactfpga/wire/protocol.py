@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga.skin.derived import HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.skin.sheet import Sheet
-from contactfpga.skin.widths import HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire.framing import (
     DELIMITER,
     DIGIT_BITS,

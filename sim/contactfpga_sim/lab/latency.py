@@ -10,7 +10,6 @@ import numpy as np
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.received import Received, Receiver
 
@@ -121,7 +120,7 @@ class _Bench:
 
     def __init__(self, skin: Skin):
         self._skin = skin
-        self._derived = Derived(skin)
+        self._derived = skin.derived
         self._untouched = np.zeros((skin.rows, skin.columns), bool)
         self._scan = self._derived.frame_clocks
         debounce = (skin.debounce_press_us + skin.debounce_release_us) * self._derived.clocks_per_us

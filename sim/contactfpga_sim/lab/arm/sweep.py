@@ -13,7 +13,6 @@ import numpy as np
 
 from contactfpga.design.cover.point import force_n
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.latency import AROUND_S, latency_s
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.arm.case import Case
@@ -121,7 +120,7 @@ def _thinnest(task: Task) -> Point:
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
     """The longest time from a switch to the controller's input by each way, in s, for this sheet and one zone."""
     usb = case.usb
-    scan = Derived(skin).max_frame_slots * Derived(skin).row_clocks / skin.clock_hz
+    scan = skin.derived.max_frame_slots * skin.derived.row_clocks / skin.clock_hz
     wire = latency_s(skin)
     return {"pin": scan + AROUND_S, "UART": wire + usb.timer_s + usb.frame_s + usb.host_s, "last byte": wire}
 

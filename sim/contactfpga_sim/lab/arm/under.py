@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
 from contactfpga_sim.lab.arm.case import Case
@@ -44,7 +43,7 @@ class Under:
 
     def commands(self) -> bytes:
         """Zeros, and the threshold of the plain sum."""
-        derived = Derived(self._skin)
+        derived = self._skin.derived
         facts = UnitFacts.of(derived.units)
         wanted = [zero_value(facts, unit, ZERO) for unit in range(3)]
         wanted.append(sum_threshold_value(facts, 0, round(THRESHOLD_N / GAIN_N)))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin
-from contactfpga.skin.widths import LONGEST_PACKET, Widths
+from contactfpga.skin.derived import LONGEST_PACKET, Widths
 from contactfpga_sim.lab import writer
 
 COMPILER = "arm-none-eabi-gcc"

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab.chart import steady
 from contactfpga_sim.model.board.received import frames_in
 from contactfpga_sim.model.golden import Timeline, Trace, predict
@@ -45,7 +44,7 @@ class Speed:
 
 def touch_cycle(skin: Skin, share: float) -> int:
     """When a touch begins, after ``share`` of a scan."""
-    scan = Derived(skin).frame_clocks
+    scan = skin.derived.frame_clocks
     return int((math.ceil(steady.WARM_US * skin.clock_hz / 1e6 / scan) + share) * scan)
 
 
@@ -54,7 +53,7 @@ def last_byte(skin: Skin, trace: Trace, cells: int) -> tuple[int, int] | None:
     the trace ends before."""
     for got in frames_in(skin, trace.bytes):
         if got.frame.cells == cells:
-            return got.last + 10 * Derived(skin).bit_clocks, got.size
+            return got.last + 10 * skin.derived.bit_clocks, got.size
     return None
 
 
@@ -67,8 +66,8 @@ def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> t
     start = touch_cycle(skin, share)
     timeline = Timeline([(start, cells, None)])
     cycles = start
-    while cycles < start + MOST_SCANS * Derived(skin).frame_clocks:
-        cycles = start + 2 * max(cycles - start, 2 * Derived(skin).frame_clocks)
+    while cycles < start + MOST_SCANS * skin.derived.frame_clocks:
+        cycles = start + 2 * max(cycles - start, 2 * skin.derived.frame_clocks)
         trace = predict(skin, timeline, cycles)
         if found := last_byte(skin, trace, int(cells.sum())):
             if check:
@@ -83,7 +82,7 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     The first ``checked`` of them go through the compiled gateware as well; raises
     :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where it differs from the golden model.
     """
-    derived = Derived(skin)
+    derived = skin.derived
     us = skin.clock_hz / 1e6
     found: list[float] = []
     bounds: list[float] = []

@@ -7,7 +7,6 @@ import bisect
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.board.received import Received, frames_in
 from contactfpga_sim.model.golden import Timeline, beginnings, predict, requests
 
@@ -24,12 +23,12 @@ def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
     ``cells``: (R, C) bool, pressed from the start; ``size``: bytes of their frame. The frame is one that the keep-alive
     sends, with nothing changed.
     """
-    if Derived(skin).scan.waits:
+    if skin.derived.scan.waits:
         return _asked_clocks(skin, cells)
     longest = _longest(skin, size)
     quiet = skin.replace(send="on_change", keep_alive_ms=2e3 * longest / skin.clock_hz)
     last = [got for got in _held(quiet, cells, 8 * longest) if got.frame.cells == cells.sum()][-1]
-    end = last.last + 10 * Derived(skin).bit_clocks
+    end = last.last + 10 * skin.derived.bit_clocks
     begun = beginnings(quiet, Timeline([(0, cells, None)]), end)
     whole = bisect.bisect_right(begun, last.first) - 1  # frames whose scan had ended by then
     return end - begun[whole - 1]
@@ -39,14 +38,14 @@ def _asked_clocks(skin: Skin, cells: np.ndarray) -> int:
     """The same of a frame that the host asks for: a scan that waits would keep still for milliseconds."""
     quiet = skin.replace(send="on_change")
     asked = round(WARM_US * skin.clock_hz / 1e6)
-    received = requests([asked], Derived(skin).bit_clocks)
-    late = asked + 10 * Derived(skin).bit_clocks * len(received[0][1])
+    received = requests([asked], skin.derived.bit_clocks)
+    late = asked + 10 * skin.derived.bit_clocks * len(received[0][1])
     timeline = Timeline([(0, cells, None)], received)
-    end = late + 4 * Derived(skin).max_frame_clocks
+    end = late + 4 * skin.derived.max_frame_clocks
     frame = next(got for got in frames_in(quiet, predict(quiet, timeline, end).bytes) if got.first > late)
     begun = beginnings(quiet, timeline, frame.first)
     whole = bisect.bisect_right(begun, frame.first) - 1
-    return frame.last + 10 * Derived(skin).bit_clocks - begun[whole]
+    return frame.last + 10 * skin.derived.bit_clocks - begun[whole]
 
 
 def frames_per_second(skin: Skin, cells: np.ndarray, size: int) -> float:
@@ -58,7 +57,7 @@ def frames_per_second(skin: Skin, cells: np.ndarray, size: int) -> float:
 
 def _longest(skin: Skin, size: int) -> int:
     """Clocks that a frame takes at most, scan and wire."""
-    derived = Derived(skin)
+    derived = skin.derived
     return derived.frame_clocks + 10 * derived.bit_clocks * size
 
 

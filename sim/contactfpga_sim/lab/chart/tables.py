@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab import pool, writer
 from contactfpga_sim.lab.chart import front_picture, host, numbers, picture, speed, steady
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, front, study
@@ -75,7 +74,7 @@ def host_table() -> str:
     lines = []
     for size in SHEETS:
         skin = Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
-        most = min(size * size // 4, Derived(skin).max_items)
+        most = min(size * size // 4, skin.derived.max_items)
         # Zones take longer the more there are, cells do not.
         even = bisect.bisect_left(range(1, most + 1), 0.0, key=lambda count: _later(skin, count)) + 1
         for count in sorted({1, 5, even - 1, even, most} & set(range(1, most + 1))):

@@ -9,7 +9,6 @@ import numpy as np
 
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import sizes
 from contactfpga_sim.lab import size, writer
 from contactfpga_sim.model.golden import volume
@@ -60,7 +59,7 @@ def worst(labeller: Labeller, connectivity: int) -> list[str]:
 def most(labeller: Labeller, connectivity: int) -> list[str]:
     """What no closed sheet exceeds: the end mark comes a clock later."""
     skins = (skin_of(lines, connectivity, labeller, True) for lines in size.SIZES)
-    return [str(Derived(skin).label_clocks - 1) for skin in skins]
+    return [str(skin.derived.label_clocks - 1) for skin in skins]
 
 
 def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:

@@ -10,7 +10,6 @@ import numpy as np
 from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
 from contactfpga.errors import ReadTimeout
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga_sim.lab.failures.knob import Outcome, Study
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
@@ -37,7 +36,7 @@ def _of_line(found: Heard, extra: str = "") -> Outcome:
 
 
 def _baud(sign: int, per_cent: float) -> Outcome:
-    bits = Derived(SKIN).bit_clocks / (1 + sign * per_cent / 100)
+    bits = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
     return _of_line(heard(recorded(), recorded().read(bits)))
 
 
@@ -57,7 +56,7 @@ def _send(rig: Rig, byte: int, bit: float) -> None:
 
 def _asked(sign: int, per_cent: float) -> Outcome:
     """The host's requests, at the host's rate, at the board's receive pin: does a frame answer?"""
-    bit = Derived(SKIN).bit_clocks / (1 + sign * per_cent / 100)
+    bit = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
     answered = 0
     lows = (1, 2, 3, 4)
     with Rig(SKIN) as rig:
@@ -92,7 +91,7 @@ BAUD = Study(
 def _noise(rate_hz: float) -> Outcome:
     """The port was opened before the noise began."""
     line = recorded(200)
-    noisy = line.noisy(rate_hz, seed=1).read(Derived(SKIN).bit_clocks)
+    noisy = line.noisy(rate_hz, seed=1).read(SKIN.derived.bit_clocks)
     return _of_line(heard(line, noisy, greeted=protocol.encode_hello(SKIN)))
 
 
@@ -110,7 +109,7 @@ NOISE = Study(
 def _clock(per_cent: float) -> Outcome:
     """The board's crystal is fast: bits are short, and so are its microseconds."""
     faster = 1 + per_cent / 100
-    found = heard(recorded(), recorded().read(Derived(SKIN).bit_clocks * faster))
+    found = heard(recorded(), recorded().read(SKIN.derived.bit_clocks * faster))
     if found.arrived < found.sent or found.wrong:
         return _of_line(found)
     told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
@@ -192,7 +191,7 @@ def _slow_host(milliseconds: float) -> Outcome:
             while transport.clock() < until:
                 times.append(board.next().time_us)
         stats = board.stats
-    scan_us = Derived(SKIN).frame_clocks / Derived(SKIN).clocks_per_us
+    scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
     missing = round((times[-1] - times[0]) / scan_us) + 1 - len(times) - stats.overwritten
     told = tuple(name for name in ("lost", "unexplained") if getattr(stats, name))
     what = f"{missing} frames missing, `lost` says {stats.lost}"

@@ -8,7 +8,6 @@ import functools
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab.failures.electric import finger, judged
 from contactfpga_sim.lab.failures.knob import Outcome, Study
 from contactfpga_sim.lab.failures.rig import (
@@ -82,7 +81,7 @@ def _stuck_columns(skin: Skin, count: float) -> Outcome:
     columns[[2, 12, 4, 14, 0, 10][: int(count)]] = True
     with Rig(skin) as rig:
         rig.board.stick(columns)
-        rig.board.hold(touch[None], hello_clocks(skin) + 4 * Derived(skin).frame_clocks)
+        rig.board.hold(touch[None], hello_clocks(skin) + 4 * skin.derived.frame_clocks)
         zones = rig.frames()[-1]
     return judged(zones, touch | columns, [touch])
 

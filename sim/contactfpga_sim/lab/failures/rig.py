@@ -8,7 +8,6 @@ import numpy as np
 
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Place
@@ -38,7 +37,7 @@ class Rig:
         self.skin = skin
         self.board = CompiledBoard(skin, capture)
         self.conversation = Conversation("the board")
-        self.scan = Derived(skin).frame_clocks
+        self.scan = skin.derived.frame_clocks
 
     def frames(self) -> list[Zones]:
         """All frames that have come since they were taken last."""
@@ -54,8 +53,8 @@ class Rig:
 
 def hello_clocks(skin: Skin) -> int:
     """Scans that the hello at power-up may take from frames, in clocks."""
-    scan = Derived(skin).frame_clocks
-    return scan * (math.ceil(HELLO_BYTES * 10 * Derived(skin).bit_clocks / scan) + 2)
+    scan = skin.derived.frame_clocks
+    return scan * (math.ceil(HELLO_BYTES * 10 * skin.derived.bit_clocks / scan) + 2)
 
 
 def still(skin: Skin, cells: np.ndarray, cuts: Cuts | None = None) -> Zones:
@@ -71,13 +70,13 @@ def seen(skin: Skin, frames: np.ndarray, cuts: Cuts | None = None) -> list[Zones
             rig.board.cut(cuts.rows, cuts.columns)
         start = hello_clocks(skin)
         # Whole scans, or the last frame would be torn.
-        held = HELD_SCANS * rig.scan * math.ceil(10 * FRAME_BYTES * Derived(skin).bit_clocks / rig.scan)
+        held = HELD_SCANS * rig.scan * math.ceil(10 * FRAME_BYTES * skin.derived.bit_clocks / rig.scan)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), start)
         rig.board.hold(frames, held)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), held)
         found: dict[int, Zones] = {}
         for zones in rig.frames():
-            scan = (zones.time_us * Derived(skin).clocks_per_us - start) // held
+            scan = (zones.time_us * skin.derived.clocks_per_us - start) // held
             found[scan] = zones
         return [found[index] for index in range(len(frames))]
 

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Outcome, Study
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, faults, hello_clocks, places, plural, seen
@@ -74,7 +73,7 @@ FIRST, LAST = 2.0, 13.0
 def _slide(skin: Skin, speed: float, way: tuple[int, int]) -> tuple[float, Zones, np.ndarray]:
     """The frame whose zones are farthest from the finger at the frame's time: distance in pitches, frame, pressed cells
     at that time. A frame without exactly one zone is infinitely far."""
-    derived, pitch = Derived(skin), skin.pitch_x_mm
+    derived, pitch = skin.derived, skin.pitch_x_mm
     start = hello_clocks(skin) / skin.clock_hz
     end = start + (LAST - FIRST) / speed * derived.frame_clocks / skin.clock_hz
     ends = (FIRST * pitch, LAST * pitch)
@@ -125,7 +124,7 @@ BOUNCING = Skin(rows=4, columns=4, baud=6_000_000)
 
 def debounced(method: str) -> Skin:
     """A sheet whose debounce times are :data:`DEBOUNCE_SCANS` scans."""
-    scan_us = Derived(BOUNCING).frame_clocks / Derived(BOUNCING).clocks_per_us
+    scan_us = BOUNCING.derived.frame_clocks / BOUNCING.derived.clocks_per_us
     times = {"debounce_press_us": DEBOUNCE_SCANS * scan_us, "debounce_release_us": DEBOUNCE_SCANS * scan_us}
     return BOUNCING.replace(debounce=method, **times)
 
@@ -134,7 +133,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
     """How often the host sees the sheet touched when a switch closes for a time, opens for a time and closes again."""
     rest, touch = np.zeros((2, 1, skin.rows, skin.columns), bool)
     touch[0, 2, 1] = True
-    clocks = Derived(skin).clocks_per_us
+    clocks = skin.derived.clocks_per_us
     with Rig(skin) as rig:
         rig.board.hold(rest, hello_clocks(skin) + phase)
         rig.board.hold(touch, round(closed_us * clocks))
@@ -146,7 +145,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float) -> Outcome:
-    scan = Derived(skin).frame_clocks
+    scan = skin.derived.frame_clocks
     shortly, for_good = 30.0, 300.0
     counts = [
         _touches(skin, closed_us, open_us, phase * scan // 4) for closed_us in (shortly, for_good) for phase in range(4)

@@ -9,7 +9,6 @@ import numpy as np
 
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.rig import Rig, hello_clocks
@@ -42,7 +41,7 @@ class Line:
             rig.board.hold(cells)
             *packets, cut = rig.board.receive().split(bytes([protocol.DELIMITER]))
             while cut:  # the last one is waited for
-                rig.board.run(Derived(skin).bit_clocks)
+                rig.board.run(skin.derived.bit_clocks)
                 cut += rig.board.receive()
                 if cut.endswith(bytes([protocol.DELIMITER])):
                     packets.append(cut[:-1])
@@ -53,7 +52,7 @@ class Line:
     def noisy(self, rate_hz: float, seed: int) -> Line:
         """With this many pulses per second that turn the level around for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
-        bit = Derived(self.skin).bit_clocks
+        bit = self.skin.derived.bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)
         starts, lengths = rng.uniform(0, self.end, count), rng.uniform(0.5 * bit, 2 * bit, count)
         return dataclasses.replace(self, edges=np.sort(np.concatenate([self.edges, starts, starts + lengths])))
@@ -62,7 +61,7 @@ class Line:
         """What a UART takes for bytes whose bits last this many of the board's clocks; without the bytes that have no
         stop bit."""
         tick = bit_clocks / OVERSAMPLING
-        data, now, last = bytearray(), 0.0, self.end + 12 * Derived(self.skin).bit_clocks
+        data, now, last = bytearray(), 0.0, self.end + 12 * self.skin.derived.bit_clocks
         offsets = tick * (OVERSAMPLING * np.arange(10) + OVERSAMPLING // 2)
         while now < last:
             index = int(np.searchsorted(self.edges, now, "right"))

@@ -7,7 +7,6 @@ import itertools
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.model import golden
 
@@ -34,7 +33,7 @@ def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
             place = np.clip(place + rng.integers(-1, 2, 2), 0, most)
             if there:
                 sheet[place[0] : place[0] + rows, place[1] : place[1] + columns] = True
-    if Derived(skin).scan.waits:
+    if skin.derived.scan.waits:
         cells[np.arange(count) % PERIOD >= PERIOD - REST] = False
     return cells
 

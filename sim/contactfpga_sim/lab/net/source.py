@@ -6,8 +6,7 @@ import functools
 import threading
 import time
 
-from contactfpga.skin.derived import EPOCH_BITS
-from contactfpga.skin.widths import HEARD_BITS
+from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS
 from contactfpga.wire.hello import EPOCH_DIGITS, HEARD_DIGITS, SENT_DIGITS
 from contactfpga_sim.lab.speed.driver import FRAMES, STEP_US, frame
 from contactfpga_sim.lab.speed.driver import SKIN as SKIN

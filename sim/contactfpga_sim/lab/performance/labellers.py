@@ -10,7 +10,6 @@ import numpy as np
 
 from contactfpga.choices.labellers import LABELLERS, Labeller, LabellerName
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.model.golden import volume
@@ -75,7 +74,7 @@ def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
 def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
     """Clocks from a frame's last row to its last record that no frame exceeds: the end mark comes a clock later."""
     skin = Skin(rows=16, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=15.0)
-    return Derived(skin).label_clocks - 1
+    return skin.derived.label_clocks - 1
 
 
 def worst_last_record_clocks(skin: Skin) -> int:

@@ -6,7 +6,6 @@ import numpy as np
 
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab import latency, writer
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
 
@@ -59,7 +58,7 @@ def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
     """The projection, a row time per touched row, and the frame's bits; and how far the worst touch is above it."""
     if not skin.reads_rows:
         return ""
-    derived = Derived(skin)
+    derived = skin.derived
     slots = derived.project_clocks + cells[0] * derived.row_clocks
     bound = (slots + 10 * found.bytes * derived.bit_clocks) / derived.clocks_per_us
     return f"{bound:.1f} us, + {100 * (found.touch_to_last_byte_us.worst / bound - 1):.0f} %"

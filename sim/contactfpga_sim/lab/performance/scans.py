@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
@@ -86,7 +85,7 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
     """From switches of one row closing to the pin, and to the first and last byte of their frame; by default that of a
     single one in the first row, which is the worst place: the rest of the scan follows it.
     """
-    frame = Derived(skin).frame_clocks
+    frame = skin.derived.frame_clocks
     touched = one_switch(skin, 0) if touched is None else touched
     untouched = np.zeros_like(touched)
     found: dict[str, list[int]] = {"contact": [], "first byte": [], "last byte": []}
@@ -94,7 +93,7 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
         start = 8 * frame + instant * frame // INSTANTS
         with CompiledBoard(skin, capture=("contact",)) as board:
             board.hold(untouched[None], start)
-            board.hold(touched[None], 4 * frame + 100 * Derived(skin).bit_clocks * 10)
+            board.hold(touched[None], 4 * frame + 100 * skin.derived.bit_clocks * 10)
             found["contact"].append(int(board.take("contact")["cycle"][0]) - start)
             first, last = _first_frame_with_cells(board, skin)
         found["first byte"].append(first - start)
@@ -107,7 +106,7 @@ def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]
     received = board.take("received")
     for got in frames_in(skin, zip(received["cycle"].tolist(), received["data"].tolist())):
         if got.frame.cells:
-            return got.first - 10 * Derived(skin).bit_clocks, got.last
+            return got.first - 10 * skin.derived.bit_clocks, got.last
     raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
 
 
@@ -116,7 +115,7 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[1:3, 1:3] = True
     with CompiledBoard(skin) as board:
-        board.hold(cells[None], scans * Derived(skin).frame_clocks)
+        board.hold(cells[None], scans * skin.derived.frame_clocks)
         frames = list(frames_in(skin, enumerate(board.receive())))
         return len(frames) / (board.cycle / skin.clock_hz), frames[-1].size
 
@@ -131,7 +130,7 @@ def reference_row(name: str, skin: Skin) -> str:
     """One setting's row of :func:`reference_table`."""
     latency = touch_latencies(skin)
     rate, size = frame_rate(skin)
-    scan = Derived(skin).frame_clocks / (skin.clock_hz / 1e6)
+    scan = skin.derived.frame_clocks / (skin.clock_hz / 1e6)
     times = (f"{scan:g} us", f"{latency['contact']} us", f"**{latency['last byte']} us**")
     return writer.line((name, *times, f"{rate:,.0f}", str(size)))
 
@@ -149,7 +148,7 @@ def report_row(name: str, skin: Skin) -> str:
     """One line of :func:`report_table`."""
     scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
     times = [f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes]
-    return writer.line((name, f"`{skin.report}`", str(Derived(skin).record_bytes), *times))
+    return writer.line((name, f"`{skin.report}`", str(skin.derived.record_bytes), *times))
 
 
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab.safety import compute
 from contactfpga_sim.lab.safety.catalogue import FAULTS
 from contactfpga_sim.lab.safety.hurt import Hurt
@@ -23,7 +22,7 @@ HOST = "self_test"
 
 def clocks(skin: Skin) -> int:
     """That the self-test takes at power-up, and the pin after it; no row is driven by the scan until then."""
-    derived = Derived(skin)
+    derived = skin.derived
     slot = 2 * derived.project_clocks + derived.settle_clocks + 8
     return (1 + skin.rows + skin.columns) * slot + 2
 
@@ -38,7 +37,7 @@ def told_us(hurt: Hurt, skin: Skin = TESTED) -> float | None:
         board.join(Shorts(rows=hurt.joined_rows, columns=hurt.joined_columns, bridged=hurt.bare))
         board.hold(cells, clocks(skin))
         rises = board.take("contact")
-    return float(rises["cycle"][0]) / Derived(skin).clocks_per_us if len(rises) else None
+    return float(rises["cycle"][0]) / skin.derived.clocks_per_us if len(rises) else None
 
 
 @functools.cache

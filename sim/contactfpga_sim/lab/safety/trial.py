@@ -8,7 +8,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments, reported
 from contactfpga_sim.lab.safety.hurt import Hurt
@@ -56,7 +55,7 @@ def run(skin: Skin, hurt: Hurt, touched: np.ndarray, phase: float = 0.0) -> Told
     """A sheet that is touched so gets the fault this share of a scan after its beginning."""
     with Rig(skin, capture=PINS) as rig:
         board = rig.board
-        board.hold(touched[None], hello_clocks(skin) + Derived(skin).clocks(WARM_UP_US) + int(phase * rig.scan))
+        board.hold(touched[None], hello_clocks(skin) + skin.derived.clocks(WARM_UP_US) + int(phase * rig.scan))
         rig.frames()
         before = {pin: board.take(pin)["data"] for pin in PINS}
         assert len(before["alive"]) >= 2 or not skin.alive
@@ -68,7 +67,7 @@ def run(skin: Skin, hurt: Hurt, touched: np.ndarray, phase: float = 0.0) -> Told
 
 def _watch(rig: Rig, hurt: Hurt, watched: _Watched) -> Told:
     skin, board = rig.skin, rig.board
-    clocks = Derived(skin).clocks_per_us * STEP_US
+    clocks = skin.derived.clocks_per_us * STEP_US
     for step in range(1, LONGEST_US // STEP_US + 1):
         frames: list[Zones] = []
         edges: dict[str, int] = {}
@@ -129,7 +128,7 @@ class _Watched:
 
     @property
     def _scan_us(self) -> int:
-        return -(-Derived(self._skin).frame_clocks // Derived(self._skin).clocks_per_us)
+        return -(-self._skin.derived.frame_clocks // self._skin.derived.clocks_per_us)
 
     def told(self) -> Told:
         """All of it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import CHECK_BYTES, Derived
+from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire.units import plain_bytes
 from contactfpga_sim.lab import writer
 
@@ -29,7 +29,7 @@ def units_table() -> str:
 
 
 def _row(skin: Skin) -> tuple[str, ...]:
-    units = Derived(skin).units
+    units = skin.derived.units
     sweep_us = round(units.sweep_clocks / skin.clock_hz * 1e6, 1)
     packet = 1 + plain_bytes(skin.units, units.converter.bits) + CHECK_BYTES + 1
     spi_mhz = skin.clock_hz / (2 * units.level_clocks) / 1e6

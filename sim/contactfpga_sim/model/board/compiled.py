@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.board.running import Running
 from contactfpga_sim.model.scenes.cells import to_words
@@ -130,7 +129,7 @@ class CompiledBoard(Running):
             "hold",
             words.ctypes.data_as(ctypes.c_void_p),
             ctypes.c_size_t(len(words)),
-            ctypes.c_uint64(Derived(self.skin).frame_clocks if cycles is None else cycles),
+            ctypes.c_uint64(self.skin.derived.frame_clocks if cycles is None else cycles),
         )
         self._check_pins()
 
@@ -168,15 +167,15 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "COL2ROW": int(skin.selects_low),
             "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
-            "BIT_CLOCKS": Derived(skin).bit_clocks,
+            "BIT_CLOCKS": skin.derived.bit_clocks,
             "PRECHARGE": int(skin.precharge_us > 0),
             "REVERSAL": int(skin.reads_rows),
-            "KEEPS": Derived(skin).settle_clocks + 1 if skin.self_test else 0,
+            "KEEPS": skin.derived.settle_clocks + 1 if skin.self_test else 0,
             "PROBES": int(netlist is None),
             "ALIVE": int(skin.alive),
             "DIVIDED": int(skin.report == "barycenter"),
             "UNITS": skin.units,
-            "PACED": int(Derived(skin).units.converter.pace is not None),
+            "PACED": int(skin.derived.units.converter.pace is not None),
         },
     )
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from contactfpga.skin import Skin
-from contactfpga.skin.widths import Widths
+from contactfpga.skin.derived import Widths
 from contactfpga.wire import framing, protocol
 from contactfpga.wire.faults import KIND_FAULTS
 from contactfpga.wire.protocol import Frame

@@ -13,7 +13,6 @@ import numpy as np
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
@@ -104,7 +103,7 @@ def skin_for(
     steps = (step << shift for shift in range(12) for step in (4, 5, 6, 7))
     capacity = min(most, next(step for step in (1, 2, 3, *steps) if step >= zones))
     slow = Skin(**shape, zone_capacity=capacity, baud=6_000_000)
-    derived = Derived(slow)
+    derived = slow.derived
     wire = derived.max_frame_bytes * 10 * BIT_CLOCKS + 8
     row_clocks = max(derived.min_row_clocks, math.ceil(wire / rows))
     return slow.replace(
@@ -139,7 +138,7 @@ class _Plan:
     """Which scan holds which input frame."""
 
     def __init__(self, skin: Skin, count: int):
-        derived = Derived(skin)
+        derived = skin.derived
         hello = len(protocol.encode_hello(skin)) * 10 * derived.bit_clocks
         quiet = math.ceil(hello / derived.frame_clocks) + 2
         period = derived.hello_frames
@@ -166,7 +165,7 @@ class _Collector:
     def __init__(self, board: CompiledBoard, plan: _Plan):
         self._board = board
         self._plan = plan
-        self._derived = Derived(board.skin)
+        self._derived = board.skin.derived
         self._times: dict[int, list[int]] = {}  # scan: first row, last row, records
         self._scan = 0
         self._row_scan = 0

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several, sheets_of
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.board.compiled import initializer
@@ -107,7 +106,7 @@ def model_of(several: Several) -> native.Model:
         key=hashlib.sha256(keys.encode()).hexdigest(),
         elaborate=elaborate,
         defines={
-            "BIT_CLOCKS": Derived(several.skins[0]).bit_clocks,
+            "BIT_CLOCKS": several.skins[0].derived.bit_clocks,
             "EACH_SHEET": " ".join(_entry(number, skin) for number, skin in enumerate(several.skins)),
         },
     )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.sheet.shorts import Lines, Shorts, bits, followers
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ class Matrix:
         """Lines of the columns that are stuck."""
         self._shorts: Shorts | None = None
         self._released = Lines(0, 0)  # let go, and lifted to the released level
-        self._keeps = Derived(skin).settle_clocks + 1 if skin.self_test else 0  # clocks
+        self._keeps = skin.derived.settle_clocks + 1 if skin.self_test else 0  # clocks
         self._kept, self._left = 0, 0  # columns, and clocks for which they are
         self.closed = [0] * skin.row_lines
         """By a row's line, the lines of the columns that it reaches through closed switches."""

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.scenes.cells import to_words
 
@@ -56,7 +55,7 @@ class LabelBench:
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self._derived = Derived(skin)
+        self._derived = skin.derived
         library = native.load(_model(skin))
         library.bench_new.restype = ctypes.c_void_p
         library.bench_records.restype = ctypes.c_void_p
@@ -123,7 +122,7 @@ class LabelBench:
 
 
 def _model(skin: Skin) -> native.Model:
-    derived = Derived(skin)
+    derived = skin.derived
 
     def elaborate() -> Any:
         return derived.labeller.load_gateware()(skin)

@@ -14,7 +14,6 @@ from contactfpga.choices.debounces import DEBOUNCES
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.choices.reports import REPORTS
 from contactfpga.skin import Skin, SkinError
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.limits import MIN_AROUND
 from contactfpga.skin.sheet import max_zones
 from contactfpga_sim.model.golden.facts import facts
@@ -178,7 +177,7 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     press, back = choice["debounce_scans"]
     values |= {"debounce_press_us": press * scan_us, "debounce_release_us": back * scan_us}
     frame_us = known.frame_slots * known.row_clocks / megahertz
-    least = Derived(known.skin).min_keep_alive_ms if known.scan.waits else 0.0
+    least = known.skin.derived.min_keep_alive_ms if known.scan.waits else 0.0
     values["keep_alive_ms"] = min(100.0, least + (choice["keep_alive_scans"] + 0.5) * frame_us / 1000)
     return Skin(**values)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import SELF_TEST, Derived
+from contactfpga.skin.derived import SELF_TEST
 from contactfpga.skin.units import NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import command
@@ -18,7 +18,7 @@ from contactfpga_sim.model.sheet.shorts import Shorts
 
 def least_cycles(skin: Skin) -> int:
     """In which the options have had their turn: sweeps of the units, slots of a few self-tests."""
-    sweeps = 40 * Derived(skin).units.sweep_clocks if skin.units else 0
+    sweeps = 40 * skin.derived.units.sweep_clocks if skin.units else 0
     return max(sweeps, 5 * test_clocks(skin) if skin.self_test else 0)
 
 
@@ -30,8 +30,8 @@ def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
         pieces = [(start, cells, _with_guard(skin, stuck, rng)) for start, cells, stuck in pieces]
         cuts = [(start, _cuts(skin, rng)) for start in _starts(rng, cycles, 6 * facts(skin).scan_clocks)]
     if skin.units:
-        most = 2 ** Derived(skin).units.converter.bits - 1
-        sweep = Derived(skin).units.sweep_clocks
+        most = 2**skin.derived.units.converter.bits - 1
+        sweep = skin.derived.units.sweep_clocks
         units = [(start, _readings(skin.units, most, rng)) for start in _starts(rng, cycles, sweep)]
     return Timeline(pieces, timeline.received, cuts, units)
 
@@ -51,7 +51,7 @@ def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
     """One zero and one threshold after the other, of readings about them and on either side of the zero; nothing else
     touches the sheet."""
     rng = np.random.default_rng(41)
-    units, bits = Derived(skin).units, facts(skin).bit_clocks
+    units, bits = skin.derived.units, facts(skin).bit_clocks
     most = 2**units.converter.bits - 1
     zeros = [0] * skin.units
     received: list[tuple[int, bytes]] = []
@@ -80,7 +80,7 @@ def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
 
 def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int], int]:
     """Whose threshold is next, a unit's or a sum's: command, place, weights, and in steps of 2 to which power."""
-    units, of_sum = Derived(skin).units, bool(rng.random() < 0.5)
+    units, of_sum = skin.derived.units, bool(rng.random() < 0.5)
     if of_sum:
         place = int(rng.integers(len(skin.unit_sums)))
         return SUM_THRESHOLD, place, list(skin.unit_sums[place]), number_shift(units.sum_bits)

@@ -20,7 +20,6 @@ from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools.console import interrupt, numbers
 from contactfpga_hdl.board import build
 from contactfpga_sim.model.board import native
@@ -86,7 +85,7 @@ def replay(skin: Skin, model: native.Model, frames: np.ndarray) -> Outcome:
 
 
 def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> Outcome:
-    derived = Derived(skin)
+    derived = skin.derived
     scan = derived.frame_clocks
     cycles = len(frames) * scan + 2 * derived.max_frame_bytes * 10 * derived.bit_clocks
     timeline = Timeline.frames(
@@ -100,7 +99,7 @@ def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> 
 
 def reset_clocks(skin: Skin, model: native.Model) -> int:
     """Clocks from power-up to cycle 0 of docs/timing.md, from when the first hello begins."""
-    limit = RESET_US * Derived(skin).clocks_per_us
+    limit = RESET_US * skin.derived.clocks_per_us
     untouched = Timeline([])
     hello = predict(skin, untouched, limit).line[0][0]
     line = bench_native.run(skin, untouched, hello + limit, model).line

@@ -7,7 +7,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.dual import PAUSE_BITS, Dual
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -45,7 +44,7 @@ def differences_stop_the_line(proof: Proof, fail_safe: bool) -> None:
     dut = Dual(skin, first, second)
     inside = proof.put(dut)
     m.d.comb += dut.rx.eq(proof.free(1, "rx"))
-    pause, scan = PAUSE_BITS * Derived(skin).bit_clocks, Derived(skin).frame_clocks
+    pause, scan = PAUSE_BITS * skin.derived.bit_clocks, skin.derived.frame_clocks
     last = 2 * pause + scan
     since = Signal(range(last + 3), init=last + 2)  # the last difference, in clocks
     resets = proof.before(inside["holds"], init=1)  # of the second, which starts a clock late

@@ -27,7 +27,7 @@ def frames_are_packed(proof: Proof, skin: Skin) -> None:
     nothing.
     """
     m = proof.m
-    derived = Derived(skin)
+    derived = skin.derived
     dut = Packer(skin, offset_bits=derived.max_stored_bytes.bit_length())
     inside = proof.put(dut)
     place = proof.chosen(range(derived.max_stored_bytes), "place")

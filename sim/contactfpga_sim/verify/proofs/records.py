@@ -4,7 +4,6 @@ from functools import partial
 
 from amaranth.hdl import Cat, Const, Mux, Signal
 
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.around import Unwrap
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
@@ -144,7 +143,7 @@ def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int
     Claimed: row by row as many zones with this record end as a flood fill of the whole frame finds.
     """
     m = proof.m
-    derived = Derived(skin_of(rows, columns, connectivity, closed))
+    derived = skin_of(rows, columns, connectivity, closed).derived
     frame, wanted = proof.free(rows * columns, "frame"), proof.free(zone_layout(derived).size, "wanted")
     open_row, found = empty_row(derived), 0
     for y in range(rows):

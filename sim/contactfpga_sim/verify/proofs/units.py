@@ -5,7 +5,6 @@ from functools import partial
 from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.watch import Settings, Watch
 from contactfpga_sim.verify.proofs.bugs import Bug
@@ -28,7 +27,7 @@ def conversions(proof: Proof, skin: Skin) -> None:
     m = proof.m
     dut = Mcp3208(skin)
     inside = proof.put(dut)
-    least = Derived(skin).units.level_clocks
+    least = skin.derived.units.level_clocks
     miso = proof.free(1, "miso")
     m.d.comb += dut.pins.spi_miso.eq(miso)
     clock, select_n, mosi = dut.pins.spi_clock, dut.pins.spi_select_n, dut.pins.spi_mosi

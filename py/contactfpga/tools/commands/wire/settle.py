@@ -13,7 +13,6 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTimeout
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
 from contactfpga.tools.console import interrupt, live, terminal
 from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
@@ -46,7 +45,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def _settling(board: Board, skin: Skin) -> Settling:
-    derived = Derived(skin)
+    derived = skin.derived
     first, settle = derived.first_sample_clocks, derived.settle_clocks
     if settle <= first:
         raise ContactFPGAError(
@@ -108,7 +107,7 @@ def _restored(board: Board, timeout: float) -> list[Finding]:
 
 
 def _answer(found: Settling, skin: Skin, seconds: float, end: list[Finding]) -> dict[str, Any]:
-    per_us, slow = Derived(skin).clocks_per_us, found.slow()
+    per_us, slow = skin.derived.clocks_per_us, found.slow()
     clocks = [[int(cell) or None for cell in row] for row in found.clocks]
     return {
         "seconds": seconds,
@@ -133,7 +132,7 @@ def _proposed_us(found: Settling, skin: Skin) -> float | None:
 def _show(found: Settling, skin: Skin, end: list[Finding]) -> None:
     for finding in end:
         terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
-    known, per_us = found.clocks[found.clocks > 0], Derived(skin).clocks_per_us
+    known, per_us = found.clocks[found.clocks > 0], skin.derived.clocks_per_us
     if not len(known):
         terminal.say("Nothing was measured: no cell read pressed for long enough at the full settle time.")
         return
@@ -206,7 +205,7 @@ def _view(found: Settling, skin: Skin, room: live.Room) -> RenderableType:
     from contactfpga.tools.console import views  # rich, which scripts do without
 
     wide = 2 * skin.columns <= room.width
-    drawing = drawn(found, Derived(skin).clocks_per_us, skin.mask, wide, room.unicode)
+    drawing = drawn(found, skin.derived.clocks_per_us, skin.mask, wide, room.unicode)
     known = int((found.clocks > 0).sum())
     below = f"{drawing.legend}\n{known} of {skin.rows * skin.columns - len(skin.mask)} cells measured"
     return Group(views.styled(drawing), Text(terminal.wrapped(below, room.width)))
