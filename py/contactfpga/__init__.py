@@ -30,6 +30,8 @@ if TYPE_CHECKING:
         SkinMismatch,
         VersionMismatch,
     )
+    from contactfpga.instruments.self_test import SelfTest
+    from contactfpga.instruments.watch import Suspicion, Watch
     from contactfpga.shipped import examples
     from contactfpga.skin import Skin, SkinError
     from contactfpga.skin.sheet import Sheet
@@ -38,10 +40,7 @@ if TYPE_CHECKING:
     from contactfpga.wire.faults import Faults, SelfTestSlot
     from contactfpga.wire.hello import Hello
     from contactfpga.zones.batch import Batch
-    from contactfpga.zones.self_test import SelfTest
-    from contactfpga.zones.suspicion import Suspicion
     from contactfpga.zones.units import UnitHistory, UnitSamples
-    from contactfpga.zones.watch import Watch
     from contactfpga.zones.zone import Zone, Zones
 
 # The one place of the version; the build reads it from here. Metadata of an installed package would be absent in a
@@ -103,6 +102,8 @@ _NAMES = {
         "BoardClosed BoardSilent ContactFPGAError MissingExtra MissingTool NoData NoSuchCommand OnlyNoise PortBusy "
         "PortLost PortNotFound ReadTimeout ReplayEnded SkinMismatch VersionMismatch"
     ),
+    "instruments.self_test": "SelfTest",
+    "instruments.watch": "Suspicion Watch",
     "shipped": "examples",
     "skin": "Skin SkinError",
     "skin.sheet": "Sheet",
@@ -111,10 +112,7 @@ _NAMES = {
     "wire.faults": "Faults SelfTestSlot",
     "wire.hello": "Hello",
     "zones.batch": "Batch",
-    "zones.self_test": "SelfTest",
-    "zones.suspicion": "Suspicion",
     "zones.units": "UnitHistory UnitSamples",
-    "zones.watch": "Watch",
     "zones.zone": "Zone Zones",
 }
 """Modules, and the public names that each of them defines."""

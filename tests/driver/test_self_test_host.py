@@ -8,8 +8,8 @@ from model_board import DirectPort
 import contactfpga
 from contactfpga import Skin
 from contactfpga.driver import driver
+from contactfpga.instruments.self_test import merged
 from contactfpga.tools import cli
-from contactfpga.zones.self_test import merged
 
 SKIN = Skin(rows=3, columns=2, scan="reversal", precharge_us=1.0, self_test=True)
 COUNT = 6

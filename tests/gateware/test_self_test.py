@@ -8,9 +8,9 @@ from amaranth.hdl import Cat
 from reversal import any_skin, checked_soon, small, touches
 from sample import sample
 
+from contactfpga.instruments.self_test import SelfTest
 from contactfpga.skin import Skin
 from contactfpga.wire.faults import SelfTestSlot
-from contactfpga.zones.self_test import SelfTest
 from contactfpga_hdl.scan import self_test as gateware
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.model.golden import Timeline, predict

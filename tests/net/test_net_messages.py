@@ -12,8 +12,7 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.stats import NetCounters
 from contactfpga.robot.net.message import BEAT_S, MOST_BYTES, QUIET_S, Message, Stream
 from contactfpga.robot.net.session import LOOPBACK, is_loopback, key_of, own_endpoint
-from contactfpga.wire.asked import Asked, asked_in
-from contactfpga.wire.command import Command, encode_command
+from contactfpga.wire.command import Command, RequestKind, encode_command, request_kind
 from contactfpga.wire.protocol import encode_request
 
 SKIN = contactfpga.Skin()
@@ -241,13 +240,13 @@ def test_requests_pass_in_both_forms_and_commands_are_told_apart():
     for pulsed in (False, True):
         request = encode_request(0x10101, hello=True, pulsed=pulsed)
         command = encode_command(0x10101, Command(1, 5), pulsed=pulsed)
-        assert asked_in(request) is Asked.REQUEST
-        assert asked_in(request + request) is Asked.REQUEST
-        assert asked_in(command) is Asked.COMMAND
-        assert asked_in(request + command) is Asked.COMMAND
+        assert request_kind(request) is RequestKind.REQUEST
+        assert request_kind(request + request) is RequestKind.REQUEST
+        assert request_kind(command) is RequestKind.COMMAND
+        assert request_kind(request + command) is RequestKind.COMMAND
         for cut in range(1, len(request)):
-            assert asked_in(request[:cut]) is Asked.OTHER
-            assert asked_in(request[cut:]) is Asked.OTHER
+            assert request_kind(request[:cut]) is RequestKind.OTHER
+            assert request_kind(request[cut:]) is RequestKind.OTHER
 
 
 def test_bytes_with_a_flipped_bit_do_not_pass(rng):
@@ -256,9 +255,9 @@ def test_bytes_with_a_flipped_bit_do_not_pass(rng):
         for _ in range(300):
             broken = bytearray(data)
             broken[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-            assert asked_in(bytes(broken)) is Asked.OTHER
-    assert asked_in(b"") is Asked.OTHER
-    assert asked_in(bytes(20)) is Asked.OTHER
+            assert request_kind(bytes(broken)) is RequestKind.OTHER
+    assert request_kind(b"") is RequestKind.OTHER
+    assert request_kind(bytes(20)) is RequestKind.OTHER
 
 
 # ---- addresses

@@ -12,7 +12,7 @@ from contactfpga import Skin
 from contactfpga.robot.body import Body
 from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording, Session
-from contactfpga.wire.hellos import Cutter
+from contactfpga.wire.hello import Cutter
 
 SKIN = Skin()
 LONG = 60.0

@@ -7,7 +7,7 @@ import pytest
 from histories import frames
 
 from contactfpga import ContactFPGAError, Skin
-from contactfpga.zones.bounce import QUIET_US, Bounce, Proposal
+from contactfpga.instruments.bounce import QUIET_US, Bounce, Proposal
 
 SKIN = Skin(rows=2, columns=3, report="cells", settle_us=40.0)
 RATE_HZ = 10_000.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contactfpga.zones.settling import AGREE, STEADY, Settling
+from contactfpga.instruments.settling import AGREE, STEADY, Settling
 
 FIRST, SETTLE = 3, 100
 

@@ -9,7 +9,7 @@ from histories import RATE_HZ, frame, frames, moving_touches
 
 import contactfpga
 from contactfpga import Skin, SkinMismatch, Watch
-from contactfpga.zones.zone_history import cells_of
+from contactfpga.instruments.watch import cells_of
 
 CELLS = Skin(rows=16, columns=16, report="cells")
 MOMENTS = Skin(rows=16, columns=16)

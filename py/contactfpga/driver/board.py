@@ -13,6 +13,7 @@ from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
 from contactfpga.driver.transport import Transport, counters_of
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReadTimeout, ReplayEnded
+from contactfpga.instruments.self_test import SelfTest
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
 from contactfpga.skin.sheet import Sheet
@@ -22,7 +23,6 @@ from contactfpga.wire.hello import Hello
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga.zones.self_test import SelfTest
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
@@ -254,7 +254,7 @@ class Board:
         """Have the board drive each of its lines alone, and return what this shows (:class:`SelfTest`).
 
         Bridged diodes show only while their switch is pressed: repeat the test, and combine the results with
-        :func:`contactfpga.zones.self_test.merged`. The scan goes on between the slots of the test. ``timeout`` in
+        :func:`contactfpga.instruments.self_test.merged`. The scan goes on between the slots of the test. ``timeout`` in
         seconds. Raises :class:`NoSuchCommand` if the board has no self-test, and the errors of :meth:`read`. Without
         the board's Skin its mask is not known, so lines that do not rise cannot be distinguished from absent ones.
         """

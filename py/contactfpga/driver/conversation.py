@@ -23,8 +23,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.wire import framing, many, protocol
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_slot, is_slot
-from contactfpga.wire.hello import Hello
-from contactfpga.wire.mismatch import describe, difference
+from contactfpga.wire.hello import Hello, describe, difference
 from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.wire.units import KIND_UNITS

@@ -23,8 +23,7 @@ from contactfpga.driver.transport import connect
 from contactfpga.errors import BoardSilent, ContactFPGAError, OnlyNoise, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.skin import Skin
-from contactfpga.wire.hello import Hello
-from contactfpga.wire.mismatch import describe
+from contactfpga.wire.hello import Hello, describe
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,7 +12,7 @@ from contactfpga.driver import finding
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.wire.faults import STUCK
-from contactfpga.wire.mismatch import report_of
+from contactfpga.wire.hello import report_of
 from contactfpga.zones.units import only
 from contactfpga.zones.zone import Zones
 

@@ -18,8 +18,7 @@ from contactfpga.driver.transport import Transport, counters_of
 from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
-from contactfpga.wire.hello import Hello
-from contactfpga.wire.mismatch import describe
+from contactfpga.wire.hello import Hello, describe
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.skin.derived import LONGEST_PACKET
-from contactfpga.wire.hellos import find_hello
+from contactfpga.wire.hello import find_hello
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics

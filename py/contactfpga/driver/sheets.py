@@ -19,8 +19,7 @@ from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire import framing
 from contactfpga.wire.framing import PacketError
-from contactfpga.wire.hello import Hello, HelloReader
-from contactfpga.wire.hellos import begins_hello
+from contactfpga.wire.hello import Hello, HelloReader, begins_hello
 from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
 
 TURN_S = 0.05

@@ -3,10 +3,9 @@
 import functools
 
 from contactfpga.skin.sheet import Sheet
-from contactfpga.surfaces.answer import SurfaceError
 from contactfpga.surfaces.mesh import Mesh
-from contactfpga.surfaces.mirrored import Mirrored
-from contactfpga.surfaces.surface import Cone, Cylinder, Plane
+from contactfpga.surfaces.shapes import SurfaceError
+from contactfpga.surfaces.surface import Cone, Cylinder, Mirrored, Plane
 
 Surface = Plane | Cylinder | Cone | Mesh | Mirrored
 

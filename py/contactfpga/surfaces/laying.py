@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from contactfpga.surfaces import mesh_file
-from contactfpga.surfaces.answer import SurfaceError
 from contactfpga.surfaces.mesh import Mesh
-from contactfpga.surfaces.shapes import Floats
+from contactfpga.surfaces.shapes import Floats, SurfaceError
 
 FINE = 8
 """Rays per pitch where arc lengths are measured."""

@@ -13,8 +13,7 @@ from contactfpga.inputs import array_file
 from contactfpga.inputs.array_file import ArrayFileError
 from contactfpga.inputs.files import replaced
 from contactfpga.skin.limits import MAX_LINES
-from contactfpga.surfaces.answer import SurfaceError, length
-from contactfpga.surfaces.shapes import Floats, Vector, is_one, vector
+from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, length, vector
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
 MAX_BYTES = 8 * 3 * MAX_LINES**2

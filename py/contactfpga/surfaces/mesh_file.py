@@ -15,7 +15,7 @@ import numpy as np
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs import xmlfile
 from contactfpga.inputs.files import read_small
-from contactfpga.surfaces.answer import SurfaceError
+from contactfpga.surfaces.shapes import SurfaceError
 
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 COLLADA = ".dae"

@@ -14,8 +14,7 @@ from typing import overload
 import numpy as np
 
 from contactfpga.surfaces import shapes
-from contactfpga.surfaces.answer import SurfaceError, length
-from contactfpga.surfaces.shapes import Floats, Vector, is_one
+from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, length
 
 
 @dataclasses.dataclass(frozen=True)

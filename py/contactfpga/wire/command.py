@@ -1,15 +1,26 @@
-"""Commands to a board (docs/protocol.md)."""
+"""Commands to a board, and what bytes to one ask for (docs/protocol.md)."""
 
 from __future__ import annotations
 
 import dataclasses
+import enum
 
 from contactfpga.inputs.values import shown, whole
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
 from contactfpga.skin.units import SUM_THRESHOLD, THRESHOLD, ZERO
-from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, digits, last_byte, pulses, seal
+from contactfpga.wire.framing import (
+    DELIMITER,
+    DIGIT_BITS,
+    PacketError,
+    digits,
+    kind_of,
+    last_byte,
+    pulses,
+    seal,
+    unseal,
+)
 from contactfpga.wire.hello import HEARD_DIGITS
-from contactfpga.wire.protocol import REQUEST_HELLO, may_number
+from contactfpga.wire.protocol import KIND_REQUEST, REQUEST_HELLO, may_number
 
 KIND_COMMAND = 10
 """To the board."""
@@ -54,3 +65,46 @@ def encode_command(number: int, command: Command, hello: bool = False, pulsed: b
     plain = b"".join(digits(value, count) for value, count in words)
     data = bytes([DELIMITER]) + seal(plain + bytes([last_byte(KIND_COMMAND, REQUEST_HELLO * hello)]))
     return pulses(data) if pulsed else data
+
+
+_MARK, _ONE, _ZERO = 0xF0, 0xFF, 0x00
+"""Of pulses: :func:`contactfpga.wire.framing.pulses`."""
+_SIZES = {KIND_REQUEST: HEARD_DIGITS + 1, KIND_COMMAND: HEARD_DIGITS + WHAT_DIGITS + VALUE_DIGITS + 1}
+"""Plain bytes of each."""
+
+
+class RequestKind(enum.Enum):
+    """The most that is among them."""
+
+    REQUEST = "requests for a frame or a hello, which change nothing"
+    COMMAND = "a command"
+    OTHER = "something that no host sends"
+
+
+def request_kind(data: bytes) -> RequestKind:
+    """What these bytes, which must be whole packets, ask for."""
+    found = RequestKind.REQUEST if data else RequestKind.OTHER
+    while data:
+        mark = data[0]
+        end = data.find(mark, 1)
+        if mark not in (DELIMITER, _MARK) or end < 0:
+            return RequestKind.OTHER
+        packet, data = data[1:end], data[end + 1 :]
+        try:
+            plain = unseal(packet if mark == DELIMITER else _without_pulses(packet), b"")
+        except PacketError:
+            return RequestKind.OTHER
+        kind = kind_of(plain)
+        if len(plain) != _SIZES.get(kind):
+            return RequestKind.OTHER
+        if kind == KIND_COMMAND:
+            found = RequestKind.COMMAND
+    return found
+
+
+def _without_pulses(data: bytes) -> bytes:
+    """Undo :func:`contactfpga.wire.framing.pulses` between two marks."""
+    if len(data) % 8 or set(data) - {_ONE, _ZERO}:
+        raise PacketError("framing", "pulses that are no bits")
+    eights = (data[start : start + 8] for start in range(0, len(data), 8))
+    return bytes(sum((pulse == _ONE) << bit for bit, pulse in enumerate(eight)) for eight in eights)

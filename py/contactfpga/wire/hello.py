@@ -5,17 +5,15 @@ from __future__ import annotations
 import dataclasses
 import struct
 import zlib
-from typing import TYPE_CHECKING
 
 from contactfpga.choices.reports import REPORTS
-from contactfpga.skin.derived import SELF_TEST, pulsed
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import CHECK_BYTES, SELF_TEST, pulsed
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire import framing
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
 from contactfpga.wire.numbered import Place
 from contactfpga.wire.units import FACTS_BYTES, UnitFacts
-
-if TYPE_CHECKING:
-    from contactfpga.skin import Skin
 
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255
 
@@ -240,3 +238,84 @@ def _counters(state: bytes) -> dict[str, int]:
         counters[name] = number(state[offset : offset + count])
         offset += count
     return counters
+
+
+def begins_hello(packet: bytes) -> bool:
+    """Whether a packet, without delimiters, is a hello or the first one of several."""
+    if len(packet) < framing.SHORTEST_PACKET:
+        return False
+    if packet[-CHECK_BYTES - 1] >> framing.FLAG_BITS != framing.KIND_HELLO:  # quicker than the check
+        return False
+    try:
+        return framing.unseal(packet, b"")[0] == SHEET
+    except PacketError:
+        return False
+
+
+def find_hello(data: bytes, last: bool = False) -> int:
+    """Where the first, or the ``last``, whole hello in ``data`` begins; -1: there is none."""
+    found, start = -1, 0
+    while (end := data.find(0, start)) >= 0:
+        if begins_hello(data[start:end]):
+            if not last:
+                return start
+            found = start
+        start = end + 1
+    return found
+
+
+class Cutter:
+    """Cuts a stream of bytes at its next hello."""
+
+    def __init__(self) -> None:
+        self.held = b""
+        """The beginning of a packet that is not whole."""
+
+    def take(self, data: bytes) -> tuple[bytes, bytes]:
+        """Bytes before the cut, and after it, which is empty as long as no hello has come."""
+        data = self.held + data
+        at = find_hello(data)
+        if at >= 0:
+            self.held = b""
+            at -= data[max(0, at - 2) : at].count(0) == min(at, 2) > 0  # a hello has a delimiter at either end
+            return data[:at], data[at:]
+        end = data.rfind(0) + 1
+        self.held = data[end:]
+        return data[:end], b""
+
+
+def report_of(sheet: Sheet) -> str:
+    """What a board reports."""
+    precise = f" of {sheet.barycenter_bits} fraction bits" if sheet.report == "barycenter" else ""
+    return f"report {sheet.report!r}{precise}"
+
+
+def describe(hello: Hello) -> str:
+    """The Skin that a board tells of."""
+    sheet = hello.sheet
+    name = f" named {hello.name!r}" if hello.name else ""
+    return (
+        f"a {sheet.rows}x{sheet.columns} Skin{name} (fingerprint {hello.fingerprint.hex()}, {report_of(sheet)}, "
+        f"connectivity {sheet.connectivity})"
+    )
+
+
+def difference(hello: Hello, expected: Skin) -> str:
+    """What a board was built from, and how that differs from the Skin that was expected."""
+    told, asked = _facts(hello), _expected_facts(expected)
+    differing = [f"{name} is {told[name]}, asked for was {asked[name]}" for name in told if told[name] != asked[name]]
+    if differing:
+        what = "; ".join(differing)
+    else:
+        changed = ", ".join(f"{name} = {value!r}" for name, value in expected.changed.items()) or "only default values"
+        what = f"the two differ in fields that a hello does not tell; the Skin asked for has {changed}"
+    prints = f"fingerprint {hello.fingerprint.hex()}, asked for was {expected.fingerprint.hex()}"
+    return f"another Skin: {what} ({prints}); give its own Skin or none, or load the bitstream of this one"
+
+
+def _facts(hello: Hello) -> dict[str, object]:
+    return dataclasses.asdict(hello.sheet) | {"send": hello.send, "clock_hz": hello.clock_hz, "baud": hello.baud}
+
+
+def _expected_facts(skin: Skin) -> dict[str, object]:
+    return dataclasses.asdict(skin.sheet) | {"send": skin.send, "clock_hz": skin.clock_hz, "baud": skin.baud}

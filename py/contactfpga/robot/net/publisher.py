@@ -14,7 +14,7 @@ from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import ContactFPGAError
 from contactfpga.robot.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Message, Stream, token
 from contactfpga.robot.net.session import LEASE_MS
-from contactfpga.wire.asked import Asked, asked_in
+from contactfpga.wire.command import RequestKind, request_kind
 
 if TYPE_CHECKING:
     import zenoh
@@ -119,8 +119,8 @@ class BoardPublisher:
     def _take(self, sample: zenoh.Sample) -> None:
         """Someone asks the board."""
         data = sample.payload.to_bytes()
-        asked = asked_in(data) if len(data) <= MOST_ASKED else Asked.OTHER
-        if asked is Asked.OTHER or (asked is Asked.COMMAND and not self._commands):
+        asked = request_kind(data) if len(data) <= MOST_ASKED else RequestKind.OTHER
+        if asked is RequestKind.OTHER or (asked is RequestKind.COMMAND and not self._commands):
             self.denied += 1
             return
         self.passed += 1

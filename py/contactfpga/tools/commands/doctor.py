@@ -15,11 +15,10 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
+from contactfpga.instruments.self_test import LineFinding, SelfTest, untried
+from contactfpga.instruments.watch import Cell, Suspicion, Watch, named
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, interrupt, live, numbers, terminal
-from contactfpga.zones.self_test import LineFinding, SelfTest, untried
-from contactfpga.zones.suspicion import Cell, Suspicion, named
-from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
 
 EXTRA = None

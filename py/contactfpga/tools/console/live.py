@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.health import Finding
 from contactfpga.driver.events import Silence, longest_pause_s
+from contactfpga.driver.health import Finding
 from contactfpga.errors import PortLost, ReadTimeout, ReplayEnded
 from contactfpga.tools.console import interrupt, terminal
 from contactfpga.zones.zone import Zones

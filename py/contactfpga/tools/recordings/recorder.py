@@ -15,8 +15,7 @@ from contactfpga.driver.mcap import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.tools.recordings import messages
 from contactfpga.tools.recordings.mcap_file import McapFile
-from contactfpga.wire.hello import Hello
-from contactfpga.wire.hellos import Cutter
+from contactfpga.wire.hello import Cutter, Hello
 
 PATIENCE_S = 2.0
 """How long a new file waits for hellos to begin with; boards say one twice per second."""

@@ -12,11 +12,11 @@ from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTimeout
+from contactfpga.instruments.settling import Settling
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
 from contactfpga.tools.console import interrupt, live, terminal
 from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
-from contactfpga.zones.settling import Settling
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga.zones.suspicion import Cell
+from contactfpga.instruments.watch import Cell
 from contactfpga.zones.zone import Zones
 
 QUIET_US = 20_000
