@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several
-from contactfpga.wire.numbered import Place
+from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 
@@ -25,7 +25,7 @@ class SeveralTop(wiring.Component):
     def __init__(self, several: Several, probes: bool = False):
         self.several = several
         count = len(several.skins)
-        self.sheets = [Top(skin, probes, place=Place(number, count)) for number, skin in enumerate(several.skins)]
+        self.sheets = [Top(skin, probes, place=SheetPlace(number, count)) for number, skin in enumerate(several.skins)]
         shared = {"tx": Out(1, init=1), "rx": In(1, init=1), "contact": Out(1)}
         super().__init__(shared | {f"{name}_{number}": member for number, name, member in self._outside()})
 

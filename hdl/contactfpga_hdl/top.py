@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
-from contactfpga.wire.numbered import Place
+from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.request import RequestReader
@@ -52,7 +52,7 @@ class Top(wiring.Component):
     UART it has ``bits`` (in), ``bytes`` (out), and ``turn`` (in) and ``holds`` (out) of its link.
     """
 
-    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False, place: Place | None = None):
+    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False, place: SheetPlace | None = None):
         self.skin = skin
         self.place = place
         self.probes = probes

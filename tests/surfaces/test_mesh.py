@@ -12,7 +12,7 @@ import pytest
 
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.surfaces import Cylinder, Mesh, SurfaceError
-from contactfpga.surfaces.laying import Laid, Triangles
+from contactfpga.surfaces.laying import Placement, Triangles
 from contactfpga.tools import cli
 
 trimesh = pytest.importorskip("trimesh")
@@ -39,7 +39,7 @@ def ball(tmp_path_factory):
 
 
 def laid(rows, columns, pitch_x_mm, pitch_y_mm, pose=POSE):
-    return Laid(rows, columns, pitch_x_mm, pitch_y_mm, pose.rotation, pose.point_m)
+    return Placement(rows, columns, pitch_x_mm, pitch_y_mm, pose.rotation, pose.point_m)
 
 
 def test_sheet_unrolled_on_a_tube_lies_as_on_a_cylinder(tube):

@@ -78,7 +78,7 @@ def test_a_hello_tells_the_place_among_sheets():
     packet = hello(Facts(SKIN, (1, 3))).strip(b"\0")
     plain = framing.unseal(numbered.unnumbered(packet), b"")
     assert protocol.HelloReader().take(plain).place == (1, 3)
-    assert protocol.encode_hello(SKIN, place=numbered.Place(1, 3)).strip(b"\0") == numbered.unnumbered(packet)
+    assert protocol.encode_hello(SKIN, place=numbered.SheetPlace(1, 3)).strip(b"\0") == numbered.unnumbered(packet)
     assert protocol.HelloReader().take(framing.unseal(hello(Facts(SKIN)).strip(b"\0"), b"")).place is None
     with pytest.raises(PacketError, match="sheet 3 of 3"):
         protocol.HelloReader().take(framing.unseal(protocol.encode_hello(SKIN, place=(3, 3)).strip(b"\0"), b""))

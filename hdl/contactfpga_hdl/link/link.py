@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS, Derived
 from contactfpga.wire import numbered, protocol
-from contactfpga.wire.numbered import Place
+from contactfpga.wire.numbered import SheetPlace
 from contactfpga.wire.units import plain_bytes
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
@@ -79,7 +79,7 @@ class Link(wiring.Component):
     packets then say the sheet's number.
     """
 
-    def __init__(self, skin: Skin, place: Place | None = None):
+    def __init__(self, skin: Skin, place: SheetPlace | None = None):
         self.skin = skin
         self.place = place
         self.derived = Derived(skin)
@@ -356,11 +356,11 @@ def hello_words(skin: Skin) -> range:
     return range(first, first + len(stored_hello(skin)))
 
 
-def stored_hello(skin: Skin, place: Place | None = None) -> bytes:
+def stored_hello(skin: Skin, place: SheetPlace | None = None) -> bytes:
     """The hello from its leading delimiter on, without its check."""
     return protocol.encode_hello(skin, place=place)[: -CHECK_BYTES - 1]
 
 
-def offset_bits(skin: Skin, place: Place | None = None) -> int:
+def offset_bits(skin: Skin, place: SheetPlace | None = None) -> int:
     """Of a place in a region of the memory, which holds any frame or the hello."""
     return max(Derived(skin).max_stored_bytes, len(stored_hello(skin, place))).bit_length()

@@ -48,7 +48,7 @@ _CONVERTER_PINS = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Line:
+class Connection:
     """What is soldered to a line, and what hangs on it."""
 
     leads_to: str
@@ -67,7 +67,7 @@ class Wire:
     """As in the constraints, with its bit where it has several: ``rows[3]``, ``uart rx``."""
     pin: str
     """``connector:pin``, as the platform names it; nothing where the board wires it by itself."""
-    line: Line
+    line: Connection
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Output:
     """Of the chip in its chain; 0 is next to the board."""
     name: str
     pin: int
-    line: Line
+    line: Connection
 
     @property
     def place(self) -> tuple[str, str, str, str]:
@@ -95,15 +95,15 @@ def wires(board: BoardSpec, skin: Skin | Several) -> list[Wire]:
         lines = _lines_of_sheet(skin, port, len(pins)) if isinstance(skin, Several) else _lines(skin, port, len(pins))
         names = [port] if len(pins) == 1 else [f"{port}[{bit}]" for bit in range(len(pins))]
         found += [Wire(name, pin, line) for name, pin, line in zip(names, pins, lines, strict=True)]
-    found.append(Wire("contact", board.contact, Line("stop input of the robot: high while touched")))
+    found.append(Wire("contact", board.contact, Connection("stop input of the robot: high while touched")))
     for name, pin, other in zip(("rx", "tx"), board.uart or ("", ""), ("TXD", "RXD"), strict=True):
         place = f"{other} of the {board.bridge.chip}" + ("" if board.uart else f" {OWN}")
-        found.append(Wire(f"uart {name}", pin, Line(place)))
-    found.append(Wire("clock", "", Line(f"crystal {OWN}")))
+        found.append(Wire(f"uart {name}", pin, Connection(place)))
+    found.append(Wire("clock", "", Connection(f"crystal {OWN}")))
     many = len(board.held_high) > 1
     for bit, _ in enumerate(board.held_high):
         name = f"held_high[{bit}]" if many else "held_high"
-        found.append(Wire(name, "", Line(f"another chip, held high {OWN}")))
+        found.append(Wire(name, "", Connection(f"another chip, held high {OWN}")))
     return found
 
 
@@ -117,41 +117,41 @@ def outputs(skin: Skin) -> list[Output]:
     return found
 
 
-def row_lines(skin: Skin) -> list[Line]:
+def row_lines(skin: Skin) -> list[Connection]:
     """What is soldered to each row's line; the guard row's is the last one."""
     pull = ("down" if skin.selects_low else "up") if skin.reads_rows else ""
     return _sheet_lines("row", skin.line_of_row, skin.rows, pull)
 
 
-def column_lines(skin: Skin) -> list[Line]:
+def column_lines(skin: Skin) -> list[Connection]:
     """The same for columns."""
     return _sheet_lines("column", skin.line_of_column, skin.columns, "up" if skin.selects_low else "down")
 
 
-def _sheet_lines(kind: str, line_of: Sequence[int], count: int, pull: str) -> list[Line]:
+def _sheet_lines(kind: str, line_of: Sequence[int], count: int, pull: str) -> list[Connection]:
     names = [f"{kind} {number}" for number in range(count)] + [f"guard {kind}"] * (len(line_of) - count)
-    return [Line(names[line_of.index(line)], kind, pull) for line in range(len(line_of))]
+    return [Connection(names[line_of.index(line)], kind, pull) for line in range(len(line_of))]
 
 
-def _lines(skin: Skin, port: str, count: int) -> Sequence[Line]:
+def _lines(skin: Skin, port: str, count: int) -> Sequence[Connection]:
     if port == "rows":
         return row_lines(skin)
     if port == "columns":
         return column_lines(skin)
     if port == "alive":
-        return [Line("watchdog: turns each ms while all is well")]
+        return [Connection("watchdog: turns each ms while all is well")]
     if port.startswith("spi_"):
-        return [Line(_CONVERTER_PINS.get(converters.find(skin.converter).name, {}).get(port, port))]
-    return [Line(_CHIP_PINS[port].format(chain)) for chain in range(count)]
+        return [Connection(_CONVERTER_PINS.get(converters.find(skin.converter).name, {}).get(port, port))]
+    return [Connection(_CHIP_PINS[port].format(chain)) for chain in range(count)]
 
 
-def _lines_of_sheet(several: Several, port: str, count: int) -> Sequence[Line]:
+def _lines_of_sheet(several: Several, port: str, count: int) -> Sequence[Connection]:
     name, _, number = port.rpartition("_")
     lines = _lines(several.skins[int(number)], name, count)
-    return [Line(f"sheet {number}: {line.leads_to}") for line in lines]
+    return [Connection(f"sheet {number}: {line.leads_to}") for line in lines]
 
 
-def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Sequence[Line]) -> Iterator[Output]:
+def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Sequence[Connection]) -> Iterator[Output]:
     """Chain j has lines j n to j n + n - 1, n to a chain; its first line is on the chip next to the board."""
     length = -(-len(lines) // chains)
     for index, line in enumerate(lines):

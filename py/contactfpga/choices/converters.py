@@ -10,7 +10,7 @@ from contactfpga.choices.choice import find as find_choice
 
 
 @dataclasses.dataclass(frozen=True)
-class Pace:
+class ConverterPace:
     """Of a converter that converts all channels by itself, at the pace of a clock that the board gives it."""
 
     most_hz: int
@@ -45,7 +45,7 @@ class Converter(Choice):
     """High or low levels of the SPI clock in a sweep, for each unit."""
     spacing_levels: int
     """The same between the samples of two units; 0 where all are taken at once."""
-    pace: Pace | None = None
+    pace: ConverterPace | None = None
     """None: it converts as it is asked."""
 
     def most_hz(self, supply_v: float) -> int:
@@ -87,7 +87,7 @@ CONVERTERS: dict[str, Converter] = {
             least_level_ns=40,
             sweep_levels=0,
             spacing_levels=0,
-            pace=Pace(most_hz=8_200_000, least_level_ns=49, period=2048, delay_halves=3),
+            pace=ConverterPace(most_hz=8_200_000, least_level_ns=49, period=2048, delay_halves=3),
         ),
     )
 }

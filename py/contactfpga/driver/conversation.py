@@ -178,7 +178,7 @@ class Conversation:
         places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
         return np.minimum.accumulate(places[::-1])[::-1].tolist(), expected
 
-    def _take_run(self, table: many.Table, start: int, end: int, last_bytes: int, now: float) -> Run:
+    def _take_run(self, table: many.PacketTable, start: int, end: int, last_bytes: int, now: float) -> Run:
         assert self._widths is not None
         widths = self._widths
         packets, starts = table.packets[start:end], table.starts[start : end + 1]

@@ -27,16 +27,16 @@ LOG = logging.getLogger("contactfpga")
 were lost. Silent unless the program sets up logging."""
 LOG.addHandler(logging.NullHandler())
 
-TURN_S = 0.05
+READ_S = 0.05
 """How often the reader checks whether the board was closed."""
 
 ASK_S = 1.0
 """How often :meth:`Link.ask` asks."""
 
-SIMULATED_TURN_S = 0.002
-"""The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
+SIMULATED_READ_S = 0.002
+"""The most simulated time that passes in one read, for which :meth:`Link.close` may have to wait."""
 
-Found = Zones | SideEvent | ContactFPGAError | Hello | bool
+Result = Zones | SideEvent | ContactFPGAError | Hello | bool
 """What is waited for."""
 
 
@@ -85,7 +85,7 @@ class Link:
         self._waiters: list[_Waiter] = []
         self._failure: BaseException | None = None
         self._closing = False
-        self._turning: int | None = None  # the thread that reads
+        self._reading: int | None = None  # the thread that reads
         self._writing: int | None = None  # the thread that writes
         self._closers = 0  # threads that wait in :meth:`close`
         self._logged: tuple[int, int] | None = None  # restarts and lost frames; None: not even the first hello
@@ -102,7 +102,7 @@ class Link:
         self.check_open()
         return self.transport.clock()
 
-    def read(self, timeout: float) -> Found:
+    def read(self, timeout: float) -> Result:
         """Ask the board; the first frame scanned after now, or the error that came in its place."""
         deadline = self.clock() + timeout
         with self.changed:
@@ -126,7 +126,7 @@ class Link:
             self.conversation.ask(now, now)
         self._send()
 
-    def command(self, command: Command, timeout: float) -> Found:
+    def command(self, command: Command, timeout: float) -> Result:
         """Have the board do something; the first frame scanned after it took the command, or the error that came in
         its place. Raises :class:`NoSuchCommand`."""
         deadline, denied = self.clock() + timeout, self._denied()
@@ -180,7 +180,7 @@ class Link:
             self.changed.notify_all()
             if self._inherited:
                 return
-            if threading.get_ident() in (self._turning, self._writing):  # a scene's callback closes
+            if threading.get_ident() in (self._reading, self._writing):  # a scene's callback closes
                 return  # what it was called by does the rest
             self._closers += 1
             try:
@@ -192,7 +192,7 @@ class Link:
 
     def _in_use(self) -> bool:
         """Whether a thread is in the transport; the lock is held."""
-        return self._turning is not None or self._writing is not None
+        return self._reading is not None or self._writing is not None
 
     def _leave(self) -> None:
         """What a thread does that was in the transport, with the lock held: the last one of a board that was closed
@@ -205,7 +205,7 @@ class Link:
     def forked(self) -> None:
         """In a child process the port is closed, and stays open in its parent."""
         self.changed, self._commanding = threading.Condition(), threading.Lock()
-        self._turning = self._writing = None
+        self._reading = self._writing = None
         self._closing = self._inherited = True
 
     def check_open(self) -> None:
@@ -214,7 +214,7 @@ class Link:
         if self._closing:
             raise BoardClosed(f"{self.transport.name} was closed; open it again")
 
-    def wait_for(self, found: Callable[[], Found | None], deadline: float, timeout: float) -> Found:
+    def wait_for(self, found: Callable[[], Result | None], deadline: float, timeout: float) -> Result:
         """What ``found`` returns as soon as it is not None; raises :class:`ReadTimeout` at the deadline."""
         start = self.conversation.stats.bytes
         with self.changed:
@@ -222,7 +222,7 @@ class Link:
                 self.check_open()
                 if (result := found()) is not None:
                     return result
-                if self._turning == threading.get_ident():
+                if self._reading == threading.get_ident():
                     step = "a scene is called while its board is read, so read the board elsewhere"
                     raise ContactFPGAError(f"{self.transport.name}: its own scene would wait for it for ever; {step}")
                 if self._failure is not None:
@@ -230,21 +230,21 @@ class Link:
                 left = deadline - self.transport.clock()
                 if left <= 0:
                     raise timed_out(self.transport.name, timeout, self.conversation, start, counters_of(self.transport))
-                if self.transport.threaded or self._turning is not None:
-                    self.changed.wait(min(left, 1.0) if self.transport.threaded else TURN_S)
+                if self.transport.threaded or self._reading is not None:
+                    self.changed.wait(min(left, 1.0) if self.transport.threaded else READ_S)
                 else:
-                    self._turn(min(left, SIMULATED_TURN_S))
+                    self._read_once(min(left, SIMULATED_READ_S))
 
-    def _turn(self, seconds: float) -> int:
+    def _read_once(self, seconds: float) -> int:
         """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
-        self._turning = threading.get_ident()
+        self._reading = threading.get_ident()
         breaks = self._breaks()
         self.changed.release()
         try:
             data = self.transport.read(seconds)
         finally:
             self.changed.acquire()
-            self._turning = None
+            self._reading = None
             self.changed.notify_all()
             self._leave()
         self.check_open()
@@ -271,7 +271,7 @@ class Link:
     def take_what_came(self) -> None:
         with self.changed:
             self.check_open()
-            while self._turning is None and self._turn(0.0):
+            while self._reading is None and self._read_once(0.0):
                 pass
 
     def _pass_on(self, event: Event | Run) -> None:
@@ -330,7 +330,7 @@ class Link:
             with self.changed:
                 try:
                     self.check_open()
-                    self._turn(TURN_S)
+                    self._read_once(READ_S)
                 except BoardClosed:
                     self._leave()
                     return

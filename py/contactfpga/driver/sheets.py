@@ -22,7 +22,7 @@ from contactfpga.wire.framing import PacketError
 from contactfpga.wire.hello import Hello, HelloReader, begins_hello
 from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
 
-TURN_S = 0.05
+READ_S = 0.05
 """How long a sheet reads for all at a time."""
 
 MOST_WAIT = 16_384
@@ -108,9 +108,9 @@ class SharedPort:
                 if left <= 0 and (timeout_s > 0 or self._reading):
                     return b""
                 if self._reading:
-                    self._changed.wait(TURN_S)
+                    self._changed.wait(READ_S)
                     continue
-                came = self._turn(max(0.0, min(left, TURN_S)))
+                came = self._read_once(max(0.0, min(left, READ_S)))
                 if not came and timeout_s <= 0:
                     return b""
 
@@ -128,7 +128,7 @@ class SharedPort:
         if (sheets := self._sorter.sheets) is not None and sheet.number >= sheets:
             raise PortNotFound(f"{sheet.name}: the board at {name} has the sheets 0 to {sheets - 1}")
 
-    def _turn(self, seconds: float) -> bool:
+    def _read_once(self, seconds: float) -> bool:
         """Read once, with the lock held, which is released meanwhile; whether something came."""
         self._reading = True
         self._changed.release()

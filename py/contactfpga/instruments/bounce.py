@@ -25,7 +25,7 @@ SLOW = 2.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Bounced:
+class Transition:
     """One press or release."""
 
     cell: Cell
@@ -61,9 +61,9 @@ class Bounce:
     def __init__(self, on_change: bool = False) -> None:
         """``on_change``: the board sends no frame while nothing changes."""
         self._on_change = on_change
-        self.bounced: list[Bounced] = []
+        self.bounced: list[Transition] = []
         """Presses and releases, in the order in which they ended."""
-        self.blips: list[Bounced] = []
+        self.blips: list[Transition] = []
         """The same of switches that ended as they began: touches shorter than :data:`QUIET_US`, or noise."""
         self._open: np.ndarray
         self._before: np.ndarray
@@ -111,7 +111,7 @@ class Bounce:
         for row, column in np.argwhere(ended).tolist():
             at = row, column
             us = int(self._to_us[at] - self._from_us[at])
-            one = Bounced(at, bool(self._now[at]), us, int(self._changes[at]))
+            one = Transition(at, bool(self._now[at]), us, int(self._changes[at]))
             (self.blips if self._before[at] == self._now[at] else self.bounced).append(one)
 
     # ---- what they show

@@ -104,7 +104,7 @@ def _corner_normals(mesh: Any) -> Floats:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Laid:
+class Placement:
     """The sheet and where its own frame lies in the mesh's."""
 
     rows: int

@@ -1,4 +1,4 @@
-"""Plane and cylinder as plain functions: all lengths are in one unit, whichever it is."""
+"""Plane and cylinder as plain functions, all lengths in one unit, whichever it is; and surfaces that cannot be."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import is_finite, shown
 
 Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -49,3 +52,18 @@ def vector(values: Floats) -> Vector:
 def is_one(*values: Any) -> bool:
     """Whether these are plain numbers and no arrays."""
     return all(isinstance(value, (float, int)) for value in values)
+
+
+LONGEST_MM = 1e6
+
+
+class SurfaceError(ContactFPGAError, ValueError):
+    """A surface, or a place on one, that cannot be; the message names the value and the limit."""
+
+
+def length(name: str, value: Any, low: float = -LONGEST_MM, unit: str = "mm") -> float:
+    """``value`` if it is a number above ``low``; raises :class:`SurfaceError`."""
+    if not is_finite(value) or not low < value <= LONGEST_MM:
+        what = f"a number above {low:g} and at most {LONGEST_MM:g} {unit}".rstrip()
+        raise SurfaceError(f"{name} is {shown(value)}; it must be {what}")
+    return float(value)

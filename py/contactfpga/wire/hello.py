@@ -12,7 +12,7 @@ from contactfpga.skin.derived import CHECK_BYTES, SELF_TEST, pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire import framing
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
-from contactfpga.wire.numbered import Place
+from contactfpga.wire.numbered import SheetPlace
 from contactfpga.wire.units import FACTS_BYTES, UnitFacts
 
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255
@@ -43,7 +43,7 @@ _SIZES = {
     FINGERPRINT: _FINGERPRINT_BYTES,
     RATES: _RATES.size,
     UNITS: FACTS_BYTES,
-    PLACE: len(Place._fields),
+    PLACE: len(SheetPlace._fields),
     CHECK: _CHECK.size,
 }
 """The least bytes of a field."""
@@ -69,7 +69,7 @@ class Hello:
     """Numbers of the commands that the board takes; see :meth:`Board.command`."""
     units: UnitFacts | None = None
     """Its pressure units; None: it has none."""
-    place: Place | None = None
+    place: SheetPlace | None = None
     """The sheet's number among several at one FPGA, and how many there are; None for a board with one sheet."""
     sent: int
     """Frames sent since power-up."""
@@ -92,7 +92,7 @@ class Hello:
 
 
 def encode_hello(
-    skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0, place: Place | None = None
+    skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0, place: SheetPlace | None = None
 ) -> bytes:
     """The hello of a board built from ``skin``, as on the wire, with a delimiter at either end.
 
@@ -220,8 +220,8 @@ def _hello(fields: dict[int, bytes]) -> Hello:
     )
 
 
-def _place(data: bytes) -> Place:
-    place = Place(*data[: len(Place._fields)])
+def _place(data: bytes) -> SheetPlace:
+    place = SheetPlace(*data[: len(SheetPlace._fields)])
     if place.number >= place.sheets:
         raise ValueError(f"it is of sheet {place.number} of {place.sheets}")
     return place

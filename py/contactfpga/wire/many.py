@@ -37,7 +37,7 @@ counts its records."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Table:
+class PacketTable:
     """Consecutive packets."""
 
     packets: np.ndarray
@@ -49,7 +49,7 @@ class Table:
     meet, as :attr:`contactfpga.wire.protocol.Frame.moments`."""
 
 
-def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> Table:
+def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTable:
     """Read packets as they came between delimiters; ``before`` as for :func:`contactfpga.wire.framing.unseal`.
 
     The report of the sheet must have zones.
@@ -74,7 +74,7 @@ def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> Table:
         all_records[(starts[which][:, None] + np.arange(records.shape[1])).ravel()] = records.reshape(
             -1, len(widths.record_bits)
         )
-    return Table(found, starts, all_records)
+    return PacketTable(found, starts, all_records)
 
 
 def _group(data: np.ndarray, items: int, widths: Widths, before: bytes) -> tuple[np.ndarray, np.ndarray]:

@@ -26,7 +26,7 @@ _BITS = (DIGIT_BITS, DIGIT_BITS, 16 - 2 * DIGIT_BITS)
 _POLYNOMIAL = 0x8408
 
 
-class Place(NamedTuple):
+class SheetPlace(NamedTuple):
     """Where a sheet stands among those of its FPGA."""
 
     number: int

@@ -123,7 +123,7 @@ def _list(args: argparse.Namespace) -> int:
     return 0 if boards else 1
 
 
-def _listed(one: finding.Found) -> dict[str, object]:
+def _listed(one: finding.Answer) -> dict[str, object]:
     known = one.hello
     return {
         "port": one.candidate.device,

@@ -7,7 +7,7 @@ from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
-from contactfpga.wire.numbered import Place
+from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.several import Turns
 from contactfpga_sim.verify.proofs.bugs import Bug
@@ -15,7 +15,7 @@ from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
-_PLACE = Place(1, 2)
+_PLACE = SheetPlace(1, 2)
 
 
 def turns_go_round(proof: Proof, sheets: int) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.skin import Skin
-from contactfpga.surfaces.laying import Laid, Triangles
+from contactfpga.surfaces.laying import Placement, Triangles
 from contactfpga.tools.console import numbers, outputs, terminal
 
 EXTRA = "surface"
@@ -42,7 +42,9 @@ def run(args: argparse.Namespace) -> int:
     output = outputs.file(args.output, "TABLE.npz")
     triangles = Triangles.load(args.mesh, args.scale)
     pose = Pose.of(args.origin, args.rpy)
-    laid = Laid(skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, pose.rotation, np.array(args.origin, float))
+    laid = Placement(
+        skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, pose.rotation, np.array(args.origin, float)
+    )
     table = laid.unrolled(triangles, closed=skin.closed) if args.by == "unrolling" else laid.projected(triangles)
     table.save(output)
     (x_low, x_high), (y_low, y_high) = table.spacing_mm
