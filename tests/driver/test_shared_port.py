@@ -270,8 +270,8 @@ def test_a_search_finds_each_sheet(monkeypatch):
         numbered(board.hello().strip(b"\0"), number) + b"\0" for number, board in enumerate(line.boards)
     )
     monkeypatch.setattr(finding, "connect", lambda port, baud: line)
-    monkeypatch.setattr(finding.ports, "candidates", lambda: [Candidate("fake", "a board", "ABC")])
-    heard = finding.survey(finding.ports.candidates(), 3_000_000)
+    monkeypatch.setattr(finding, "candidates", lambda: [Candidate("fake", "a board", "ABC")])
+    heard = finding.survey(finding.candidates(), 3_000_000)
     assert [(one.candidate.device, one.hello.name) for one in heard] == [("fake#0", "chest"), ("fake#1", "back")]
     assert finding.find("name:back", None, 3_000_000) == "fake#1"
     assert finding.find(None, SKINS[0], 3_000_000) == "fake#0"

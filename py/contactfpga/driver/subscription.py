@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import collections
 import contextlib
 import math
@@ -215,10 +214,12 @@ class Listening(Generic[Item]):
                 return
 
     async def __aiter__(self) -> AsyncIterator[Item]:
+        import asyncio  # a quarter of what contactfpga.open would load
+
         while True:
             try:
                 if self._frames:
-                    await asyncio.sleep(0)  # others get their turn
+                    await asyncio.sleep(0)  # others go on
                 else:
                     await asyncio.to_thread(self._wait, 1.0)
                 yield self.next()  # which waits for nothing now, and takes no frame if we were canceled above
