@@ -13,7 +13,8 @@ from contactfpga.driver.clock import PIECE_S, USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga_sim.lab.clock.compute import PATHS, accuracy, compute, followed, moments, tables
+from contactfpga_sim.lab.clock import compute, tables
+from contactfpga_sim.lab.clock.compute import PATHS, accuracy, followed, moments
 
 SKIN = contactfpga.Skin()
 QUIET = dataclasses.replace(PATHS["usb_125us"], rate_hz=200.0)
