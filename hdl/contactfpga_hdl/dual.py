@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 
 PAUSE_BITS = 16
 """Bits of the line for which it is broken, and then for which it rests: more than a byte takes."""
@@ -72,8 +71,8 @@ class Dual(wiring.Component):
 
     def _restart(self, m: Module, differs: Value, breaks: Value, holds: Value) -> Value:
         """Returns what is high from a difference to the end of the restart."""
-        pause = PAUSE_BITS * Derived(self.skin).bit_clocks
-        scan = Derived(self.skin).frame_clocks
+        pause = PAUSE_BITS * self.skin.derived.bit_clocks
+        scan = self.skin.derived.frame_clocks
         left = Signal(range(scan + 2 * pause + 1))  # of the restart, in clocks
         with m.If(differs):
             m.d.sync += left.eq(scan + 2 * pause)

@@ -4,7 +4,6 @@ from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several
 from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.uart import Transmitter
@@ -31,7 +30,7 @@ class SeveralTop(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        derived = Derived(self.several.skins[0])  # its rates are those of all
+        derived = self.several.skins[0].derived  # its rates are those of all
         m.submodules.transmitter = transmitter = Transmitter(derived.bit_clocks)
         m.submodules.receiver = receiver = receiver_of(derived)
         m.submodules.turns = turns = Turns(len(self.sheets))

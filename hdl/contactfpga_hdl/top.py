@@ -58,7 +58,7 @@ class Top(wiring.Component):
         self.probes = probes
         self.copy = copy
         self._restarts = Signal(name="restarts")
-        self.derived = derived = Derived(skin)
+        self.derived = derived = skin.derived
         ports = {
             **row_pins(skin),
             **column_pins(skin),

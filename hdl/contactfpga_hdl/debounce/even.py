@@ -5,7 +5,6 @@ from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import row_layout
 
 
@@ -41,12 +40,12 @@ class Debounce(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        row = row_layout(Derived(skin))
+        row = row_layout(skin.derived)
         super().__init__({"raw": In(stream.Signature(row)), "rows": Out(stream.Signature(row))})
 
     def elaborate(self, platform):
         m = Module()
-        derived = Derived(self.skin)
+        derived = self.skin.derived
         press, release = derived.press_scans, derived.release_scans
         symmetric = self.skin.debounce == "sym_defer_pk"
         longest = max(press, release) if symmetric else release + 1 + max(0, press - 1)

@@ -5,7 +5,6 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.debounce.even import Phase, Switch, walk_columns
 from contactfpga_hdl.payloads import row_layout
 
@@ -24,7 +23,7 @@ class TimedDebounce(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         row = row_layout(self.derived)
         super().__init__(
             {
@@ -89,7 +88,7 @@ class _Walk(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         row = row_layout(self.derived)
         super().__init__(
             {

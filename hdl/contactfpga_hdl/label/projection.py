@@ -10,7 +10,6 @@ from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, memory, wiring
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
@@ -31,7 +30,7 @@ class ProjectionLabeller(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):

@@ -35,7 +35,7 @@ class RunLabeller(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):

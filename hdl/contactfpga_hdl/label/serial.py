@@ -88,7 +88,7 @@ class SerialLabeller(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):

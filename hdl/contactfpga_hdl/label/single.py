@@ -4,7 +4,6 @@ from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
@@ -19,7 +18,7 @@ class SingleLabeller(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):

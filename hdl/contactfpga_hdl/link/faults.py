@@ -5,7 +5,6 @@ from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire import faults
 from contactfpga.wire.framing import DIGIT_BITS, cobs_encode
 from contactfpga_hdl.payloads import faults_layout, slots_layout
@@ -30,7 +29,7 @@ class Reporter(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        layout = faults_layout(derived := Derived(skin))
+        layout = faults_layout(derived := skin.derived)
         self._report = report_of(layout.size, 0)
         self._slot = empty_slot(skin) if skin.self_test else b""
         place_bits = max(len(self._report), len(self._slot)).bit_length()

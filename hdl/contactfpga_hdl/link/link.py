@@ -5,7 +5,7 @@ from amaranth.lib import crc, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS, Derived
+from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS
 from contactfpga.wire import numbered, protocol
 from contactfpga.wire.numbered import SheetPlace
 from contactfpga.wire.units import plain_bytes
@@ -82,7 +82,7 @@ class Link(wiring.Component):
     def __init__(self, skin: Skin, place: SheetPlace | None = None):
         self.skin = skin
         self.place = place
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         self._hello = stored_hello(skin, place)
         self._offset_bits = offset_bits(skin, place)
         super().__init__(
@@ -363,4 +363,4 @@ def stored_hello(skin: Skin, place: SheetPlace | None = None) -> bytes:
 
 def offset_bits(skin: Skin, place: SheetPlace | None = None) -> int:
     """Of a place in a region of the memory, which holds any frame or the hello."""
-    return max(Derived(skin).max_stored_bytes, len(stored_hello(skin, place))).bit_length()
+    return max(skin.derived.max_stored_bytes, len(stored_hello(skin, place))).bit_length()

@@ -72,7 +72,7 @@ class Packer(wiring.Component):
 
     def __init__(self, skin: Skin, offset_bits: int):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             {
                 "items": In(stream.Signature(item_layout(self.derived))),

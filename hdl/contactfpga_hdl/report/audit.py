@@ -7,7 +7,6 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import (
     moments_layout,
     passed_layout,
@@ -36,7 +35,7 @@ class Audit(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             {
                 "taken": In(1),
@@ -101,7 +100,7 @@ class Tally(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         self._columns = 4  # of a group; a power of two
         while skin.columns > GROUPS * self._columns:
             self._columns *= 2
@@ -166,7 +165,7 @@ class Counts(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             {
                 "taken": In(1),

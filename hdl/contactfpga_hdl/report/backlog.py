@@ -5,7 +5,6 @@ from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import passed_layout
 
 
@@ -59,7 +58,7 @@ class Backlog(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         payload = stream.Signature(passed_layout(self.derived))
         super().__init__({"passed": In(payload), "waiting": Out(payload)})
 

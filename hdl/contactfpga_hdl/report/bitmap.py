@@ -5,7 +5,6 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import item_layout, row_layout, summary_layout
 from contactfpga_hdl.report.audit import Counts
 
@@ -21,7 +20,7 @@ class Bitmap(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             {
                 "rows": In(stream.Signature(row_layout(self.derived))),

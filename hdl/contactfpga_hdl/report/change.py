@@ -5,7 +5,6 @@ from amaranth.lib import memory, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import row_layout
 
 
@@ -18,7 +17,7 @@ class Change(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__({"taken": In(1), "row": In(row_layout(self.derived)), "clear": In(1), "changed": Out(1)})
 
     def elaborate(self, platform):

@@ -14,7 +14,6 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import barycenter_layout, item_layout, record_layout
 
 
@@ -31,7 +30,7 @@ class Divider(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             {
                 "records": In(stream.Signature(record_layout(self.derived))),

@@ -8,7 +8,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import faults_layout
 from contactfpga_hdl.scan.stuck import anywhere, present, watched
 
@@ -33,7 +32,7 @@ class Told(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self._layout = faults_layout(Derived(skin))
+        self._layout = faults_layout(skin.derived)
         super().__init__(
             {
                 "rows": In(skin.rows),

@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.stuck import watched
 
 LOOKS = 4
@@ -36,7 +35,7 @@ class Precharge(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        derived = Derived(skin)
+        derived = skin.derived
         charge = max(derived.precharge_clocks, derived.project_clocks if skin.reads_rows else 0)
         self.apart_bits = max(LEAST_BITS, charge.bit_length())
         self.alone = skin.guard and skin.reads_rows

@@ -51,7 +51,7 @@ class Seek(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         rows = skin.rows
         everything = (1 << rows) - 1
         super().__init__(

@@ -10,7 +10,6 @@ from amaranth.lib.cdc import FFSynchronizer
 
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.lines import of_lines, on_lines
 from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
 
@@ -30,7 +29,7 @@ class RowChain(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        derived = Derived(self.skin)
+        derived = self.skin.derived
         lines, clocks = derived.row_chain_lines, derived.shift_clocks
         pattern = on_lines(self.pattern, self.skin.line_of_row)
         levels = ~pattern if self.skin.selects_low else pattern
@@ -72,7 +71,7 @@ class ColumnChain(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        derived = Derived(self.skin)
+        derived = self.skin.derived
         lines, clocks = derived.column_chain_lines, derived.shift_clocks
         busy = Signal()
         bit = Signal(range(lines + 1))  # 0 is the load pulse

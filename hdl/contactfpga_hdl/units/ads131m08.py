@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.units.ports import converter_ports
 
 BITS, WORDS = 24, 10
@@ -33,7 +32,7 @@ class Ads131m08(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        units = Derived(skin).units
+        units = skin.derived.units
         self.level_clocks, self.pace_clocks = units.level_clocks, units.pace_level_clocks
         super().__init__(converter_ports(skin))
 

@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.units.ports import converter_ports
 
 CLOCKS = 19
@@ -26,7 +25,7 @@ class Mcp3208(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.level_clocks = Derived(skin).units.level_clocks
+        self.level_clocks = skin.derived.units.level_clocks
         super().__init__(converter_ports(skin))
 
     def elaborate(self, platform):

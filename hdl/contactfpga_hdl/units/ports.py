@@ -4,7 +4,6 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.units import INDEX_BITS
 
 
@@ -14,14 +13,14 @@ def unit_pins(skin: Skin) -> dict[str, wiring.Member]:
     if not skin.units:
         return {}
     pins = {"spi_clock": Out(1), "spi_select_n": Out(1, init=1), "spi_mosi": Out(1), "spi_miso": In(1)}
-    if Derived(skin).units.converter.pace is not None:
+    if skin.derived.units.converter.pace is not None:
         pins |= {"spi_ready_n": In(1, init=1), "spi_pace": Out(1)}
     return pins
 
 
 def reading_layout(skin: Skin) -> data.StructLayout:
     """A reading, of which unit, and whether that is the sweep's last one."""
-    return data.StructLayout({"value": Derived(skin).units.converter.bits, "unit": INDEX_BITS, "last": 1})
+    return data.StructLayout({"value": skin.derived.units.converter.bits, "unit": INDEX_BITS, "last": 1})
 
 
 def converter_ports(skin: Skin) -> dict[str, wiring.Member]:

@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.wire.command import MOST_VALUE, MOST_WHAT
 from contactfpga_hdl.units.pack import UnitPacker, packet_signature
 from contactfpga_hdl.units.ports import unit_pins
@@ -38,7 +37,7 @@ class Units(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.converter = converter = Derived(self.skin).units.converter.load_gateware()(self.skin)
+        m.submodules.converter = converter = self.skin.derived.units.converter.load_gateware()(self.skin)
         m.submodules.watch = watch = Watch(self.skin)
         m.submodules.packer = packer = UnitPacker(self.skin)
         wiring.connect(m, converter.pins, wiring.flipped(self.pins))

@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga.skin.units import INDEX_BITS, MAX_WEIGHT, NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
 from contactfpga.wire.command import MOST_VALUE, MOST_WHAT
 from contactfpga_hdl.units.ports import reading_layout
@@ -38,7 +37,7 @@ class Watch(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.settings = settings = Settings(self.skin)
-        deviation = Signal(signed(Derived(self.skin).units.converter.bits + 1))
+        deviation = Signal(signed(self.skin.derived.units.converter.bits + 1))
         compares = Signal()
         of_units = Signal(self.skin.units)
         amount = Mux(deviation < 0, -deviation, deviation).as_unsigned()
@@ -84,7 +83,7 @@ class Settings(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        units = Derived(skin).units
+        units = skin.derived.units
         self._bits, self._sum_bits = units.converter.bits, units.sum_bits
         sums = {"sum": In(2), "sum_threshold": Out(self._sum_bits), "sum_watched": Out(1)} if skin.unit_sums else {}
         super().__init__(
@@ -143,7 +142,7 @@ class Sums(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        units = Derived(skin).units
+        units = skin.derived.units
         self._bits, self._total = units.converter.bits, signed(units.sum_bits + 1)
         super().__init__(
             {
