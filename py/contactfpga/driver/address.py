@@ -22,6 +22,11 @@ SIM, REPLAY, NET = "sim:", "replay://", "zenoh://"
 """What the other addresses begin with."""
 
 
+def searched(port: object) -> bool:
+    """Whether a port is one of those that have to be searched."""
+    return port is None or (isinstance(port, str) and port.startswith((NAME, USB)))
+
+
 @dataclasses.dataclass(frozen=True)
 class Serial:
     """The device of a serial port."""

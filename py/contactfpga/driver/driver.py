@@ -9,7 +9,8 @@ import threading
 from pathlib import Path
 
 from contactfpga.choices.choice import trusted
-from contactfpga.driver import finding, forks, recording
+from contactfpga.driver import forks, recording
+from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
@@ -62,7 +63,9 @@ def open(
         raise TypeError(f"record is {shown(record)}; it must be the name of a file or a Tap")
     if isinstance(port, os.PathLike):
         port = os.fspath(port)
-    if port is None or (isinstance(port, str) and finding.searched(port)):
+    if port is None or (isinstance(port, str) and searched(port)):
+        from contactfpga.driver import finding  # all boards, which a named port has no use for
+
         port = finding.find(port, skin, baud)
     with trusted(trust):
         transport = connect(port, baud)

@@ -112,11 +112,6 @@ class Answer:
         return f"{self.candidate}: {said}"
 
 
-def searched(port: object) -> bool:
-    """Whether a port is one of those that have to be searched."""
-    return port is None or (isinstance(port, str) and port.startswith((NAME, USB)))
-
-
 def find(port: str | None, skin: Skin | None, baud: int) -> str:
     """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
     if port is not None and (sheet := SheetOf.parse(port)) is not None:

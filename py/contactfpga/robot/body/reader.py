@@ -9,7 +9,8 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from typing import Protocol
 
-from contactfpga.driver import driver, finding
+from contactfpga.driver import driver
+from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board
 from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import BoardClosed, BoardSilent, OnlyNoise, ReadTimeout, SkinMismatch, VersionMismatch
@@ -28,7 +29,7 @@ def open_board(plan: Plan, timeout: float = 1.0) -> Board:
 
 
 def _lock(port: str | None) -> contextlib.AbstractContextManager[None]:
-    if finding.searched(port):
+    if searched(port):
         return _PORTS.exclusive()
     elsewhere = port is not None and "://" in port  # virtual, or on the network: no search opens it
     return contextlib.nullcontext() if elsewhere else _PORTS.shared()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.driver import driver, finding, health
-from contactfpga.driver.address import SheetOf
+from contactfpga.driver.address import SheetOf, searched
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
@@ -144,7 +144,7 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
         if len(found) == 1:
             port = found[0].device
     try:
-        if port is not None and finding.searched(port):
+        if port is not None and searched(port):
             skin = Skin.load(args.skin) if args.skin else None
             port = finding.find(port, skin, args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
         if port is not None and "://" not in port:
