@@ -11,7 +11,7 @@ from typing import Any
 
 from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
-from contactfpga.boards.wiring import Line, Output, Wire
+from contactfpga.boards.wiring import Connection, Output, Wire
 from contactfpga.design.circuit import Circuit, load_checked
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
@@ -151,7 +151,7 @@ class WiringTable:
         pull = {"to": line.pull, "ohm": self._pull_ohm(line)} if line.pull else None
         return {"leads_to": line.leads_to, "series_ohm": self._series_ohm(line), "pull": pull}
 
-    def _end(self, line: Line) -> tuple[str, str, str]:
+    def _end(self, line: Connection) -> tuple[str, str, str]:
         series, pull = self._series_ohm(line), self._pull_ohm(line)
         to = {"up": "to 3.3 V", "down": "to ground", "": ""}[line.pull]
         return (
@@ -160,10 +160,10 @@ class WiringTable:
             to if pull is None else f"{ohms(pull)} {to}",
         )
 
-    def _series_ohm(self, line: Line) -> float | None:
+    def _series_ohm(self, line: Connection) -> float | None:
         return self.circuit.series_ohm or None if self.circuit and line.kind else None
 
-    def _pull_ohm(self, line: Line) -> float | None:
+    def _pull_ohm(self, line: Connection) -> float | None:
         if self.circuit is None or not line.pull:
             return None
         return self.circuit.row_pull_ohm if line.kind == "row" else self.circuit.column_pull_ohm
