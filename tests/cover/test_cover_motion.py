@@ -8,7 +8,7 @@ import pytest
 from impacts import FIRST, ROWS, SPEED, arm
 from scipy import integrate
 
-from contactfpga.design.cover import CoverError, NoSolution, impact, solve
+from contactfpga.design.cover import CoverError, NoSolution, impact, numerics
 from contactfpga.design.cover import arm as motion
 from contactfpga.design.cover.arm import Arm, speed2
 
@@ -146,11 +146,11 @@ def test_the_first_of_several_roots_is_found():
 
 
 def test_roots_and_integrals():
-    assert solve.root(lambda x: x**3 - 2, 0, 3) == pytest.approx(2 ** (1 / 3), rel=1e-15)
-    assert solve.root(lambda x: math.inf if x > 1 else x - 0.3, 0, 9) == pytest.approx(0.3, rel=1e-15)
-    assert solve.root(lambda x: x, 0, 1) == 0
+    assert numerics.root(lambda x: x**3 - 2, 0, 3) == pytest.approx(2 ** (1 / 3), rel=1e-15)
+    assert numerics.root(lambda x: math.inf if x > 1 else x - 0.3, 0, 9) == pytest.approx(0.3, rel=1e-15)
+    assert numerics.root(lambda x: x, 0, 1) == 0
     with pytest.raises(ValueError, match="no change of sign between 1 and 2"):
-        solve.root(lambda x: x, 1, 2)
-    assert solve.integral(np.sqrt, 0, 1) == pytest.approx(2 / 3, rel=1e-13)
-    assert solve.integral(lambda x: 1 / x, 0, 1) is None
-    assert solve.integral(lambda x: x * np.inf, 0, 1) is None
+        numerics.root(lambda x: x, 1, 2)
+    assert numerics.integral(np.sqrt, 0, 1) == pytest.approx(2 / 3, rel=1e-13)
+    assert numerics.integral(lambda x: 1 / x, 0, 1) is None
+    assert numerics.integral(lambda x: x * np.inf, 0, 1) is None

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
-from contactfpga.design.cover.solve import Floats, gauss
+from contactfpga.design.cover.numerics import Floats, gauss
 
 GRAVITY = 9.81
 """g in m/s2, the paper's."""

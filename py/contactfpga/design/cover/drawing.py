@@ -16,8 +16,8 @@ from contactfpga import picture_style as style
 from contactfpga.design.cover import arm, elastic, impact, line, medium, point
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.solve import Floats
 from contactfpga.design.cover.task import FIRST_DESIGN, WORST_M, Task
 from contactfpga.picture_style import save
 

@@ -16,8 +16,8 @@ import numpy as np
 from contactfpga.design.cover import hertz, medium
 from contactfpga.design.cover.answer import NoSolution, not_negative, positive
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.numerics import Floats, legendre, root
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.solve import Floats, legendre, root
 
 WIDEST = 8.0
 """Patch radius over thickness up to which stresses are computed; Hertz stops holding at 1."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
 from contactfpga.design.cover.arm import Arm, compress, slowness, speed2
-from contactfpga.design.cover.solve import integral, root
+from contactfpga.design.cover.numerics import integral, root
 
 COMPRESSION_TIME: float = 0.4 * math.gamma(0.4) * math.gamma(0.5) / math.gamma(0.9)
 """t_c v0/delta_c without torque and gravity: (2/5) B(2/5, 1/2) = 1.471637592."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.design.cover.answer import CoverError
-from contactfpga.design.cover.solve import Floats
+from contactfpga.design.cover.numerics import Floats
 from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import shown
 

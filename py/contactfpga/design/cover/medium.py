@@ -22,12 +22,10 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contactfpga.design.cover.answer import CoverError
+from contactfpga.design.cover.numerics import Floats
 from contactfpga.inputs.values import shown
-
-Floats = NDArray[np.float64]
 
 MEDIA = ("halfspace", "bonded", "frictionless")
 """The names of :func:`spread` and :func:`transfer`."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.robot.haptics.values import Floats
 from contactfpga.robot.haptics.wrench import Cylinder, Noise, Plane, Surface
+from contactfpga.surfaces.shapes import Floats
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:

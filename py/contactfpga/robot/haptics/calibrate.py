@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.robot.haptics.units import COMPONENTS, LoadCells, reduced
-from contactfpga.robot.haptics.values import Floats, HapticsError
+from contactfpga.robot.haptics.values import HapticsError
+from contactfpga.surfaces.shapes import Floats
 
 SEEN = 1e-6
 """Share of the largest load below which a direction was not loaded."""

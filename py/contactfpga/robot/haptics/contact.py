@@ -14,8 +14,9 @@ import numpy as np
 from contactfpga import notebook
 from contactfpga.inputs.values import shown
 from contactfpga.robot.haptics.units import LoadCells
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import ALARM, Center, Motion, Wrench
+from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.zones.zone import Zone, Zones
 
 FULL_WRENCH = "FULL_WRENCH"

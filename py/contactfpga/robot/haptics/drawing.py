@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from contactfpga import picture_style as style
 from contactfpga.robot.haptics.rate import ALONG, AROUND, Rating, Requirements
-from contactfpga.robot.haptics.values import Floats
 from contactfpga.robot.haptics.wrench import Cylinder
+from contactfpga.surfaces.shapes import Floats
 
 
 def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:

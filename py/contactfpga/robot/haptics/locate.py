@@ -16,9 +16,10 @@ from contactfpga.design.cover import medium, sense
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.robot.haptics import posterior
 from contactfpga.robot.haptics.posterior import Box, Posterior
-from contactfpga.robot.haptics.values import Floats, HapticsError
+from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Center
 from contactfpga.skin import sheet as sheets
+from contactfpga.surfaces.shapes import Floats
 from contactfpga.zones.zone import Zones
 
 STEPS, PATCH_STEPS = 512, 240

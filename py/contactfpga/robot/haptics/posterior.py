@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from contactfpga.robot.haptics.values import Floats
+from contactfpga.surfaces.shapes import Floats
 
 SIDE = 36
 """Points of the grid along each axis."""

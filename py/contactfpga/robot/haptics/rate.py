@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from contactfpga.robot.haptics.units import LoadCells, Unit
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, cross, number, positive, skew
+from contactfpga.robot.haptics.values import HapticsError, cross, number, positive, skew
 from contactfpga.robot.haptics.wrench import ALARM, Cylinder, Noise, Surface, Wrench
+from contactfpga.surfaces.shapes import Floats, Vector
 
 
 @dataclasses.dataclass(frozen=True)

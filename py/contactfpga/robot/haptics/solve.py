@@ -25,8 +25,9 @@ from contactfpga.robot.haptics.contact import (
     Touch,
 )
 from contactfpga.robot.haptics.system import System, along_normals, by_least_squares, distinct, within_cones
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, cross, dot, minus, solve_symmetric
+from contactfpga.robot.haptics.values import HapticsError, cross, dot, minus, solve_symmetric
 from contactfpga.robot.haptics.wrench import Surface, Wrench
+from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from contactfpga.errors import MissingExtra
 from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution, Touch
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, skew
+from contactfpga.robot.haptics.values import HapticsError, skew
 from contactfpga.robot.haptics.wrench import ALARM, Wrench
-from contactfpga.surfaces.shapes import vector
+from contactfpga.surfaces.shapes import Floats, Vector, vector
 
 SAME_M = 1e-9
 """Points nearer to each other than this are one."""

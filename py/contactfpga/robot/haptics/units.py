@@ -14,18 +14,9 @@ import numpy as np
 
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
-from contactfpga.robot.haptics.values import (
-    Floats,
-    HapticsError,
-    Vector,
-    direction,
-    matrix,
-    number,
-    positive,
-    skew,
-    vector,
-)
+from contactfpga.robot.haptics.values import HapticsError, direction, matrix, number, positive, skew, vector
 from contactfpga.robot.haptics.wrench import SURFACES, Bumper, Motion, Noise, Surface, Wrench, read_surface
+from contactfpga.surfaces.shapes import Floats, Vector
 
 
 @dataclasses.dataclass(frozen=True)

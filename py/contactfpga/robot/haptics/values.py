@@ -8,13 +8,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
-
-Floats = NDArray[np.float64]
-Vector = tuple[float, float, float]
+from contactfpga.surfaces.shapes import Floats, Vector
 
 LARGEST = 1e9
 """Of what a file says in SI units; powers of it are still numbers."""

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from contactfpga.inputs.values import shown
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, number, positive
+from contactfpga.robot.haptics.values import HapticsError, number, positive
 from contactfpga.surfaces import shapes
+from contactfpga.surfaces.shapes import Floats, Vector
 
 ALARM = (10.828, 13.816, 16.266, 18.467, 20.515, 22.458)
 """Chi-square that chance exceeds once in a thousand times, with 1 to 6 degrees of freedom."""

@@ -17,9 +17,9 @@ from contactfpga.design.cover import arm, elastic, impact
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import Arm, slowness, speed2
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.numerics import Floats, gauss, legendre
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import LADDER, Model, Sheet
-from contactfpga.design.cover.solve import Floats, gauss, legendre
 
 FLOOR = 1e-13
 """Errors below this are those of the reference, and written as less than it."""

@@ -17,7 +17,7 @@ from contactfpga.design.cover.hertz import Ball
 from contactfpga.robot.haptics import Contacts, Cylinder, LoadCells, Touch, contacts
 from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.robot.haptics.rate import hexapod
-from contactfpga.robot.haptics.values import Floats
+from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.lab.failures.knob import Outcome, Study
 from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, Case

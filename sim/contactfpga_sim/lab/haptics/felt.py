@@ -16,8 +16,8 @@ import numpy as np
 import contactfpga
 from contactfpga.robot.haptics import AloneWatch, ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
 from contactfpga.robot.haptics.rate import tripod
-from contactfpga.robot.haptics.values import Floats
 from contactfpga.skin import Skin
+from contactfpga.surfaces.shapes import Floats
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.haptics.coverage import MIDDLE, POINT, reach_of
 from contactfpga_sim.model.board.virtual import VirtualBoard

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.robot.haptics.values import Floats
+from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.lab.haptics.felt import FINGER_MM, SETTINGS, pair
 
 METHODS = ("barycenters", "mean of all places that fit", "one place known")

@@ -8,8 +8,8 @@ import numpy as np
 
 from contactfpga.choices import converters
 from contactfpga.robot.haptics import Cylinder, LoadCells
-from contactfpga.robot.haptics.values import Floats
 from contactfpga.skin import Skin
+from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.model.scenes.contacts import Contact, at
 from contactfpga_sim.model.scenes.scene import Scene
 

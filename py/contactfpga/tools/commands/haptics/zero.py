@@ -11,7 +11,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import write_text
 from contactfpga.robot.haptics import HapticsError, WithReadings
 from contactfpga.robot.haptics.units import write
-from contactfpga.robot.haptics.values import Floats
+from contactfpga.surfaces.shapes import Floats
 from contactfpga.tools.console import flags, numbers, outputs, terminal
 from contactfpga.tools.console.forces import cells_of
 
