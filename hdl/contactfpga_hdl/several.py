@@ -33,7 +33,7 @@ class SeveralTop(wiring.Component):
         derived = self.several.skins[0].derived  # its rates are those of all
         m.submodules.transmitter = transmitter = Transmitter(derived.bit_clocks)
         m.submodules.receiver = receiver = receiver_of(derived)
-        m.submodules.turns = turns = Turns(len(self.sheets))
+        m.submodules.turns = turns = RoundRobin(len(self.sheets))
         m.d.comb += [
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
@@ -65,9 +65,10 @@ class SeveralTop(wiring.Component):
                     yield number, name, member
 
 
-class Turns(wiring.Component):
-    """A turn goes round from sheet to sheet. Who has it may begin a packet, and keeps it to its end; who has nothing to
-    send passes it on in the same clock. So a sheet waits for one packet of each other sheet at most.
+class RoundRobin(wiring.Component):
+    """Whose turn it is to send a packet: it goes round from sheet to sheet. Who has it may begin a packet, and keeps it
+    to its end; who has nothing to send passes it on in the same clock. So a sheet waits for one packet of each other
+    sheet at most.
 
     holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at in the sheet's turn.
     turn (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.

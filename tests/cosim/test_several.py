@@ -13,7 +13,7 @@ from contactfpga import Skin, examples
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.sheets import Sorter
 from contactfpga.skin.several import Several
-from contactfpga_hdl.several import Turns
+from contactfpga_hdl.several import RoundRobin
 from contactfpga_sim.model.board.several import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several
@@ -101,14 +101,14 @@ def test_gateware_and_model_agree_with_requests_as_pulses():
 
 
 def test_a_fault_of_the_turns_is_seen(monkeypatch):
-    right = Turns.elaborate
+    right = RoundRobin.elaborate
 
     def wrong(turns, platform):
         m = right(turns, platform)
         m.d.comb += turns.turn.eq(2)  # always the second sheet's
         return m
 
-    monkeypatch.setattr(Turns, "elaborate", wrong)
+    monkeypatch.setattr(RoundRobin, "elaborate", wrong)
     with pytest.raises(Mismatch):
         check(SMALL, timelines(SMALL, 300), 300)
 

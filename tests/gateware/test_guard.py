@@ -9,7 +9,7 @@ from sample import sample
 
 from contactfpga import Skin
 from contactfpga_hdl.scan import raster
-from contactfpga_hdl.scan.guard import Told
+from contactfpga_hdl.scan.guard import LineFaults
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.model.golden import Timeline, guard, predict, requests
 from contactfpga_sim.model.golden.facts import facts
@@ -200,7 +200,7 @@ def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
     given["round"] = [int(rng.random() < 0.1) for _ in range(cycles)]
     turned = [int(rng.random() < 0.04 or (ends and rng.random() < 0.2)) for ends in given["round"]]
     given["turn"] = [count % 2 for count in itertools.accumulate(turned)]
-    dut = Told(skin)
+    dut = LineFaults(skin)
     sim = bench(dut)
     for name in ports:
         sim.drive(getattr(dut, name), given[name].__getitem__)

@@ -37,7 +37,7 @@ class TimedDebounce(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.walk = walk = _Walk(self.skin)
+        m.submodules.walk = walk = _TimedWalk(self.skin)
         raw, rows = self.raw, self.rows
         row = Signal(range(self.skin.rows))  # of which one at most is inside
         passes = raw.valid & ~self.alone & walk.raw.ready
@@ -83,7 +83,7 @@ class _TimedSwitch(Switch):
         ]
 
 
-class _Walk(wiring.Component):
+class _TimedWalk(wiring.Component):
     """As :class:`~contactfpga_hdl.debounce.even.Debounce`, for a ``row`` that was sampled ``now``."""
 
     def __init__(self, skin: Skin):

@@ -16,7 +16,7 @@ from contactfpga_hdl.label.steps import kept_layout, nesting, place_of, zone_of
 from contactfpga_hdl.payloads import labeller_ports
 
 
-class _Walk:
+class _Columns:
     """The new row and the one before move past, a column at a time; between two rows an empty column is walked."""
 
     def __init__(self, derived: Derived):
@@ -43,7 +43,7 @@ class _Walk:
         return self.before[0]
 
 
-class _Acts:
+class _Step:
     """What is done in this clock."""
 
     def __init__(self) -> None:
@@ -93,7 +93,7 @@ class SerialLabeller(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        walk, acts = _Walk(self.derived), _Acts()
+        walk, acts = _Columns(self.derived), _Step()
         around = SerialTurns(self.derived) if self.derived.skin.closed else None
         group = _Group(self.derived, len(walk.place))
         # Does the zone of the run of the row before have others in that row?
@@ -137,7 +137,7 @@ class SerialLabeller(wiring.Component):
         self._let_out(m, walk, acts, group)
         return m
 
-    def _walk(self, m: Module, walk: _Walk, acts: _Acts, around: SerialTurns | None) -> None:
+    def _walk(self, m: Module, walk: _Columns, acts: _Step, around: SerialTurns | None) -> None:
         row = self.rows.payload
         handed = self.rows.valid & ~walk.active & ~walk.tail
         last = walk.column == self.derived.skin.columns - 1
@@ -169,7 +169,7 @@ class SerialLabeller(wiring.Component):
                 counted = Mux(walk.last, 0, walk.y + 1)
                 m.d.sync += [walk.last.eq(row.last), walk.y.eq(row.y if self.derived.skips else counted)]
 
-    def _cut(self, m: Module, walk: _Walk, acts: _Acts, waits: Value, around: SerialTurns | None) -> None:
+    def _cut(self, m: Module, walk: _Columns, acts: _Step, waits: Value, around: SerialTurns | None) -> None:
         """Where a cluster ends: with 8-connectivity at an empty column, otherwise where neither row goes on.
 
         ``waits``: the group waits for the run of the row before if one begins.
@@ -203,7 +203,7 @@ class SerialLabeller(wiring.Component):
             acts.joins.eq(acts.begins & walk.second),
         ]
 
-    def _read_bracket(self, m: Module, walk: _Walk, acts: _Acts, read: memory.ReadPort) -> None:
+    def _read_bracket(self, m: Module, walk: _Columns, acts: _Step, read: memory.ReadPort) -> None:
         # With 8-connectivity a place is two columns'. It is read before a run of the new row can begin in either.
         odd = walk.column[0] if self.derived.skin.connectivity == 8 else 1
         m.d.comb += [
@@ -214,8 +214,8 @@ class SerialLabeller(wiring.Component):
     def _write_brackets(
         self,
         m: Module,
-        walk: _Walk,
-        acts: _Acts,
+        walk: _Columns,
+        acts: _Step,
         group: _Group,
         found: data.View,
         earlier_runs: memory.Memory,
@@ -238,7 +238,7 @@ class SerialLabeller(wiring.Component):
     def _nest(
         self,
         m: Module,
-        acts: _Acts,
+        acts: _Step,
         group: _Group,
         earlier: Value,
         later: Value,
@@ -268,8 +268,8 @@ class SerialLabeller(wiring.Component):
     def _go_around(
         self,
         m: Module,
-        acts: _Acts,
-        walk: _Walk,
+        acts: _Step,
+        walk: _Columns,
         group: _Group,
         found: data.View,
         earlier: Value,
@@ -284,7 +284,7 @@ class SerialLabeller(wiring.Component):
             m.d.sync += [group.moments[name].eq(unwrapped[name]) for name in unwrapped.shape().members]
 
     def _read_group(
-        self, m: Module, walk: _Walk, acts: _Acts, group: _Group, groups: memory.Memory, earlier: Value
+        self, m: Module, walk: _Columns, acts: _Step, group: _Group, groups: memory.Memory, earlier: Value
     ) -> data.View:
         """The zone or group that joins this one, wanted in the clock before; 0 if there is none."""
         read = groups.read_port()
@@ -295,7 +295,7 @@ class SerialLabeller(wiring.Component):
         ]
         return read.data
 
-    def _know_runs(self, m: Module, walk: _Walk, acts: _Acts, group: _Group, found: data.View) -> None:
+    def _know_runs(self, m: Module, walk: _Columns, acts: _Step, group: _Group, found: data.View) -> None:
         with m.If(acts.enable):
             with m.If(~group.has_run):
                 m.d.sync += group.first.eq(walk.place)
@@ -310,7 +310,7 @@ class SerialLabeller(wiring.Component):
             with m.If(acts.closes | ~walk.active):
                 m.d.sync += group.has_run.eq(0)
 
-    def _sum(self, m: Module, walk: _Walk, acts: _Acts, group: _Group, found: data.View) -> None:
+    def _sum(self, m: Module, walk: _Columns, acts: _Step, group: _Group, found: data.View) -> None:
         with m.If(acts.enable):
             for name, share in (("area", 1), ("sum_x", walk.column), ("sum_y", walk.y)):
                 more = found.moments[name] | Mux(acts.adds, share, 0)
@@ -319,7 +319,7 @@ class SerialLabeller(wiring.Component):
             m.d.sync += group.moments.eq(0)
 
     def _store_group(
-        self, m: Module, acts: _Acts, group: _Group, groups: memory.Memory, around: SerialTurns | None
+        self, m: Module, acts: _Step, group: _Group, groups: memory.Memory, around: SerialTurns | None
     ) -> None:
         write = groups.write_port()
         m.d.comb += [
@@ -336,7 +336,7 @@ class SerialLabeller(wiring.Component):
             turns = [write.data.first_turn.eq(around.first_turn), write.data.last_turn.eq(around.last_turn)]
             m.d.comb += [write.data.moments.back.eq(back), *turns]
 
-    def _let_out(self, m: Module, walk: _Walk, acts: _Acts, group: _Group) -> None:
+    def _let_out(self, m: Module, walk: _Columns, acts: _Step, group: _Group) -> None:
         mark = Signal()
         leaves = acts.closes & group.whole & (~group.has_run | walk.last)
         m.d.comb += [

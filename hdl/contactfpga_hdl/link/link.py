@@ -75,7 +75,7 @@ class Link(wiring.Component):
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
     upset (out): high while two frames share a region, as after a bit of its number turned by itself: one would be sent
     while another is written over it. Never with ``dual``, which finds more.
-    turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.Turns`;
+    turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
     packets then say the sheet's number.
     """
 

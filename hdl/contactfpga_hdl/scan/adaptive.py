@@ -13,7 +13,7 @@ from contactfpga_hdl.scan.shift import RowChain
 from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
 
 
-class _Sample:
+class _Reading:
     """The columns in this clock, and what that clock is."""
 
     def __init__(self, derived: Derived):
@@ -64,7 +64,7 @@ class AdaptiveScanner(wiring.Component):
         m.submodules.stuck = stuck = Stuck(skin)
         connect_pins(m, driver.pins, self.pins)
         connect_pins(m, reader.pins, self.pins)
-        sample = _Sample(self.derived)
+        sample = _Reading(self.derived)
         self._read_columns(m, reader.levels, seek, sample)
         self._time_slots(m, driver, seek, sample)
         self._offer_rows(m, seek, sample)
@@ -80,7 +80,7 @@ class AdaptiveScanner(wiring.Component):
         ]
         return m
 
-    def _read_columns(self, m: Module, levels: Value, seek: Seek, sample: _Sample) -> None:
+    def _read_columns(self, m: Module, levels: Value, seek: Seek, sample: _Reading) -> None:
         m.d.comb += [
             sample.read.eq(~levels if self.skin.selects_low else levels),
             sample.pressed.eq(sample.read),
@@ -91,7 +91,7 @@ class AdaptiveScanner(wiring.Component):
             with m.If(seek.pattern[row]):
                 m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
-    def _time_slots(self, m: Module, driver: DirectRows | RowChain, seek: Seek, sample: _Sample) -> None:
+    def _time_slots(self, m: Module, driver: DirectRows | RowChain, seek: Seek, sample: _Reading) -> None:
         """As in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait at once: it is the
         slot's strobe, and the release begins after it."""
         derived = self.derived
@@ -131,7 +131,7 @@ class AdaptiveScanner(wiring.Component):
         with m.If(wakes):
             m.d.sync += [clock.eq(settled), row_due.eq(0)]
 
-    def _offer_rows(self, m: Module, seek: Seek, sample: _Sample) -> None:
+    def _offer_rows(self, m: Module, seek: Seek, sample: _Reading) -> None:
         """Rows that are known, in order; at most one that was driven alone waits."""
         rows = self.rows
         place = Signal(self.skin.rows, init=1)  # of the next row to go, one-hot
@@ -163,7 +163,7 @@ class AdaptiveScanner(wiring.Component):
         with m.If(seek.strobe & seek.alone):
             m.d.sync += before.eq(before & ~seek.pattern | Mux(seek.hit, seek.pattern, 0))
 
-    def _watch_contact(self, m: Module, seek: Seek, sample: _Sample) -> None:
+    def _watch_contact(self, m: Module, seek: Seek, sample: _Reading) -> None:
         """In a probe a column counts if none of its switches is masked."""
         clean = sum(1 << column for column in range(self.skin.columns) if all(column != c for _, c in self.skin.mask))
         row, seen = Signal(), Signal()

@@ -17,7 +17,7 @@ def checked_rows(skin: Skin) -> int:
     return sum(1 << row for row in range(skin.rows) if present(skin, row))
 
 
-class Told(wiring.Component):
+class LineFaults(wiring.Component):
     """A line that is found faulty is told from the next clock on. It is told no more once a check in a *renewing* round
     finds it well; that is the first whole round of checks after ``turn`` turns, so faults that come and go change what
     is told twice per turn at most. Lines that are masked whole are not told.

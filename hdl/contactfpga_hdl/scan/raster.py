@@ -204,10 +204,10 @@ class Scanner(wiring.Component):
     def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
         """A row that is whole reads the guard column, the guard row all columns. Returns whether a fault was told as
         the frame ended; it is there with the number of stuck columns."""
-        from contactfpga_hdl.scan.guard import Told
+        from contactfpga_hdl.scan.guard import LineFaults
 
         skin = self.skin
-        m.submodules.told = told = Told(skin)
+        m.submodules.told = told = LineFaults(skin)
         ended = Signal()
         at_end = Signal()
         m.d.comb += [

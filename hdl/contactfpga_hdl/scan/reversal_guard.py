@@ -11,7 +11,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import faults_layout
-from contactfpga_hdl.scan.guard import Told
+from contactfpga_hdl.scan.guard import LineFaults
 
 CHECK_BIT = 8
 """Of the clock in us: when this bit toggles, a sheet at rest is checked."""
@@ -26,7 +26,7 @@ class Checks(wiring.Component):
     of_guard (out): high for a clock: the sample of the rows is there, and of the guard column.
     rows, columns (in): rows that read touched, columns that read pressed; held (in): columns that are stuck.
     retry (in): bit ``RETRY_BIT`` of the clock in us.
-    faults (out): see :class:`~contactfpga_hdl.scan.guard.Told`.
+    faults (out): see :class:`~contactfpga_hdl.scan.guard.LineFaults`.
     """
 
     def __init__(self, skin: Skin):
@@ -45,7 +45,7 @@ class Checks(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin, guard_reads = self.skin, self.columns[-1]
-        m.submodules.told = told = Told(skin)
+        m.submodules.told = told = LineFaults(skin)
         m.d.sync += [
             self.of_rows.eq(self.of_rows ^ self.starts),
             self.asked.eq((self.asked | self.due) & ~self.starts),

@@ -6,7 +6,7 @@ from typing import Literal
 from amaranth.hdl import Mux, Signal, Value
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan.guard import Told
+from contactfpga_hdl.scan.guard import LineFaults
 from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.verify.proofs.bugs import Bug
@@ -95,12 +95,13 @@ def _lemmas(proof: Proof, inside: Inside, dut: Scanner, slot: Signal, line: Sign
 
 
 _BUGS = (
-    Bug("the next row is told", Told, "faults.rows", lambda rows, _: rows.rotate_left(1)),
-    Bug("a row is told once", Told, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
-    Bug("columns that answer are told", Told, "faults.columns",
+    Bug("the next row is told", LineFaults, "faults.rows", lambda rows, _: rows.rotate_left(1)),
+    Bug("a row is told once", LineFaults, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
+    Bug("columns that answer are told", LineFaults, "faults.columns",
         lambda columns, inside: columns ^ inside.component.checks_columns.replicate(COLUMNS)),
-    Bug("one column is told for all", Told, "faults.columns", lambda columns, _: columns.any().replicate(COLUMNS)),
-    Bug("a masked row is told", Told, "faults.rows",
+    Bug("one column is told for all", LineFaults, "faults.columns",
+        lambda columns, _: columns.any().replicate(COLUMNS)),
+    Bug("a masked row is told", LineFaults, "faults.rows",
         lambda rows, inside: rows | inside.component.rows & inside.component.checks_rows),
     Bug("columns are checked in rows' slots", Scanner, "checks_columns", lambda _, inside: inside["of_row"]),
     Bug("the tag does not say so", Scanner, "at_end", lambda *_: 0),

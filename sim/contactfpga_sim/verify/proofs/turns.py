@@ -9,7 +9,7 @@ from contactfpga.skin import Skin
 from contactfpga.wire import protocol
 from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.link import Link
-from contactfpga_hdl.several import Turns
+from contactfpga_hdl.several import RoundRobin
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -26,7 +26,7 @@ def turns_go_round(proof: Proof, sheets: int) -> None:
     has one, and who does not hold it keeps nobody waiting.
     """
     m = proof.m
-    dut = Turns(sheets)
+    dut = RoundRobin(sheets)
     proof.put(dut)
     holds = proof.free(sheets, "holds")
     m.d.comb += dut.holds.eq(holds)
@@ -79,8 +79,8 @@ def packets_are_whole(proof: Proof, hello: bytes) -> None:
 
 
 _TURN_BUGS = (
-    Bug("a turn is given up in a packet", Turns, "others", lambda others, inside: inside["turn"]),
-    Bug("the first sheet always has a turn", Turns, "turn", lambda turn, inside: turn | 1),
+    Bug("a turn is given up in a packet", RoundRobin, "others", lambda others, inside: inside["turn"]),
+    Bug("the first sheet always has a turn", RoundRobin, "turn", lambda turn, inside: turn | 1),
 )
 _PACKET_BUGS = (
     Bug("taken without a turn", Link, "take_frame",
