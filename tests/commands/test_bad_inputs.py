@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from every_command import called, leaves, options
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from sample import sample
@@ -135,21 +136,12 @@ PORTS = [
     *(f"sim://?scene={name}" for name in CELLS),
     *(f"sim://?skin={name}" for name in TOML),
 ]
-WITH_SKIN = [
-    ["zones", "sim://"],
-    ["wire", "sim://"],
-    ["doctor", "sim://"],
-    ["board"],
-    ["build", "icestick"],
-    ["fit", "bumper"],
-]
 CASES = [
     *(
         [command, "--timeout", "1", *json, port]
         for port in PORTS
         for command, json in (("zones", ["--json"]), ("wire", []))
     ),
-    *([*command, "--skin", name] for command in WITH_SKIN for name in TOML),
     ["zones", "replay://RECORDED", "--record", "RECORDED"],
     ["zones", "sim://", "--record", "FOLDER"],
     ["publish", "sim://", "--key", ""],
@@ -215,6 +207,15 @@ def test_what_cannot_be_is_refused(arguments, run):
     refused(status, errors)
 
 
+WITH_SKIN = [[*called(leaf), "--skin", name] for leaf in leaves() if "--skin" in options(leaf) for name in TOML]
+
+
+@pytest.mark.parametrize("arguments", WITH_SKIN, ids=" ".join)
+def test_a_skin_that_cannot_be_is_refused(arguments, run, tmp_path):
+    np.save(tmp_path / "frames.npy", np.zeros((1, 4, 4), bool))
+    refused(*run(*arguments))
+
+
 def test_a_recording_is_not_emptied_by_its_own_replay(run, files):
     before = files["RECORDED"].read_bytes()
     status, errors = run("zones", "--json", "replay://RECORDED", "--record", "RECORDED")
@@ -245,7 +246,7 @@ def test_millimeters_in_files_are_told_from_meters(tmp_path, run, name, old, new
 # ---- every numeric option of every command
 
 
-def options():
+def numeric_options():
     """(words of the command, option, how many) of every option that takes numbers."""
     found = []
 
@@ -262,7 +263,7 @@ def options():
     return found
 
 
-OPTIONS = options()
+OPTIONS = numeric_options()
 NEEDED = {"build": ["icestick"], "replay": ["x.npy"], "fit": ["bumper"]}
 
 

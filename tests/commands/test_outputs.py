@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+from every_command import called, leaves, options
 
 from contactfpga.tools import cli
 from contactfpga.tools.console import outputs
@@ -26,15 +27,10 @@ def places(tmp_path):
     return {"a file": tmp_path / "file", "below a file": tmp_path / "file" / "below", "a device": "/dev/null/x"}
 
 
-COMMANDS = {
-    "chart": ["study", "chart", "--no-size"],
-    "arm": ["study", "arm"],
-    "arm, charts": ["study", "arm", "--charts"],
-    "failures": ["study", "failures"],
-    "flips": ["study", "flips"],
-    "cover": ["cover", "figures"],
-    "build": ["build", "icestick"],
-}
+INTO_A_FOLDER = [
+    leaf for leaf in leaves() if "--output" in options(leaf) and options(leaf)["--output"].metavar == "DIR"
+]
+COMMANDS = {leaf.prog: called(leaf) for leaf in INTO_A_FOLDER} | {"arm, charts": ["study", "arm", "--charts"]}
 
 
 @pytest.mark.parametrize("where", ["a file", "below a file", "a device"])

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from every_command import called, leaves, options, positional
 
 import contactfpga
 from contactfpga import Skin, SkinError
@@ -116,44 +117,22 @@ def test_a_trusted_robot_opens_its_boards_with_trust(mark, tmp_path):
     assert Body.load(robot(tmp_path, port="sim://?skin=other.toml"), trust=True).links["arm"].trust
 
 
-FILES = {
-    "robot": "robot.toml",
-    "board": "icebreaker",
-    "frames": "frames.npy",
-    "recording": "frames.npy",
-    "file": "out.mcap",
-    "mesh": "mesh.stl",
-    "output": "table.npz",
-    "scenes": "fingers",
-    "link": "arm",
-    "points": "points.toml",
-    "joint": "joint",
-    "table": "out.csv",
-}
-"""Values of the arguments that commands ask for."""
-NEEDED = {("haptics", "threshold"): ["--unit", "0=5"]}
-
-
 def reading():
     """Each command that reads a Skin file, by name, with the arguments that make it read this one."""
-    for leaf in cli.leaves(cli._parser()):
-        command = leaf.prog.split()[1:]
-        places = [action for action in leaf._actions if not action.option_strings]
-        needed = [FILES.get(action.dest, "") for action in places if action.nargs not in ("?", "*")]
-        command += NEEDED.get((*command,), [])
-        options = {option for action in leaf._actions for option in action.option_strings}
-        assert "--trust" in options
-        if "--skin" in options:
-            yield [*command, *needed, "--skin", "skin.toml"]
-        if "--sheets" in options:
-            yield [*command, *needed, "--sheets", "sheets.toml"]
-        if any(action.dest == "robot" for action in places):
-            yield [*command, *needed]
-        for action in places:
+    for leaf in leaves():
+        command = called(leaf)
+        assert "--trust" in options(leaf)
+        if "--skin" in options(leaf):
+            yield [*command, "--skin", "skin.toml"]
+        if "--sheets" in options(leaf):
+            yield [*command, "--sheets", "sheets.toml"]
+        if any(action.dest == "robot" for action in positional(leaf)):
+            yield command
+        for action in positional(leaf):
             if action.dest in ("port", "ports"):
-                yield [*command, *needed, "sim://?skin=skin.toml"]
+                yield [*command, "sim://?skin=skin.toml"]
         if leaf.prog.endswith((" record", " view")):
-            yield [*command, *needed, "robot.toml"]
+            yield [*command, "robot.toml"]
 
 
 HEAVY = {"study", "fit", "ros", "build", "view"}  # each imports for a second and more

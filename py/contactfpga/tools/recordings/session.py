@@ -25,7 +25,7 @@ from contactfpga.tools.recordings.recorder import Recorder, Split, link_name
 
 
 @dataclasses.dataclass(frozen=True)
-class _Opened:
+class _OpenLink:
     """A link whose board is open."""
 
     name: str
@@ -58,7 +58,7 @@ class Session:
         self.links: list[LinkRecorder] = []
         self._path = Path(path)
         self._split = split
-        self._opened: list[_Opened] = []
+        self._opened: list[_OpenLink] = []
         self._about = dict(about or {})
         self._recorder: Recorder | None = None
         self._bytes_only = bytes_only
@@ -98,7 +98,7 @@ class Session:
             board.close()
             raise
         self._opened.append(
-            _Opened(link_name(board.hello) if name is None else name, board, buffer.events, buffer, mount, force)
+            _OpenLink(link_name(board.hello) if name is None else name, board, buffer.events, buffer, mount, force)
         )
 
     def start(self, seconds: float | None = None) -> None:
