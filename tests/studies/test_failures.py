@@ -18,8 +18,8 @@ from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, tables, touch
-from contactfpga_sim.lab.failures.catalogue import STUDIES
-from contactfpga_sim.lab.failures.knob import Outcome, Study, Turned
+from contactfpga_sim.lab.failures.catalogue import KNOBS
+from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.failures.uart import Line
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
@@ -139,12 +139,12 @@ FEW = [key for key in QUICK if key[0] in ("crossing", "stuck")]
 
 @pytest.fixture(scope="module")
 def turn():
-    """``turn(study, method)``: every value of its knob, the first time it is asked for."""
+    """``turn(knob, method)``: every value of its knob, the first time it is asked for."""
 
     @functools.cache
     def turn(name, method):
-        values, run = STUDIES[name].values, STUDIES[name].runs[method]
-        return Turned(values, tuple(map(run, values)))
+        values, run = KNOBS[name].values, KNOBS[name].runs[method]
+        return Sweep(values, tuple(map(run, values)))
 
     return turn
 
@@ -152,11 +152,11 @@ def turn():
 @pytest.fixture(scope="module")
 def turned(turn):
     """All studies with all methods, for tests of the campaign."""
-    return {name: {method: turn(name, method) for method in study.runs} for name, study in STUDIES.items()}
+    return {name: {method: turn(name, method) for method in knob.runs} for name, knob in KNOBS.items()}
 
 
 def test_every_method_of_every_study_is_pinned():
-    assert set(BREAKS) == {(name, method) for name, study in STUDIES.items() for method in study.runs}
+    assert set(BREAKS) == {(name, method) for name, knob in KNOBS.items() for method in knob.runs}
 
 
 @pytest.mark.slow
@@ -193,8 +193,8 @@ def test_what_passes_unnoticed_has_its_reason_on_the_page():
         silent |= {name} if "**not noticed**" in row else set()
     assert set(re.findall(r"\]\(#(\w+)\)", reasons)) == silent
     for name in silent:
-        assert STUDIES[name].unnoticed
-        assert f"| {STUDIES[name].unnoticed} |" in reasons
+        assert KNOBS[name].unnoticed
+        assert f"| {KNOBS[name].unnoticed} |" in reasons
 
 
 @pytest.mark.campaign
@@ -204,9 +204,9 @@ def test_the_page_and_its_pictures_are_up_to_date(turned):
     }
     for name, methods in turned.items():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
-        assert knob_pictures.svg(STUDIES[name], methods) == drawn
+        assert knob_pictures.svg(KNOBS[name], methods) == drawn
     drawn = {path.stem for path in (PAGE.parent / "images" / "failures").iterdir()}
-    assert drawn == set(STUDIES)
+    assert drawn == set(KNOBS)
 
 
 # ---- the same by other ways
@@ -386,7 +386,7 @@ def outcomes(*verdicts):
         "told": Outcome(False, ("stuck",), "2 zones of 1 contact"),
         "silent": Outcome(False, (), "2 zones of 1 contact"),
     }
-    return Turned(tuple(range(len(verdicts))), tuple(made[verdict] for verdict in verdicts))
+    return Sweep(tuple(range(len(verdicts))), tuple(made[verdict] for verdict in verdicts))
 
 
 @pytest.mark.parametrize(
@@ -401,8 +401,8 @@ def outcomes(*verdicts):
     ],
 )
 def test_lines_of_the_table(verdicts, expected):
-    study = Study("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
-    (line,) = tables.rows(study, {"method": outcomes(*verdicts)})
+    knob = Knob("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
+    (line,) = tables.rows(knob, {"method": outcomes(*verdicts)})
     assert line.split(" | ")[1:-1] == ["method", *expected]
 
 
@@ -410,17 +410,17 @@ def test_lines_of_the_table(verdicts, expected):
 def test_a_picture_shows_every_value(turn):
     space = "{http://www.w3.org/2000/svg}"
     for name in ("baud", "diodes", "broken"):
-        methods = {method: turn(name, method) for method in STUDIES[name].runs}
-        root = ElementTree.fromstring(knob_pictures.svg(STUDIES[name], methods))
+        methods = {method: turn(name, method) for method in KNOBS[name].runs}
+        root = ElementTree.fromstring(knob_pictures.svg(KNOBS[name], methods))
         bars = [bar.get("class") for bar in root.iter(f"{space}rect") if bar.get("class")]
         drawn = [knob_pictures._kind(outcome) for found in methods.values() for outcome in found.outcomes]
         assert bars == drawn
         assert len(root.findall(f"{space}polyline")) == len(methods)
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize("name", KNOBS)
 def test_values_lie_true_to_scale(name):
-    values = STUDIES[name].values
+    values = KNOBS[name].values
     spans, scale = axes.placed(values, 50.0, 400.0)
     assert (spans[0].start, spans[-1].end) == (50.0, pytest.approx(450.0))
     first = 1 if "0 stands apart" in scale else 0
@@ -455,7 +455,7 @@ def test_amounts_reach_at_most_the_top_of_the_frame(amounts, ticks):
 
 @pytest.mark.campaign
 def test_the_highest_amount_is_drawn_where_its_axis_says(turned):
-    root = ElementTree.fromstring(knob_pictures.svg(STUDIES["winding"], turned["winding"]))
+    root = ElementTree.fromstring(knob_pictures.svg(KNOBS["winding"], turned["winding"]))
     lines = [line.get("points").split() for line in root.iter("{http://www.w3.org/2000/svg}polyline")]
     heights = {float(point.partition(",")[2]) for line in lines for point in line}
     assert heights == {knob_pictures.TOP, knob_pictures.TOP + knob_pictures.HIGH / 2}  # two zones, and one

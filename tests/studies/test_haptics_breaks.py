@@ -8,13 +8,13 @@ from study_pages import section
 
 from contactfpga.robot.haptics import Plane
 from contactfpga_sim.lab.failures import tables
-from contactfpga_sim.lab.failures.knob import Turned
+from contactfpga_sim.lab.failures.knob import Sweep
 from contactfpga_sim.lab.haptics import breaks, felt, felt_tables, pairs
-from contactfpga_sim.lab.haptics.breaks import STUDIES
+from contactfpga_sim.lab.haptics.breaks import KNOBS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics.md").read_text(encoding="utf-8")
 SLOW = ("shape", "skew", "edge")
-ALL = [(name, method) for name, study in STUDIES.items() for method in study.runs]
+ALL = [(name, method) for name, knob in KNOBS.items() for method in knob.runs]
 QUICK = [
     ("unseen", "force at the zone"),
     ("torsion", "center of pressure"),
@@ -24,7 +24,7 @@ QUICK = [
 
 
 def on_page(name):
-    """The lines of a study in the page's table."""
+    """The lines of a knob in the page's table."""
     table = section("haptics.md", "breaks").splitlines()[2:]
     starts = [at for at, line in enumerate(table) if line.startswith("| [")] + [len(table)]
     first = next(at for at in starts if f"(#{name})" in table[at])
@@ -36,9 +36,9 @@ def on_page(name):
     ("name", "method"), [pytest.param(*one, marks=[] if one in QUICK else pytest.mark.campaign) for one in ALL]
 )
 def test_each_break_is_where_the_page_says(name, method):
-    study = STUDIES[name]
-    found = Turned(study.values, tuple(map(study.runs[method], study.values)))
-    line = tables.rows(study, {method: found})[0].split(" | ")[2:6]
+    knob = KNOBS[name]
+    found = Sweep(knob.values, tuple(map(knob.runs[method], knob.values)))
+    line = tables.rows(knob, {method: found})[0].split(" | ")[2:6]
     (stated,) = [one.split(" | ")[2:6] for one in on_page(name) if one.split(" | ")[1] == method]
     assert line == stated
 

@@ -34,15 +34,15 @@ def test_each_break_is_found_again_on_both_of_its_sides(name):
     holds, fails = (float(row[index].strip("*").replace(",", "")) for index in (2, 3))
     assert row[1] == run
     assert knob.values.index(fails) == knob.values.index(holds) + 1
-    assert breaks.holds(knob, knob.runs[run](holds))
-    assert not breaks.holds(knob, knob.runs[run](fails))
+    assert knob.runs[run](holds).right
+    assert not knob.runs[run](fails).right
 
 
 def test_coupling_breaks_where_capacitances_divide():
     """Neighbors fall by almost the whole supply; the column keeps what its other capacitances hold."""
     knob = breaks.KNOBS["coupling"]
     for picofarad in (5.0, 20.0, 50.0):
-        fallen = 3.3 - knob.runs["16x16, 30 pF a line"](picofarad)
+        fallen = 3.3 - knob.runs["16x16, 30 pF a line"](picofarad).amount
         divided = (2 * picofarad * 3.15 + 2 * 3.3) / (30 + 2 * picofarad + 16 * 2)
         assert fallen == pytest.approx(divided, rel=0.06)
 

@@ -108,23 +108,23 @@ def test_all_scores_are_up_to_date():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sample(breaks.STUDIES, quick=["slide", "bounce"]))
+@pytest.mark.parametrize("name", sample(breaks.KNOBS, quick=["slide", "bounce"]))
 def test_the_breaks_are_up_to_date(name):
-    study = breaks.STUDIES[name]
+    knob = breaks.KNOBS[name]
     lines = PAGE.read_text(encoding="utf-8").splitlines()
-    for row in failures_tables.rows(study, study.turn(), False):
+    for row in failures_tables.rows(knob, knob.sweep(), False):
         assert row in lines
 
 
 def test_breaks_have_their_closed_forms():
     """Gate 20 mm; a speed is believed for 50 ms; a frame shows a place to half a pitch."""
-    at_once = breaks.SLIDE.turn()
+    at_once = breaks.SLIDE.sweep()
     assert at_once["`Tracker`, at once"].breaks_at == pytest.approx(20.0, abs=PITCH_MM / 2)
     assert at_once["nearest zone, at once"].breaks_at == pytest.approx(20.0, abs=PITCH_MM / 2)
     for name, mm in (("`Tracker`", 20 + 500 * 0.05), ("nearest zone", 20)):
         run, ms = breaks.LOST.runs[name], mm / 500 * 1000
         assert [run(ms - PITCH_MM).right, run(ms + PITCH_MM).right] == [True, False]
-    for method, turned in breaks.BOUNCE.turn().items():
+    for method, turned in breaks.BOUNCE.sweep().items():
         hold = {"5": 5.0, "0": 20.0}.get(method.strip("`")[-1], 0.5)
         assert turned.breaks_at == hold
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from contactfpga_sim.lab.failures import electric, electric_reversal, line, lines, shapes, touch
 
-STUDIES = {
-    study.name: study
-    for study in (
+KNOBS = {
+    knob.name: knob
+    for knob in (
         shapes.WINDING,
         shapes.CROSSING,
         shapes.MANY,
@@ -31,4 +31,4 @@ STUDIES = {
         line.CLOCK,
     )
 }
-"""Every study by its name."""
+"""Every knob by its name."""

@@ -9,7 +9,7 @@ import numpy as np
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
@@ -62,10 +62,10 @@ def _slow(skin: Skin, circuit: Circuit, picofarad: float) -> Outcome:
     return judged(zones, cells, [finger(skin, spot) for spot in spots])
 
 
-SETTLE = Study(
+SETTLE = Knob(
     name="settle",
     title="Columns slower than `settle_us = 5`",
-    knob="capacitance of a line, pF",
+    axis="capacitance of a line, pF",
     amount="cells that read pressed",
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
@@ -114,10 +114,10 @@ def _still(skin: Skin, read: np.ndarray) -> Zones:
     return still(skin, read[:-1, :-1], guards.missed(read))
 
 
-DIODES = Study(
+DIODES = Knob(
     name="diodes",
     title="Switches without a sound diode on a sheet that should have them",
-    knob="such switches under one of three fingers",
+    axis="such switches under one of three fingers",
     amount="cells that surely read pressed",
     values=(0, 1, 2, 3, 4),
     runs={
@@ -202,10 +202,10 @@ def _scattered_cells(count: float) -> Outcome:
     return Outcome(not len(wrong), told, what, len(wrong) / len(frames), read[wrong[0] if len(wrong) else 0])
 
 
-GHOSTS = Study(
+GHOSTS = Knob(
     name="ghosts",
     title="Fingers on a sheet without diodes",
-    knob="fingers of 2x2 cells",
+    axis="fingers of 2x2 cells",
     amount="share of places read wrong",
     values=tuple(range(1, 9)),
     runs={
@@ -216,10 +216,10 @@ GHOSTS = Study(
     unnoticed="the same switches read pressed as under one larger contact",
 )
 
-GHOST = Study(
+GHOST = Knob(
     name="ghost",
     title="Three corners fake the fourth, without diodes",
-    knob="fingers at the corners of a rectangle",
+    axis="fingers at the corners of a rectangle",
     amount="cells that read pressed",
     values=(1, 2, 3, 4),
     runs={"zones": _corners},

@@ -10,7 +10,7 @@ import numpy as np
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.electric import DIODES, bare, finger, judged
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import REVERSAL, REVERSAL_GUARDED, Rig, hello_clocks
 from contactfpga_sim.model.sheet.line import lines_of
 
@@ -38,10 +38,10 @@ def _switch(skin: Skin, kiloohm: float) -> Outcome:
     return _slow(skin, Circuit(switch_ohm=1000 * kiloohm))
 
 
-SETTLE_REVERSAL = Study(
+SETTLE_REVERSAL = Knob(
     name="settle_reversal",
     title="Lines slower than `settle_us = 0.5`, by line reversal",
-    knob="capacitance of a line, pF",
+    axis="capacitance of a line, pF",
     amount="cells that read pressed",
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
@@ -51,10 +51,10 @@ SETTLE_REVERSAL = Study(
     helps="`contactfpga settle` says which times a circuit needs; smaller resistances",
 )
 
-PROJECT_REVERSAL = Study(
+PROJECT_REVERSAL = Knob(
     name="project_reversal",
     title="Pressed switches too weak to lift their row, by line reversal",
-    knob="resistance of a pressed switch, kΩ",
+    axis="resistance of a pressed switch, kΩ",
     amount="cells that read pressed",
     values=(0.1, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 20),
     runs={

@@ -35,13 +35,13 @@ class Outcome:
 
 
 @dataclasses.dataclass(frozen=True)
-class Study:
-    """One knob."""
+class Knob:
+    """One thing that is turned until something breaks."""
 
     name: str
     """Of its picture's file."""
     title: str
-    knob: str
+    axis: str
     """What is turned, with its unit."""
     amount: str
     """What :attr:`Outcome.amount` is."""
@@ -56,19 +56,19 @@ class Study:
     unnoticed: str = ""
     """Why nothing tells where :func:`Outcome.verdict` is ``silent``."""
 
-    def turn(
-        self, step: Callable[[], None] = lambda: None, so_far: dict[str, Turned] | None = None
-    ) -> dict[str, Turned]:
+    def sweep(
+        self, step: Callable[[], None] = lambda: None, so_far: dict[str, Sweep] | None = None
+    ) -> dict[str, Sweep]:
         """Every value, for every method; ``step()`` is called after each of these, and it is in ``so_far`` at once."""
         found = {} if so_far is None else so_far
         for name, run in self.runs.items():
-            found[name] = Turned(self.values, tuple(map(run, self.values)))
+            found[name] = Sweep(self.values, tuple(map(run, self.values)))
             step()
         return found
 
 
 @dataclasses.dataclass(frozen=True)
-class Turned:
+class Sweep:
     """What came out at all values of a knob, for one method."""
 
     values: tuple[float, ...]

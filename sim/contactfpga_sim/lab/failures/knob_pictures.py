@@ -1,4 +1,4 @@
-"""A study as a picture: what came out at each value, and the sheet before and at the first break.
+"""A knob as a picture: what came out at each value, and the sheet before and at the first break.
 
 Written by hand rather than by a plotting library, so that the same numbers always make the same file.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga import picture_style as style
 from contactfpga_sim.lab.failures.axes import Span, placed, rounded_up, shown
-from contactfpga_sim.lab.failures.knob import Outcome, Study, Turned
+from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.failures.rig import plural
 
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
@@ -44,21 +44,21 @@ SIDE, SHEETS = 104, 470
 """Size of a sheet, and where the first one begins."""
 
 
-def svg(study: Study, methods: Mapping[str, Turned]) -> str:
+def svg(knob: Knob, methods: Mapping[str, Sweep]) -> str:
     """The whole picture."""
-    method, sheets = _sheets(study, methods)
-    spans, scale = placed(study.values, LEFT, BESIDE if sheets else ALONE)
+    method, sheets = _sheets(knob, methods)
+    spans, scale = placed(knob.values, LEFT, BESIDE if sheets else ALONE)
     bottom = TOP + HIGH + 22 + STRIP * len(methods)
     height = max(bottom + 64, TOP + SIDE + 80)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {style.WIDTH_PX} {height}" '
         f'font-family="system-ui,sans-serif" font-size="12" fill="{style.INK}">',
         f'<rect width="{style.WIDTH_PX}" height="{height}" rx="8" fill="{style.CARD}"/>',
-        _text(16, 24, study.title, 'font-size="14" font-weight="600"'),
-        *_chart(study, methods, spans),
+        _text(16, 24, knob.title, 'font-size="14" font-weight="600"'),
+        *_chart(knob, methods, spans),
         *_strips(methods, spans, TOP + HIGH + 18),
-        *_ticks(study, spans, bottom + 8),
-        _text(LEFT, bottom + 26, f"{study.knob}{scale}"),
+        *_ticks(knob, spans, bottom + 8),
+        _text(LEFT, bottom + 26, f"{knob.axis}{scale}"),
         *_legend(height - 14),
     ]
     for number, line in enumerate(textwrap.wrap(method, 34)):
@@ -72,20 +72,20 @@ def _text(x: float, y: float, words: str, style: str = "") -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" {style}>{html.escape(words.replace("`", ""))}</text>'
 
 
-def _chart(study: Study, methods: Mapping[str, Turned], spans: Sequence[Span]) -> list[str]:
+def _chart(knob: Knob, methods: Mapping[str, Sweep], spans: Sequence[Span]) -> list[str]:
     """The outcomes' amounts; 0 is the frame's bottom."""
-    ticks = rounded_up([outcome.amount for turned in methods.values() for outcome in turned.outcomes])
+    ticks = rounded_up([outcome.amount for sweep in methods.values() for outcome in sweep.outcomes])
     left, right = spans[0].start, spans[-1].end
-    parts = [_text(LEFT, TOP - 10, study.amount)]
+    parts = [_text(LEFT, TOP - 10, knob.amount)]
     for tick in ticks:
         y = TOP + HIGH - HIGH * tick / ticks[-1]
         color = style.GRID if tick else style.SOFT
         parts.append(f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{color}"/>')
         parts.append(_text(LEFT - 6, y + 4, f"{tick:,g}", 'text-anchor="end"'))
-    for (color, width), turned in zip(LINES[-len(methods) :], methods.values(), strict=True):
+    for (color, width), sweep in zip(LINES[-len(methods) :], methods.values(), strict=True):
         joined = " ".join(
             f"{span.middle:.1f},{TOP + HIGH - HIGH * outcome.amount / ticks[-1]:.1f}"
-            for span, outcome in zip(spans, turned.outcomes, strict=True)
+            for span, outcome in zip(spans, sweep.outcomes, strict=True)
         )
         parts.append(
             f'<polyline points="{joined}" fill="none" stroke="{color}" stroke-width="{width}" stroke-linejoin="round"/>'
@@ -93,16 +93,16 @@ def _chart(study: Study, methods: Mapping[str, Turned], spans: Sequence[Span]) -
     return parts
 
 
-def _strips(methods: Mapping[str, Turned], spans: Sequence[Span], top: float) -> list[str]:
+def _strips(methods: Mapping[str, Sweep], spans: Sequence[Span], top: float) -> list[str]:
     """A bar for each method and value."""
     parts = []
-    for number, ((color, width), (method, turned)) in enumerate(
+    for number, ((color, width), (method, sweep)) in enumerate(
         zip(LINES[-len(methods) :], methods.items(), strict=True)
     ):
         y = top + number * STRIP
         parts.append(f'<path d="M{LEFT} {y + 6:.1f}h20" stroke="{color}" stroke-width="{width}"/>')
         parts.append(_text(LEFT + 26, y + 10, method))
-        for span, kind in zip(spans, map(_kind, turned.outcomes), strict=True):
+        for span, kind in zip(spans, map(_kind, sweep.outcomes), strict=True):
             tall, wide = TALL[kind], max(1.0, span.end - span.start - 1)
             parts.append(
                 f'<rect class="{kind}" x="{span.start:.1f}" y="{y + 30 - tall:.1f}" width="{wide:.1f}" '
@@ -111,8 +111,8 @@ def _strips(methods: Mapping[str, Turned], spans: Sequence[Span], top: float) ->
     return parts
 
 
-def _ticks(study: Study, spans: Sequence[Span], y: float) -> list[str]:
-    words = [study.format.format(value) for value in study.values]
+def _ticks(knob: Knob, spans: Sequence[Span], y: float) -> list[str]:
+    words = [knob.format.format(value) for value in knob.values]
     return [_text(spans[index].middle, y, words[index], 'text-anchor="middle"') for index in shown(words, spans)]
 
 
@@ -128,13 +128,13 @@ def _kind(outcome: Outcome) -> str:
     return "warned" if outcome.right and outcome.told else outcome.verdict
 
 
-def _sheets(study: Study, methods: Mapping[str, Turned]) -> tuple[str, list[tuple[str, Outcome]]]:
+def _sheets(knob: Knob, methods: Mapping[str, Sweep]) -> tuple[str, list[tuple[str, Outcome]]]:
     """The first method that gets from right to wrong, and what came out at the two values between which it does."""
-    for method, turned in methods.items():
-        if turned.broken is None or not turned.broken or turned.outcomes[turned.broken].cells is None:
+    for method, sweep in methods.items():
+        if sweep.broken is None or not sweep.broken or sweep.outcomes[sweep.broken].cells is None:
             continue
-        values = (turned.broken - 1, turned.broken)
-        return method, [(study.format.format(turned.values[index]), turned.outcomes[index]) for index in values]
+        values = (sweep.broken - 1, sweep.broken)
+        return method, [(knob.format.format(sweep.values[index]), sweep.outcomes[index]) for index in values]
     return "", []
 
 

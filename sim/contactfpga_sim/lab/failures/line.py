@@ -11,7 +11,7 @@ from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
 from contactfpga.errors import ReadTimeout
 from contactfpga.wire import protocol
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
 from contactfpga_sim.lab.failures.uart import Heard, Line, heard
 from contactfpga_sim.model.board.virtual import VirtualBoard
@@ -72,10 +72,10 @@ def _asked(sign: int, per_cent: float) -> Outcome:
     return Outcome(right, () if right else ("ReadTimeout",), what, 1 - answered / len(lows))
 
 
-BAUD = Study(
+BAUD = Knob(
     name="baud",
     title="Baud rates that differ",
-    knob="difference, %",
+    axis="difference, %",
     amount="share lost",
     values=tuple(np.arange(0, 12.01, 0.25).round(2).tolist()),
     runs={
@@ -95,10 +95,10 @@ def _noise(rate_hz: float) -> Outcome:
     return _of_line(heard(line, noisy, greeted=protocol.encode_hello(SKIN)))
 
 
-NOISE = Study(
+NOISE = Knob(
     name="noise",
     title="Pulses on the line",
-    knob="pulses per second",
+    axis="pulses per second",
     amount="share of frames lost",
     values=(0, 10, 30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": _noise},
@@ -122,10 +122,10 @@ DOCTOR_S = 10.0
 CLOCK_PER_CENT = 0.1
 """Times count as right that are off by no more."""
 
-CLOCK = Study(
+CLOCK = Knob(
     name="clock",
     title="A board whose clock is fast",
-    knob="%",
+    axis="%",
     amount="share of frames lost, else error of times",
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
     runs={"board with `clock_hz` off": _clock},
@@ -237,10 +237,10 @@ def _told_late(max_age_s: float | None, milliseconds: float) -> Outcome:
     return Outcome(milliseconds <= 1000 * MAX_AGE_S, told, f"no frame for {milliseconds:g} ms", milliseconds)
 
 
-SILENCE = Study(
+SILENCE = Knob(
     name="silence",
     title="A board without supply, clock or configuration, or a broken cable",
-    knob="ms since its last byte",
+    axis="ms since its last byte",
     amount="ms without a frame",
     values=(1, 2, 4, 6, 10, 20, 50, 100, 200, 500, 1000, 2000),
     runs={
@@ -251,10 +251,10 @@ SILENCE = Study(
     unnoticed="a read waits for a frame until its timeout; how old one may be, only your program knows",
 )
 
-HOST = Study(
+HOST = Knob(
     name="host",
     title="A host that reads every now and then",
-    knob="ms between reads",
+    axis="ms between reads",
     amount="frames missing",
     values=(1, 2, 5, 8, 10, 12, 14, 16, 20, 25, 30, 40, 50, 70, 100),
     runs={"every frame of `contactfpga.open()`": _slow_host},

@@ -9,7 +9,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.electric import finger, judged
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
@@ -33,10 +33,10 @@ def _broken(skin: Skin, line: str, count: float) -> Outcome:
     return judged(still(skin, cells, cuts), cells, [cells])
 
 
-BROKEN = Study(
+BROKEN = Knob(
     name="broken",
     title="Lines that are broken under a contact of 7x7 cells",
-    knob="broken lines side by side",
+    axis="broken lines side by side",
     amount="cells that read pressed",
     values=(0, 1, 2, 3),
     runs={
@@ -86,10 +86,10 @@ def _stuck_columns(skin: Skin, count: float) -> Outcome:
     return judged(zones, touch | columns, [touch])
 
 
-STUCK = Study(
+STUCK = Knob(
     name="stuck",
     title="Switches that are stuck closed, beside a finger",
-    knob="how many are stuck",
+    axis="how many are stuck",
     amount="cells that read pressed",
     values=(0, 1, 2, 3, 4, 5, 6),
     runs={

@@ -9,7 +9,7 @@ import numpy as np
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import REFERENCE, faults, moments, places, plural, reported, still
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
@@ -47,10 +47,10 @@ def _winding(skin: Skin, quarters: float) -> Outcome:
     return _counted(zones, around | finger, right, f"{plural(len(zones), 'zone')} of 2 contacts")
 
 
-WINDING = Study(
+WINDING = Knob(
     name="winding",
     title="An arm that winds around a finger",
-    knob="quarters of a turn",
+    axis="quarters of a turn",
     amount="zones",
     values=tuple(range(12)),
     runs={f"`{name}`": functools.partial(_winding, skin) for name, skin in SKINS.items()},
@@ -69,10 +69,10 @@ def _crossing(skin: Skin, distance_mm: float) -> Outcome:
     return _counted(zones, cells, right, f"{plural(len(zones), 'zone')} of {scene.truth(0.0).count} contacts")
 
 
-CROSSING = Study(
+CROSSING = Knob(
     name="crossing",
     title="Two fingers of 24 mm, one diagonally behind the other",
-    knob="distance of their middles, mm",
+    axis="distance of their middles, mm",
     amount="zones",
     values=tuple(range(70, 24, -1)),
     runs={f"`{name}`": functools.partial(_crossing, SKINS[name]) for name in ("run", "projection", "single")},
@@ -91,10 +91,10 @@ def _many(skin: Skin, count: float) -> Outcome:
     return _counted(zones, cells, right, f"{len(zones)} of {int(count)} zones; `total_zones` says {zones.total_zones}")
 
 
-MANY = Study(
+MANY = Knob(
     name="capacity",
     title=f"More zones than `zone_capacity = {CAPACITY}`",
-    knob="zones on the sheet",
+    axis="zones on the sheet",
     amount="zones in the frame",
     values=(*range(1, 13), 16, 32, 64),
     runs={"any labeller": functools.partial(_many, REFERENCE.replace(zone_capacity=CAPACITY))},

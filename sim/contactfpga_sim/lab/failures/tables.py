@@ -8,100 +8,98 @@ from pathlib import Path
 from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import knob_pictures
-from contactfpga_sim.lab.failures.catalogue import STUDIES
-from contactfpga_sim.lab.failures.knob import Study, Turned
+from contactfpga_sim.lab.failures.catalogue import KNOBS
+from contactfpga_sim.lab.failures.knob import Knob, Sweep
 from contactfpga_sim.lab.pool import progress
 
 HEAD = ("knob", "method", "holds until", "breaks at", "what breaks", "what the system says", "what helps")
 
 
-def table(turned: Mapping[str, Mapping[str, Turned]]) -> str:
-    """A row for each method of each study, by the study's name."""
-    return writer.table(HEAD, [line for name, methods in turned.items() for line in rows(STUDIES[name], methods)])
+def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
+    """A row for each method of each knob, by the knob's name."""
+    return writer.table(HEAD, [line for name, methods in sweeps.items() for line in rows(KNOBS[name], methods)])
 
 
-def rows(study: Study, methods: Mapping[str, Turned], pictured: bool = True) -> list[str]:
-    """A study's lines; what they have in common is said in the first one. ``pictured``: the page has its picture."""
-    title = f"[{study.title}](#{study.name})" if pictured else study.title
+def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> list[str]:
+    """A knob's lines; what they have in common is said in the first one. ``pictured``: the page has its picture."""
+    title = f"[{knob.title}](#{knob.name})" if pictured else knob.title
     lines = []
-    for number, (method, turned) in enumerate(methods.items()):
-        knob = f"{title}: {study.knob}" if number == 0 else ""
-        helps = study.helps if number == 0 else ""
-        lines.append(writer.line((knob, method, *_cells(study, turned), helps)))
+    for number, (method, sweep) in enumerate(methods.items()):
+        first = f"{title}: {knob.axis}" if number == 0 else ""
+        helps = knob.helps if number == 0 else ""
+        lines.append(writer.line((first, method, *_cells(knob, sweep), helps)))
     return lines
 
 
-def _cells(study: Study, turned: Turned) -> list[str]:
-    holds = "" if turned.holds_until is None else study.format.format(turned.holds_until)
-    if turned.broken is None:
+def _cells(knob: Knob, sweep: Sweep) -> list[str]:
+    holds = "" if sweep.holds_until is None else knob.format.format(sweep.holds_until)
+    if sweep.broken is None:
         return [f"{holds}, all there are", "", "nothing", ""]
-    at = study.format.format(turned.breaks_at)
-    return [holds or "nowhere", f"**{at}**", turned.outcomes[turned.broken].what, says(study, turned)]
+    at = knob.format.format(sweep.breaks_at)
+    return [holds or "nowhere", f"**{at}**", sweep.outcomes[sweep.broken].what, says(knob, sweep)]
 
 
-def says(study: Study, turned: Turned) -> str:
+def says(knob: Knob, sweep: Sweep) -> str:
     """What tells the user at the break, before it, and whether something passes unnoticed later."""
-    assert turned.broken is not None
-    told = turned.outcomes[turned.broken].told
+    assert sweep.broken is not None
+    told = sweep.outcomes[sweep.broken].told
     parts = [", ".join(f"`{word}`" for word in told) if told else "**not noticed**"]
-    if turned.warns_at is not None:
-        words = ", ".join(f"`{word}`" for word in turned.outcomes[turned.values.index(turned.warns_at)].told)
-        since = f"from {study.format.format(turned.warns_at)} on"
+    if sweep.warns_at is not None:
+        words = ", ".join(f"`{word}`" for word in sweep.outcomes[sweep.values.index(sweep.warns_at)].told)
+        since = f"from {knob.format.format(sweep.warns_at)} on"
         parts = [f"{parts[0]}, {since}"] if words == parts[0] else [*parts, f"{words} {since}"]
-    if told and turned.silent_at is not None:
-        parts.append(f"**not noticed** at {study.format.format(turned.silent_at)}")
-    if not told and (later := [value for value, one in zip(turned.values, turned.outcomes) if one.verdict == "told"]):
-        first = turned.outcomes[turned.values.index(later[0])].told
-        parts.append(f"{', '.join(f'`{word}`' for word in first)} from {study.format.format(later[0])} on")
+    if told and sweep.silent_at is not None:
+        parts.append(f"**not noticed** at {knob.format.format(sweep.silent_at)}")
+    if not told and (later := [value for value, one in zip(sweep.values, sweep.outcomes) if one.verdict == "told"]):
+        first = sweep.outcomes[sweep.values.index(later[0])].told
+        parts.append(f"{', '.join(f'`{word}`' for word in first)} from {knob.format.format(later[0])} on")
     return "; ".join(parts)
 
 
 UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
-def unnoticed(turned: Mapping[str, Mapping[str, Turned]]) -> str:
-    """A row for each study in which something wrong passes unnoticed, with the reason."""
+def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
+    """A row for each knob in which something wrong passes unnoticed, with the reason."""
     lines = []
-    for name, methods in turned.items():
+    for name, methods in sweeps.items():
         where = [method for method, found in methods.items() if found.silent_at is not None]
         if where:
-            study = STUDIES[name]
-            lines.append(writer.line((f"[{study.title}](#{name})", ", ".join(where), study.unnoticed)))
+            knob = KNOBS[name]
+            lines.append(writer.line((f"[{knob.title}](#{name})", ", ".join(where), knob.unnoticed)))
     return writer.table(UNNOTICED, lines)
 
 
-def tables(turned: Mapping[str, Mapping[str, Turned]]) -> writer.Tables:
+def tables(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Tables:
     """All sections of the page, by name."""
-    return {"failures": lambda: table(turned), "unnoticed": lambda: unnoticed(turned), "pictures": pictures}
+    return {"failures": lambda: table(sweeps), "unnoticed": lambda: unnoticed(sweeps), "pictures": pictures}
 
 
 def pictures() -> str:
-    """A heading and a picture for each study."""
-    return "\n".join(
-        f"({study.name})=\n\n![{study.title}](images/failures/{study.name}.svg)\n" for study in STUDIES.values()
-    )
+    """A heading and a picture for each knob."""
+    return "\n".join(f"({knob.name})=\n\n![{knob.title}](images/failures/{knob.name}.svg)\n" for knob in KNOBS.values())
 
 
-def compute() -> dict[str, dict[str, Turned]]:
+def compute() -> dict[str, dict[str, Sweep]]:
     """Every knob turned until something breaks."""
-    turned: dict[str, dict[str, Turned]] = {}
-    turn(list(STUDIES), turned)
-    return turned
+    sweeps: dict[str, dict[str, Sweep]] = {}
+    sweep_all(list(KNOBS), sweeps)
+    return sweeps
 
 
-def turn(names: Sequence[str], turned: dict[str, dict[str, Turned]]) -> None:
-    """Turn the knobs one after another; each is in ``turned`` as soon as it is done."""
-    runs = sum(len(STUDIES[name].runs) for name in names)
+def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None:
+    """Turn the knobs one after another; each is in ``sweeps`` as soon as it is done."""
+    runs = sum(len(KNOBS[name].runs) for name in names)
     with progress() as step:
         for name in names:
-            STUDIES[name].turn(lambda: step("knobs and methods", runs), turned.setdefault(name, {}))
+            KNOBS[name].sweep(lambda: step("knobs and methods", runs), sweeps.setdefault(name, {}))
 
 
-def draw(folder: Path, turned: Mapping[str, Mapping[str, Turned]]) -> list[Path]:
+def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
     """A picture for each knob, in a folder of their own."""
     (folder / "failures").mkdir(exist_ok=True)
     drawn = []
-    for name, methods in turned.items():
+    for name, methods in sweeps.items():
         drawn.append(folder / "failures" / f"{name}.svg")
-        write_text(drawn[-1], knob_pictures.svg(STUDIES[name], methods))
+        write_text(drawn[-1], knob_pictures.svg(KNOBS[name], methods))
     return drawn

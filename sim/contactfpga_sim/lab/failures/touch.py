@@ -9,7 +9,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, faults, hello_clocks, places, plural, seen
 from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.scenes import contacts
@@ -47,10 +47,10 @@ def _closing(skin: Skin, pitch_mm: float, gap_mm: float) -> Outcome:
     )
 
 
-CLOSING = Study(
+CLOSING = Knob(
     name="closing",
     title="Two fingers of 16 mm that come close",
-    knob="gap between their rims, mm",
+    axis="gap between their rims, mm",
     amount="share of places counted right",
     values=tuple(np.arange(20, -0.25, -0.5).round(2).tolist()),
     runs={
@@ -104,10 +104,10 @@ def _moving(skin: Skin, speed: float) -> Outcome:
     return Outcome(far <= 1, faults(zones), what, min(far, 5.0), cells, places(zones))
 
 
-MOVING = Study(
+MOVING = Knob(
     name="moving",
     title="A finger of 24 mm that moves during the scan",
-    knob="pitches per raster scan",
+    axis="pitches per raster scan",
     amount="pitches off at the frame's time",
     values=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={
@@ -154,10 +154,10 @@ def _bounce(skin: Skin, open_us: float) -> Outcome:
     return Outcome(set(counts) == {1}, (), f"{most} touches of 1", most)
 
 
-BOUNCE = Study(
+BOUNCE = Knob(
     name="bounce",
     title=f"A switch that bounces; debounce of {24 * DEBOUNCE_SCANS} us",
-    knob="time for which it opens once more, us",
+    axis="time for which it opens once more, us",
     amount="touches seen",
     values=tuple(range(0, 193, 12)),
     runs={

@@ -18,7 +18,7 @@ from contactfpga.robot.haptics import Contacts, Cylinder, LoadCells, Touch, cont
 from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.robot.haptics.rate import hexapod
 from contactfpga.surfaces.shapes import Floats
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, Case
 
@@ -199,46 +199,46 @@ RAMP = (30.0, 30.0)
 CLOSINGS = Case("closings", 5.0, RAMP)
 SHARE = "contacts outside the stated 95 %, %"
 
-STUDIES = {
-    study.name: study
-    for study in (
-        Study("unseen", "A second contact that the sheet does not show", "its push, N", SHARE,
+KNOBS = {
+    knob.name: knob
+    for knob in (
+        Knob("unseen", "A second contact that the sheet does not show", "its push, N", SHARE,
               (0, 0.1, 0.2, 0.5, 1, 2, 4, 8), _both(lambda value: Load(unseen_n=value)),
               "look at `alarm`; trust neither force nor place where it is set"),
-        Study("drift", "A unit whose zero has drifted", "drift, N", SHARE, (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
+        Knob("drift", "A unit whose zero has drifted", "drift, N", SHARE, (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
               _both(lambda value: Load(drift_n=value)), "`haptics zero` while nothing touches; `DriftWatch`"),
-        Study("torsion", "A contact that turns about its normal", "torsion, Nm", SHARE,
+        Knob("torsion", "A contact that turns about its normal", "torsion, Nm", SHARE,
               (0, 0.002, 0.005, 0.01, 0.02, 0.05), _both(lambda value: Load(torsion_nm=value)),
               "the center of pressure, which measures the torsion"),
-        Study("clipping", "A unit that reads no more than this", "end of its range, N", SHARE,
+        Knob("clipping", "A unit that reads no more than this", "end of its range, N", SHARE,
               (20, 14, 12, 10, 8, 6, 4), _both(lambda value: Load(ends_n=value)),
               "units for the loads that `haptics place` names; `saturated`"),
-        Study("lifted", "Units that only push, on springs", "preload, N", SHARE, (20, 14, 12, 10, 8, 6, 4),
+        Knob("lifted", "Units that only push, on springs", "preload, N", SHARE, (20, 14, 12, 10, 8, 6, 4),
               _both(lambda value: Load(preload_n=value)), "more preload; `lifted`"),
-        Study("elsewhere", "A stuck switch: the zone is not where the contact is", "distance, mm", SHARE,
+        Knob("elsewhere", "A stuck switch: the zone is not where the contact is", "distance, mm", SHARE,
               (0, 2, 5, 10, 20, 40), _both(lambda value: Load(elsewhere_m=1e-3 * value)),
               "`contactfpga doctor --watch` names the switch; `mask`"),
-        Study("shape", "A ball that is taken for a point", "its radius, mm", SHARE, (1, 2, 3, 5, 8, 12, 19),
+        Knob("shape", "A ball that is taken for a point", "its radius, mm", SHARE, (1, 2, 3, 5, 8, 12, 19),
               _places(("set, 5 mm", Case("set", 5.0, true=PATCH)),
                       ("closings, 5 mm", dataclasses.replace(CLOSINGS, true=PATCH)),
                       ball=lambda value: Ball(1e-3 * value, 4.6e5)),
               "the right `Model`; with several, the one that agrees"),
-        Study("friction", "Two fingers that drag more than friction 0.5 allows", "drag over push", SHARE,
+        Knob("friction", "Two fingers that drag more than friction 0.5 allows", "drag over push", SHARE,
               (0.1, 0.3, 0.45, 0.55, 0.7, 0.9, 1.2),
               {"interval": lambda value: outcome(_friction("interval", value), "N"),
                "estimate, 1 N": lambda value: outcome(_friction("estimate", value), "N")},
               "a larger `friction`: intervals grow, but hold"),
-        Study("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms", SHARE,
+        Knob("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms", SHARE,
               (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
               _places(("closings, 0.5 N of noise", CLOSINGS),
                       ("closings, 0.1 N, no spread", Case("closings", 5.0, RAMP, 0.0, 0.1)),
                       late_n=lambda value: 1.6 * value),
               "units on the board, which has one clock"),
-        Study("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm", SHARE,
+        Knob("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm", SHARE,
               (12, 8, 5, 2, 0, -1, -2, -3),
               _places(("barycenter, 5 mm", Case("barycenter", 5.0, RAMP, 0.0, 0.0)), ("set, 5 mm", Case("set", 5.0)),
                       ("closings, 5 mm", CLOSINGS), inside_mm=float),
               "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
     )
 }  # fmt: skip
-"""Every study by its name, in the order of the page."""
+"""Every knob by its name, in the order of the page."""

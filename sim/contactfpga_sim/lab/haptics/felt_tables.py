@@ -13,7 +13,7 @@ from contactfpga import picture_style as style
 from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import knob_pictures, tables
-from contactfpga_sim.lab.failures.knob import Turned
+from contactfpga_sim.lab.failures.knob import Sweep
 from contactfpga_sim.lab.haptics import breaks, felt, pairs
 from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
@@ -75,21 +75,21 @@ def limits_table() -> str:
 
 
 @functools.cache
-def turned() -> dict[str, dict[str, Turned]]:
+def turned() -> dict[str, dict[str, Sweep]]:
     """Every break."""
-    return {name: study.turn() for name, study in breaks.STUDIES.items()}
+    return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
 
 
 def breaks_table() -> str:
     """Where each method breaks."""
-    lines = [line for name, methods in turned().items() for line in tables.rows(breaks.STUDIES[name], methods)]
+    lines = [line for name, methods in turned().items() for line in tables.rows(breaks.KNOBS[name], methods)]
     return writer.table(tables.HEAD, lines)
 
 
 def breaks_pictures() -> str:
     """A heading and a picture for each."""
     return "\n".join(
-        f"({study.name})=\n\n![{study.title}](images/haptics/{study.name}.svg)\n" for study in breaks.STUDIES.values()
+        f"({knob.name})=\n\n![{knob.title}](images/haptics/{knob.name}.svg)\n" for knob in breaks.KNOBS.values()
     )
 
 
@@ -99,7 +99,7 @@ def draw(folder: Path) -> list[Path]:
     (folder / "haptics").mkdir(exist_ok=True)
     for name, methods in turned().items():
         path = folder / "haptics" / f"{name}.svg"
-        write_text(path, knob_pictures.svg(breaks.STUDIES[name], methods))
+        write_text(path, knob_pictures.svg(breaks.KNOBS[name], methods))
         drawn.append(path)
     return drawn
 

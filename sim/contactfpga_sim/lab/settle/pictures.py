@@ -11,7 +11,7 @@ from contactfpga import picture_style as style
 from contactfpga.design.circuit import Circuit, patterns
 from contactfpga.design.circuit.network import Network
 from contactfpga_sim.lab.settle import breaks, shorted
-from contactfpga_sim.lab.settle.breaks import KNOBS, SIZE, US
+from contactfpga_sim.lab.settle.breaks import HIGH_V, KNOBS, SETTLE_US, SIZE, US
 from contactfpga_sim.lab.settle.shorted import NAMES, RowTime
 
 COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
@@ -66,26 +66,28 @@ def _row(path: Path) -> Path:
 def _breaks(path: Path) -> Path:
     figure = style.new(6.2)
     for axes, (name, knob) in zip(figure.subplots(2, 2).flat, KNOBS.items()):
-        for color, (run, outcomes) in zip(COLORS, breaks.turned(name).items()):
-            shown = np.where(np.isfinite(outcomes), outcomes, np.nan)
+        late = name != "coupling"
+        limit = SETTLE_US if late else HIGH_V
+        for color, (run, sweep) in zip(COLORS, breaks.sweeps(name).items()):
+            amounts = [outcome.amount for outcome in sweep.outcomes]
+            shown = np.where(np.isfinite(amounts), amounts, np.nan)
             axes.plot(knob.values, shown, color=color, lw=1.8, label=run)
-            _, at = breaks.edge(knob, outcomes)
-            if at is not None:
-                axes.plot([at], [outcomes[knob.values.index(at)]], "x", color=color, ms=7, mew=2)
-        axes.axhline(knob.limit, color=style.INK, lw=1, ls=style.DASHES[1])
+            if sweep.broken is not None:
+                axes.plot([sweep.breaks_at], [amounts[sweep.broken]], "x", color=color, ms=7, mew=2)
+        axes.axhline(limit, color=style.INK, lw=1, ls=style.DASHES[1])
         if name != "columns":
             axes.set_xscale("log")
             axes.set_xlim(knob.values[0] / 1.2, 1.5 * knob.values[-1])
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:,g}")
-        if knob.below:
-            axes.set_ylim(0, 4 * knob.limit)
+        if late:
+            axes.set_ylim(0, 4 * limit)
         else:
             axes.set_ylim(0, 3.4)
         axes.set_title(knob.title, loc="left")
         axes.set_xlabel(knob.axis)
-        axes.set_ylabel("time to settle, µs" if knob.below else "unpressed column, V")
+        axes.set_ylabel("time to settle, µs" if late else "unpressed column, V")
         axes.grid(visible=True)
-        axes.legend(loc="upper left" if knob.below else "lower left")
+        axes.legend(loc="upper left" if late else "lower left")
     return style.save(figure, path)
 
 

@@ -85,15 +85,15 @@ def breaks_table() -> str:
     """Where each knob breaks."""
     rows = [["knob", "circuit", "holds until", "breaks at", "what breaks", "what helps"]]
     for name, knob in breaks.KNOBS.items():
-        for number, (run, outcomes) in enumerate(breaks.turned(name).items()):
-            last, first = breaks.edge(knob, outcomes)
+        for number, (run, sweep) in enumerate(breaks.sweeps(name).items()):
+            last, first = sweep.holds_until, sweep.breaks_at
             rows.append(
                 [
                     f"{knob.title}: {knob.axis}" if not number else "",
                     run,
                     "nowhere" if last is None else f"{last:,g}",
                     "" if first is None else f"**{first:,g}**",
-                    "nothing" if first is None else knob.breaks,
+                    "nothing" if sweep.broken is None else sweep.outcomes[sweep.broken].what,
                     knob.helps if not number else "",
                 ]
             )

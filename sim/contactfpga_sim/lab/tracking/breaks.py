@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.tracking.frames import zones_of
 from contactfpga_sim.lab.tracking.judge import Update, ours
 from contactfpga_sim.lab.tracking.nearest import Nearest
@@ -55,8 +55,8 @@ def _nearest() -> Update:
 METHODS: dict[str, Callable[[], Update]] = {"`Tracker`": ours, "nearest zone": _nearest}
 
 
-def _runs(study: Callable[[Callable[[], Update], float], Outcome]) -> dict[str, Callable[[float], Outcome]]:
-    return {name: functools.partial(study, make) for name, make in METHODS.items()}
+def _runs(run: Callable[[Callable[[], Update], float], Outcome]) -> dict[str, Callable[[float], Outcome]]:
+    return {name: functools.partial(run, make) for name, make in METHODS.items()}
 
 
 def _one_id(ids: Ids) -> Outcome:
@@ -80,10 +80,10 @@ def _slides(make: Callable[[], Update], from_rest: bool, step_mm: float) -> Outc
     return _one_id(_ids(make(), _slide(from_rest, step_mm)))
 
 
-SLIDE = Study(
+SLIDE = Knob(
     name="slide",
     title="A finger that slides",
-    knob="mm per frame",
+    axis="mm per frame",
     amount="ids",
     values=tuple(float(step) for step in range(4, 64, 2)),
     runs={
@@ -111,10 +111,10 @@ def _meets(make: Callable[[], Update], distance_mm: float) -> Outcome:
     return Outcome(ids[0] == ids[-1], told, f"ids {ids[0]} come back as {ids[-1]}", min(map(len, ids)))
 
 
-MEET = Study(
+MEET = Knob(
     name="meet",
     title="Two fingers of 16 mm that meet and part",
-    knob="distance of their middles, mm",
+    axis="distance of their middles, mm",
     amount="zones",
     values=tuple(float(value) for value in range(40, 6, -2)),
     runs=_runs(_meets),
@@ -138,10 +138,10 @@ def _crosses(make: Callable[[], Update], gap_mm: float) -> Outcome:
     return Outcome(ids[0] == ids[-1][::-1], told, f"ids {ids[0]} go on as {ids[-1][::-1]}", len(ids[-1]))
 
 
-CROSS = Study(
+CROSS = Knob(
     name="cross",
     title="Two fingers of 16 mm that pass each other at 1 m/s each",
-    knob="distance of their lanes, mm",
+    axis="distance of their lanes, mm",
     amount="ids",
     values=tuple(float(value) for value in range(40, -2, -2)),
     runs=_runs(_crosses),
@@ -173,10 +173,10 @@ def _bounces(make: Callable[[], Update], open_ms: float) -> Outcome:
     return _one_id(_ids(make(), _open(open_ms)))
 
 
-BOUNCE = Study(
+BOUNCE = Knob(
     name="bounce",
     title="A contact that bounces",
-    knob="time for which it is open, ms",
+    axis="time for which it is open, ms",
     amount="ids",
     values=(0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 4.5, 5.0, 6.0, 8.0, 10.0, 15.0, 19.0, 19.5, 20.0, 25.0, 30.0),
     runs={
@@ -202,10 +202,10 @@ def _sticks(make: Callable[[], Update], count: float) -> Outcome:
     return Outcome(right, (), f"{len({name for one in ids for name in one})} ids for {count + 1:g} contacts", count)
 
 
-STUCK = Study(
+STUCK = Knob(
     name="stuck",
     title="A finger that slides over stuck switches",
-    knob="how many are stuck",
+    axis="how many are stuck",
     amount="stuck switches",
     values=tuple(float(value) for value in range(10)),
     runs=_runs(_sticks),
@@ -223,15 +223,15 @@ def _loses(make: Callable[[], Update], lost_ms: float) -> Outcome:
     return _one_id(_ids(make(), _gap(lost_ms)))
 
 
-LOST = Study(
+LOST = Knob(
     name="lost",
     title="A finger that slides at 500 mm/s while frames are lost",
-    knob="ms without a frame",
+    axis="ms without a frame",
     amount="ids",
     values=tuple(float(value) for value in range(0, 140, 5)),
     runs=_runs(_loses),
     helps="a larger `gate_mm`; `board.stats.lost` counts lost frames",
 )
 
-STUDIES = {study.name: study for study in (SLIDE, MEET, CROSS, BOUNCE, STUCK, LOST)}
-"""Every study by its name."""
+KNOBS = {knob.name: knob for knob in (SLIDE, MEET, CROSS, BOUNCE, STUCK, LOST)}
+"""Every knob by its name."""

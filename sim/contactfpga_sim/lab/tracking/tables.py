@@ -48,7 +48,7 @@ def recorded_table() -> str:
 
 def breaks_table() -> str:
     """Where ids are lost."""
-    lines = [line for study in breaks.STUDIES.values() for line in failures_tables.rows(study, study.turn(), False)]
+    lines = [line for knob in breaks.KNOBS.values() for line in failures_tables.rows(knob, knob.sweep(), False)]
     return writer.table(failures_tables.HEAD, lines)
 
 

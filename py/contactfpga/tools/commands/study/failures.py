@@ -12,7 +12,7 @@ from contactfpga.tools.console import flags, outputs
 from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
-    from contactfpga_sim.lab.failures.knob import Turned
+    from contactfpga_sim.lab.failures.knob import Sweep
 
 EXTRA = "sim"
 
@@ -29,17 +29,17 @@ def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     from contactfpga_sim.lab import writer
     from contactfpga_sim.lab.failures import tables as failures_tables
-    from contactfpga_sim.lab.failures.catalogue import STUDIES
+    from contactfpga_sim.lab.failures.catalogue import KNOBS
 
-    names = flags.known("--study", args.study, list(STUDIES))
+    names = flags.known("--study", args.study, list(KNOBS))
     if args.page and args.study:
         raise ValueError("--page takes all studies; leave --study out")
     folder = outputs.folder(args.output)
     path = writer.page(args.page, "--page") if args.page else None
     pictures = outputs.folder(path.parent / "images" / "failures", "--page") if path else folder
-    turned: dict[str, dict[str, Turned]] = {}
+    turned: dict[str, dict[str, Sweep]] = {}
     try:
-        _turn(names, turned)
+        failures_tables.sweep_all(names, turned)
     except KeyboardInterrupt:
         raise Interrupted(_kept(turned, folder)) from None
     if path:
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
+def _write(turned: Mapping[str, Mapping[str, Sweep]], path: Path) -> Path:
     from contactfpga_sim.lab.failures import tables as failures_tables
 
     both = failures_tables.table(turned), failures_tables.unnoticed(turned)
@@ -59,7 +59,7 @@ def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
     return path
 
 
-def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
+def _kept(turned: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
     """Where what was finished is, in a file of its own: a whole table from before stays."""
     done = sum(map(len, turned.values()))
     if not done:
@@ -68,21 +68,10 @@ def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
     return f"interrupted; {done} row{'' if done == 1 else 's'} of the table, all that was finished, in {path}"
 
 
-def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
+def _draw(turned: Mapping[str, Mapping[str, Sweep]], folder: Path) -> None:
     from contactfpga_sim.lab.failures import knob_pictures
-    from contactfpga_sim.lab.failures.catalogue import STUDIES
+    from contactfpga_sim.lab.failures.catalogue import KNOBS
 
     for name, methods in turned.items():
-        write_text(folder / f"{name}.svg", knob_pictures.svg(STUDIES[name], methods))
+        write_text(folder / f"{name}.svg", knob_pictures.svg(KNOBS[name], methods))
         print(folder / f"{name}.svg")
-
-
-def _turn(names: list[str], turned: dict[str, dict[str, Turned]]) -> None:
-    """Turn the knobs one after another; each is in ``turned`` as soon as it is done."""
-    from contactfpga_sim.lab.failures.catalogue import STUDIES
-    from contactfpga_sim.lab.pool import progress
-
-    runs = sum(len(STUDIES[name].runs) for name in names)
-    with progress() as step:
-        for name in names:
-            STUDIES[name].turn(lambda: step("knobs and methods", runs), turned.setdefault(name, {}))
