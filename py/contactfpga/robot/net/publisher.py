@@ -25,7 +25,7 @@ SIMULATED_S = 0.002
 """The most simulated time that passes at once."""
 
 
-class ByteSource(Protocol):
+class BoardPort(Protocol):
     """A transport of the driver."""
 
     threaded: bool
@@ -47,7 +47,7 @@ class BoardPublisher:
 
     def __init__(
         self,
-        source: ByteSource,
+        source: BoardPort,
         session: zenoh.Session,
         key: str,
         *,
