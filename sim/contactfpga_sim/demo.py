@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.driver import driver
 from contactfpga.robot.haptics import LoadCells, WithReadings, felt
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga.tools.console import interrupt, outputs, tables, terminal
+from contactfpga.tools.console import interrupt, outputs, tables
 from contactfpga.wire.protocol import Frame
 from contactfpga_sim.lab import pool
 from contactfpga_sim.model.board.received import frames_in

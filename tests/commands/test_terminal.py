@@ -15,8 +15,7 @@ from rich.console import Console
 from sample import sample
 from terminals import OnTerminal, environment, on_terminal, wait_for
 
-from contactfpga import Skin
-from contactfpga.tools.console import terminal
+from contactfpga import Skin, terminal
 from contactfpga.tools.console.tables import tables
 
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -155,7 +154,7 @@ def test_the_encoding_decides_on_characters(encoding, unicode):
 
 
 def test_what_an_encoding_lacks_is_written_as_what_is_nearest():
-    code = "from contactfpga.tools.console import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
+    code = "from contactfpga import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, env=environment(PYTHONIOENCODING="ascii")
     )

@@ -77,7 +77,8 @@ def test_term_is_handled_as_before_when_a_command_is_done():
 
 PRINTS = """
 import sys
-from contactfpga.tools.console import interrupt, terminal
+from contactfpga import terminal
+from contactfpga.tools.console import interrupt
 
 def body():
     SAY

@@ -98,7 +98,7 @@ PATIENT_S = 8.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Answer:
+class Reply:
     """A port that was listened to."""
 
     candidate: Candidate
@@ -136,7 +136,7 @@ def find(port: str | None, skin: Skin | None, baud: int) -> str:
     raise PortNotFound(f"several boards answer{_of(port, skin)}; name one of them{_hint(meant)}. Candidates: {report}")
 
 
-def survey(candidates: Sequence[Candidate], baud: int) -> list[Answer]:
+def survey(candidates: Sequence[Candidate], baud: int) -> list[Reply]:
     """Listen to all of these ports at once."""
     if not candidates:
         return []
@@ -145,14 +145,14 @@ def survey(candidates: Sequence[Candidate], baud: int) -> list[Answer]:
         return [found for at_one_port in heard for found in at_one_port]
 
 
-def _heard(candidate: Candidate, baud: int) -> list[Answer]:
+def _heard(candidate: Candidate, baud: int) -> list[Reply]:
     """What is at a port: a board, or each sheet of one that serves several."""
     try:
         names = sheets.open_at(candidate.device) or [candidate.device]
         heard = [one for name in names for one in listen(name, baud).items()]
-        return [Answer(dataclasses.replace(candidate, device=name), hello, "") for name, hello in heard]
+        return [Reply(dataclasses.replace(candidate, device=name), hello, "") for name, hello in heard]
     except ContactFPGAError as error:
-        return [Answer(candidate, None, str(error))]
+        return [Reply(candidate, None, str(error))]
 
 
 def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, Hello]:
@@ -195,7 +195,7 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
     return found
 
 
-def _meant(heard: Sequence[Answer], port: str | None, skin: Skin | None) -> list[Answer]:
+def _meant(heard: Sequence[Reply], port: str | None, skin: Skin | None) -> list[Reply]:
     """Those that were asked for by name; by Skin; and where its name tells several of these apart, by that."""
     found = [one for one in heard if one.hello is not None]
     if port is not None and port.startswith(NAME):
@@ -209,7 +209,7 @@ def _meant(heard: Sequence[Answer], port: str | None, skin: Skin | None) -> list
     return found
 
 
-def _named(found: Sequence[Answer], name: str) -> list[Answer]:
+def _named(found: Sequence[Reply], name: str) -> list[Reply]:
     return [one for one in found if one.hello is not None and one.hello.name == name]
 
 
@@ -219,13 +219,13 @@ def _of(port: str | None, skin: Skin | None) -> str:
     return name + (f" with fingerprint {skin.fingerprint.hex()}" if skin is not None else "")
 
 
-def _nobody(port: str | None, skin: Skin | None, heard: Sequence[Answer]) -> str:
+def _nobody(port: str | None, skin: Skin | None, heard: Sequence[Reply]) -> str:
     if not any(one.hello for one in heard):
         return "no board answers"
     return f"no board{_of(port, skin)} is here"
 
 
-def _hint(meant: Sequence[Answer]) -> str:
+def _hint(meant: Sequence[Reply]) -> str:
     """How these can be told apart."""
     names = [one.hello.name for one in meant if one.hello is not None]
     numbers = [one.candidate.serial_number for one in meant]

@@ -28,7 +28,7 @@ _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
 """What looks like options that there are not."""
 
 
-class ByteSource(Protocol):
+class ByteFile(Protocol):
     """Recorded bytes."""
 
     def read(self, count: int, /) -> bytes:
@@ -104,7 +104,7 @@ class RecordingTransport:
             self._transport.close()
 
 
-def open_recorded(name: str) -> ByteSource:
+def open_recorded(name: str) -> ByteFile:
     """The file that ``replay://FILE`` names, open for reading. Raises :class:`PortNotFound`."""
     try:
         asked = Replay.parse(name)
@@ -198,7 +198,7 @@ class _Pace:
         self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
         self._last_us = 0
 
-    def read(self, file: ByteSource, timeout_s: float) -> bytes:
+    def read(self, file: ByteFile, timeout_s: float) -> bytes:
         if not self._held:
             packet = bytearray(_more(file, 1, self._name))
             while packet[-1] and len(packet) <= LONGEST_PACKET and (more := file.read(1)):
@@ -223,7 +223,7 @@ class _Pace:
         self._last_us = time_us
 
 
-def _more(file: ByteSource, count: int, name: str) -> bytes:
+def _more(file: ByteFile, count: int, name: str) -> bytes:
     data = file.read(count)
     if not data:
         raise ReplayEnded(f"{name} ends here")

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NoReturn, Protocol
 
-from contactfpga import __version__
+from contactfpga import __version__, terminal
 from contactfpga.choices.choice import trusted
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.values import shortened, visible_lines
 from contactfpga.tools import commands
-from contactfpga.tools.console import interrupt, terminal
+from contactfpga.tools.console import interrupt
 
 COMMANDS = {
     "zones": "Show the contact zones live.",

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 
-from contactfpga.tools.console import terminal
+from contactfpga import terminal
 from contactfpga.tools.console.interrupt import silence_amaranth
 
 GRACE_S = 0.5

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from contactfpga import terminal
 from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.boards.wiring import Connection, Output, Wire
@@ -16,7 +17,7 @@ from contactfpga.design.circuit import Circuit, load_checked
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga.tools.console import flags, numbers, outputs, terminal
+from contactfpga.tools.console import flags, numbers, outputs
 
 EXTRA = "boards"
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.driver import driver, finding, health
 from contactfpga.driver.address import SheetOf, searched
 from contactfpga.driver.board import Board
@@ -18,7 +19,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.instruments.self_test import LineFinding, SelfTest, untried
 from contactfpga.instruments.watch import Cell, Suspicion, Watch, named
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, interrupt, live, numbers, terminal
+from contactfpga.tools.console import flags, interrupt, live, numbers
 from contactfpga.zones.zone import Zones
 
 EXTRA = None
@@ -123,7 +124,7 @@ def _list(args: argparse.Namespace) -> int:
     return 0 if boards else 1
 
 
-def _listed(one: finding.Answer) -> dict[str, object]:
+def _listed(one: finding.Reply) -> dict[str, object]:
     known = one.hello
     return {
         "port": one.candidate.device,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.tools.console import outputs, terminal
+from contactfpga import terminal
+from contactfpga.tools.console import outputs
 
 EXTRA = "analysis"
 

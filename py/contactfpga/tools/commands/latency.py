@@ -7,8 +7,9 @@ import dataclasses
 import json
 import re
 
+from contactfpga import terminal
 from contactfpga.skin import Skin
-from contactfpga.tools.console import numbers, terminal
+from contactfpga.tools.console import numbers
 
 EXTRA = "sim"
 

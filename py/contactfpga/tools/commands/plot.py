@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from contactfpga.tools.console import outputs, progress, terminal
+from contactfpga import terminal
+from contactfpga.tools.console import outputs, progress
 
 EXTRA = "view"
 

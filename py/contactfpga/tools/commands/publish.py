@@ -12,12 +12,13 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NoReturn
 
+from contactfpga import terminal
 from contactfpga.driver import driver
 from contactfpga.driver.address import NET, SheetOf, checked_key
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
 from contactfpga.robot.net.session import is_loopback, key_of
-from contactfpga.tools.console import flags, interrupt, numbers, terminal
+from contactfpga.tools.console import flags, interrupt, numbers
 
 if TYPE_CHECKING:
     from contactfpga.driver.transport import Transport

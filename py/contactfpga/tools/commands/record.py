@@ -8,10 +8,11 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
-from contactfpga.tools.console import flags, interrupt, numbers, terminal
+from contactfpga.tools.console import flags, interrupt, numbers
 from contactfpga.tools.console.forces import Forces
 
 if TYPE_CHECKING:

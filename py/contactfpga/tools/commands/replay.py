@@ -6,8 +6,9 @@ import argparse
 import json
 import time
 
+from contactfpga import terminal
 from contactfpga.skin import limits
-from contactfpga.tools.console import numbers, terminal
+from contactfpga.tools.console import numbers
 
 EXTRA = "sim"
 

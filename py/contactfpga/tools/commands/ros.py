@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from contactfpga import terminal
 from contactfpga.robot.haptics import WithReadings
-from contactfpga.tools.console import flags, interrupt, numbers, terminal
+from contactfpga.tools.console import flags, interrupt, numbers
 from contactfpga.tools.console.forces import Forces
 
 EXTRA = "ros"

@@ -7,6 +7,7 @@ import dataclasses
 import json
 from typing import Any
 
+from contactfpga import terminal
 from contactfpga.design import circuit as sheet
 from contactfpga.design.circuit import DIODES, Circuit, CircuitError, Diode, Needs, Problem
 from contactfpga.design.circuit.static import NOISE_V
@@ -14,7 +15,7 @@ from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.design.circuit.values import DIODE_LIMITS, LIMITS
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin, limits
-from contactfpga.tools.console import numbers, terminal
+from contactfpga.tools.console import numbers
 
 EXTRA = None
 

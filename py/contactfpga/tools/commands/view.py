@@ -7,7 +7,8 @@ import contextlib
 import os
 import sys
 
-from contactfpga.tools.console import flags, interrupt, numbers, progress, terminal
+from contactfpga import terminal
+from contactfpga.tools.console import flags, interrupt, numbers, progress
 
 EXTRA = "view"
 

@@ -14,10 +14,11 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 
+from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import told
 from contactfpga.inputs.values import shortened, visible_lines
-from contactfpga.tools.console import signals, terminal
+from contactfpga.tools.console import signals
 from contactfpga.tools.console.signals import SIGNALS
 
 AGAIN_S = 0.01

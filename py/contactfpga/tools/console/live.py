@@ -11,11 +11,12 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.events import Silence, longest_pause_s
 from contactfpga.driver.health import Finding
 from contactfpga.errors import PortLost, ReadTimeout, ReplayEnded
-from contactfpga.tools.console import interrupt, terminal
+from contactfpga.tools.console import interrupt
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:

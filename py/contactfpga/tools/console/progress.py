@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-from contactfpga.tools.console import terminal
+from contactfpga import terminal
 
 SOON_S = 1.0
 """What takes no longer says nothing."""

@@ -12,7 +12,7 @@ from rich.console import JustifyMethod
 from rich.markup import escape
 from rich.table import Table
 
-from contactfpga.tools.console import terminal
+from contactfpga import terminal
 
 GAP = 3
 """Characters from a column to the next."""

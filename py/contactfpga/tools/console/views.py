@@ -9,11 +9,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.instruments.watch import Watch
 from contactfpga.robot.haptics import Contact, Contacts
-from contactfpga.tools.console import drawn_sheet, terminal
+from contactfpga.tools.console import drawn_sheet
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tools.console.live import Room
 from contactfpga.tracking.tracks import Track, Tracks

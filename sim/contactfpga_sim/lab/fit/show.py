@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from contactfpga import terminal
 from contactfpga.design.cover.press import write_cover
-from contactfpga.tools.console import tables, terminal
+from contactfpga.tools.console import tables
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
 from contactfpga_sim.lab.fit.cost import DEVICE
 from contactfpga_sim.lab.fit.goals import Measured

@@ -29,10 +29,10 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.choices.choice import own_files
 from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
 from contactfpga.skin import Skin
-from contactfpga.tools.console import terminal
 from contactfpga_sim.model.board import cache, sources
 
 _USER = "the virtual board"

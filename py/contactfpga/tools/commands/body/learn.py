@@ -10,12 +10,13 @@ from typing import TextIO
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.inputs.values import number_in, shown
 from contactfpga.robot.body import Body, folds
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
 from contactfpga.tools.commands.body.register import link
-from contactfpga.tools.console import numbers, outputs, terminal
+from contactfpga.tools.console import numbers, outputs
 from contactfpga.zones.zone import Zones
 
 EXTRA = None

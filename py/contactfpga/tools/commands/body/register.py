@@ -7,13 +7,14 @@ import dataclasses
 import json
 import math
 
+from contactfpga import terminal
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
 from contactfpga.inputs.values import shown
 from contactfpga.robot.body import Body, registration
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.registration import Press, Registration
-from contactfpga.tools.console import numbers, terminal
+from contactfpga.tools.console import numbers
 
 EXTRA = None
 

@@ -7,10 +7,11 @@ import json
 import math
 import time
 
+from contactfpga import terminal
 from contactfpga.inputs.values import number_in
 from contactfpga.robot.body import Body, Contact, Snapshot
 from contactfpga.robot.body.snapshot import BASE, LINK
-from contactfpga.tools.console import numbers, terminal
+from contactfpga.tools.console import numbers
 
 EXTRA = None
 

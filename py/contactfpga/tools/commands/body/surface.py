@@ -6,10 +6,11 @@ import argparse
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.skin import Skin
 from contactfpga.surfaces.laying import Placement, Triangles
-from contactfpga.tools.console import numbers, outputs, terminal
+from contactfpga.tools.console import numbers, outputs
 
 EXTRA = "surface"
 

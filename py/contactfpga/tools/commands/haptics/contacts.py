@@ -6,9 +6,9 @@ import argparse
 import json
 from typing import Any
 
+from contactfpga import terminal
 from contactfpga.robot.haptics import Center, Contacts, contacts
 from contactfpga.tools.commands.haptics import reading
-from contactfpga.tools.console import terminal
 
 EXTRA = "haptics"
 

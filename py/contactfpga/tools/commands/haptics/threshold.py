@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import re
 
+from contactfpga import terminal
 from contactfpga.errors import NoSuchCommand
 from contactfpga.inputs.values import shown
 from contactfpga.robot.haptics import HapticsError, LoadCells
-from contactfpga.tools.console import flags, terminal
+from contactfpga.tools.console import flags
 from contactfpga.tools.console.forces import cells_of
 
 EXTRA = "haptics"

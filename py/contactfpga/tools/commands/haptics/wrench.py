@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
+from contactfpga import terminal
 from contactfpga.tools.commands.haptics import reading
-from contactfpga.tools.console import terminal
 
 EXTRA = "haptics"
 

@@ -6,13 +6,14 @@ import argparse
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import write_text
 from contactfpga.robot.haptics import HapticsError, WithReadings
 from contactfpga.robot.haptics.units import write
 from contactfpga.surfaces.shapes import Floats
-from contactfpga.tools.console import flags, numbers, outputs, terminal
+from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.forces import cells_of
 
 EXTRA = "haptics"

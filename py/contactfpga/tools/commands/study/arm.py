@@ -8,9 +8,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs, terminal
+from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:

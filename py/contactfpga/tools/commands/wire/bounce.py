@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.choices import debounces
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError
 from contactfpga.instruments.bounce import QUIET_US, Bounce
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, live, terminal
+from contactfpga.tools.console import flags, live
 from contactfpga.zones.zone import Zones
 
 SHARES = (50, 90, 99, 100)

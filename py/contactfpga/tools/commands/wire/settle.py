@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
@@ -15,7 +16,7 @@ from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTi
 from contactfpga.instruments.settling import Settling
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
-from contactfpga.tools.console import interrupt, live, terminal
+from contactfpga.tools.console import interrupt, live
 from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
 from contactfpga.zones.zone import Zones
 
