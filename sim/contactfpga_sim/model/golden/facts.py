@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from contactfpga.choices import scans
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
-    from contactfpga_sim.model.golden.scan import ScanRule
 
 
 def exact(value: float) -> Fraction:
@@ -130,9 +129,9 @@ class Facts:
         return 0 if self.skin.column_read == "direct" else self.shift_bit
 
     @functools.cached_property
-    def scan(self) -> ScanRule:
-        found: ScanRule = scans.find(self.skin.scan).load_golden()
-        return found
+    def scan(self) -> Any:
+        """The rule of the Skin's scan, a :class:`~contactfpga_sim.model.golden.scan.ScanRule`; it asks for facts."""
+        return scans.find(self.skin.scan).load_golden()
 
     @functools.cached_property
     def halvings(self) -> int:
