@@ -20,7 +20,7 @@ PLACES = [
     (study, place)
     for study in DECLARED
     for place in (
-        *(one for section in study.sections.values() for one in (section.makes, section.sample, section.depends)),
+        *(one for section in study.sections.values() for one in (section.makes, section.sample)),
         *(study.compute, study.pictures),
     )
     if place
@@ -150,6 +150,19 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
     assert stale() == []
     code.write_text(code.read_text().replace("[1, 2]", "[1, 3]"))
     assert len(stale()) == 2
+
+
+@pytest.mark.slow
+def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
+    from contactfpga_sim.lab import size
+    from contactfpga_sim.lab.several import tables
+
+    monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured
+    several = registry.load("several")
+    before = meaning.fingerprint(several, "several_size")
+    assert meaning.fingerprint(several, "several_size") == before
+    monkeypatch.setattr(tables, "SKIN", tables.SKIN.replace(zone_capacity=5))
+    assert meaning.fingerprint(several, "several_size") != before
 
 
 def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):

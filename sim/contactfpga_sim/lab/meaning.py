@@ -7,8 +7,11 @@ the place where they stand.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import hashlib
+import io
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,9 +25,22 @@ LENGTH = 8
 def fingerprint(study: Study, section: str) -> str:
     """Of what makes a section."""
     declared = study.sections[section]
-    if declared.depends:
-        return _hashed(Run(study).call(declared.depends))
+    if declared.of_netlists:
+        return _hashed("\n".join((*_netlists(study, section), *_marks(_file(study.module(declared.makes))))))
     return _of(frozenset(study.module(place) for place in (declared.makes, study.compute) if place))
+
+
+def _netlists(study: Study, section: str) -> list[str]:
+    """Keys of the netlists that a section measures."""
+    from contactfpga_sim.lab import size
+
+    with size.keys_alone() as keys, contextlib.redirect_stderr(io.StringIO()):
+        Run(study).text(section)
+    return keys
+
+
+def _file(module: str) -> Path:
+    return Path(sys.modules[module].__file__ or "")
 
 
 @functools.cache

@@ -34,9 +34,8 @@ class Section:
     """As :attr:`Study.needs`. Where one is absent, the section stays as it is."""
     sample: str = ""
     """A function that gives in less than a minute a part of the text, such as a row; it takes nothing."""
-    depends: str = ""
-    """A function that gives a text that changes with the section, such as that of a netlist; by default all code that
-    ``makes`` reaches decides."""
+    of_netlists: bool = False
+    """It says what :mod:`.size` measures, so netlists decide whether it is out of date, and not all code it reaches."""
 
 
 @dataclasses.dataclass(frozen=True)

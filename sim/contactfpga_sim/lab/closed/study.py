@@ -9,7 +9,7 @@ STUDY = Study(
     minutes=5,
     sections={
         "closed": Section("tables:clocks_table", sample="tables:clocks_sample"),
-        "closed_size": Section("tables:size_table"),
+        "closed_size": Section("tables:size_table", of_netlists=True),
     },
     extra="boards",
 )

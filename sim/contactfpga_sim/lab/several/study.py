@@ -9,7 +9,7 @@ STUDY = Study(
     minutes=3,
     sections={
         "several_line": Section("tables:line_table", sample="tables:line_sample"),
-        "several_size": Section("tables:size_table"),
+        "several_size": Section("tables:size_table", of_netlists=True),
     },
     extra="boards",
 )

@@ -8,9 +8,9 @@ STUDY = Study(
     page="performance.md",
     minutes=60,
     sections={
-        "gateware": Section("tables:gateware_table"),
-        "faults": Section("tables:faults_table"),
-        "units_size": Section("tables:units_table", page="units.md"),
+        "gateware": Section("tables:gateware_table", of_netlists=True),
+        "faults": Section("tables:faults_table", of_netlists=True),
+        "units_size": Section("tables:units_table", page="units.md", of_netlists=True),
         "boards": Section("tables:boards_table", page="boards.md"),
     },
     extra="boards",
