@@ -53,7 +53,7 @@ def raster(proof: Proof, diodes: Diodes) -> None:
         dut.pins.columns.eq(proof.free(2, "columns")),
         dut.rows.ready.eq(proof.free(1, "ready")),
     ]
-    selected, clock = Signal(dut.skin.rows), inside["cycle.clock"]
+    selected, clock = Signal(dut.skin.rows), inside["clock"]
     proof.m.d.comb += selected.eq(~dut.pins.rows if dut.skin.selects_low else dut.pins.rows)
     apart(proof, dut.pins.columns_drive, selected)
     settled, slot = dut.derived.settle_clocks, dut.derived.row_clocks
@@ -63,7 +63,7 @@ def raster(proof: Proof, diodes: Diodes) -> None:
         proof.lemma(dut.pins.columns_drive == 0)
     proof.lemma((clock != 0) | (proof.before(dut.pins.columns_drive) == 0))
     proof.lemma((selected == 0) == (clock >= settled))
-    following = inside["cycle.following"]
+    following = inside["following"]
     proof.lemma((following & (following - 1) == 0) & (following != 0) & (selected & (selected - 1) == 0))
 
 
@@ -155,7 +155,7 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
         sampled, time, runs = inside["cycle.begins"] | inside["cycle.rests"] & inside["cycle.settled"], dut.time, 1
     else:
         sampled, time, runs = inside["of_released"], inside["frame_clock.time"], inside["started"]
-        late = proof.before(proof.before((inside["cycle.clock"] == dut.derived.row_clocks - 1) & inside["scans"]))
+        late = proof.before(proof.before((inside["clock"] == dut.derived.row_clocks - 1) & inside["scans"]))
         proof.claim(sampled == late)
         _raster_lemmas(proof, inside, dut, late)
     released = released_levels(skin, skin.columns)
@@ -189,7 +189,7 @@ def level_lemmas(proof: Proof, inside: Inside, columns, released: int) -> None:
 
 def _raster_lemmas(proof: Proof, inside: Inside, dut: Scanner, late) -> None:
     """When a sample is on its way, and of what."""
-    clock, settled, slot = inside["cycle.clock"], dut.derived.settle_clocks, dut.derived.row_clocks
+    clock, settled, slot = inside["clock"], dut.derived.settle_clocks, dut.derived.row_clocks
     ended = proof.before((clock == slot - 1) & inside["scans"])
     proof.lemma((clock < slot) & inside["scans"])
     proof.lemma(~ended | (clock == 0))
@@ -201,7 +201,7 @@ def _raster_lemmas(proof: Proof, inside: Inside, dut: Scanner, late) -> None:
 
 
 def _also_in(columns, inside: Inside, clock: int):
-    return columns | (inside["cycle.clock"] == clock).replicate(len(columns))
+    return columns | (inside["clock"] == clock).replicate(len(columns))
 
 
 def _settled(inside: Inside) -> int:

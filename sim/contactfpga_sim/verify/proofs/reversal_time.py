@@ -207,6 +207,10 @@ def rises(proof: Proof, **changes: Any) -> None:
     keep_frames(sheet, spec)
 
 
+def _wakes_alone(inside: Inside):
+    return inside["rests"] & inside["settled"] & inside["touched"][0]
+
+
 def _wakes(inside: Inside):
     return inside["rests"] & inside["touched"].any()
 
@@ -229,7 +233,7 @@ _CONTACT_BUGS = (
     Bug("with the row", Contact, "contact",
         lambda contact, inside: Mux(inside["strobe"] | inside["contact"], contact, 0)),
     Bug("for one clock", Contact, "contact", lambda contact, inside: contact & ~inside["contact"]),
-    Bug("of row 0 alone", ReversalScanner, "clean", lambda _, inside: inside["touched"][0]),
+    Bug("of row 0 alone", ReversalScanner, "wakes", lambda _, inside: _wakes_alone(inside)),
 )  # fmt: skip
 CASES = (
     Case("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **SHORT), 2, _NEXT_BUGS, 32),

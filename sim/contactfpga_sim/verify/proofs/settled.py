@@ -13,6 +13,8 @@ def at_settle_time(proof: Proof, inside: Inside, derived: Derived, slot: Value |
     if not moves_sample(derived):
         return
     settle = derived.settle_clocks
-    proof.lemma((inside["sample_clock"] == settle) & (inside["next_sample_clock"] == settle) & ~inside["early"])
+    part = "cycle." if derived.skin.reads_rows else ""
+    clock, following = inside[f"{part}sample_clock"], inside[f"{part}next_sample_clock"]
+    proof.lemma((clock == settle) & (following == settle) & ~inside[f"{part}early"])
     if slot is not None:
         proof.lemma(inside["sample_due"] == ((slot == settle) | (slot == settle + 1)))
