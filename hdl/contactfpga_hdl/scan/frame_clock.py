@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
+from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS
 from contactfpga_hdl.util.upset import upset_count
 
 RETRY_BIT = 16
@@ -28,7 +28,7 @@ class FrameClock(wiring.Component):
     def __init__(self, skin: Skin, ahead: int = 0):
         self.skin = skin
         self.ahead = ahead
-        self._per_us = Derived(skin).clocks_per_us
+        self._per_us = skin.derived.clocks_per_us
         super().__init__(
             {
                 "runs": In(1, init=1),

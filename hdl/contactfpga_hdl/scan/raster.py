@@ -75,7 +75,7 @@ class Scanner(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(scan_ports(self.derived))
 
     def elaborate(self, platform):

@@ -6,7 +6,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import TIME_BITS, Derived
+from contactfpga.skin.derived import TIME_BITS
 from contactfpga_hdl.scan.frame_clock import RETRY_BIT, FrameClock
 from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways, moves_sample, scan_ports
 from contactfpga_hdl.scan.precharge import Precharge
@@ -45,7 +45,7 @@ class ReversalScanner(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             scan_ports(self.derived)
             | (test_ports(self.derived) if skin.self_test else {})

@@ -5,7 +5,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import row_bits
 from contactfpga_hdl.scan.pins import moves_sample, sample_at_ports
 from contactfpga_hdl.scan.sample_at import SampleAt
@@ -44,7 +43,7 @@ class ReversalCycle(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = derived = Derived(skin)
+        self.derived = derived = skin.derived
         self._settle = settle = derived.settle_clocks
         self._charge = charge = derived.release_clocks - 2
         # Columns are driven as a frame begins, and a clock more; of a charge there is as much by then.

@@ -9,7 +9,6 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import faults_layout
 from contactfpga_hdl.scan.guard import LineFaults
 
@@ -38,7 +37,7 @@ class Checks(wiring.Component):
                 "columns": In(skin.column_lines),
                 "held": In(skin.column_lines),
                 **dict.fromkeys(("asked", "of_rows", "of_guard"), Out(1)),
-                "faults": Out(faults_layout(Derived(skin))),
+                "faults": Out(faults_layout(skin.derived)),
             }
         )
 

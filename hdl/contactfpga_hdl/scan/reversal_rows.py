@@ -35,7 +35,7 @@ class DrivenRows(wiring.Component):
     """Hands on the rows that were driven, and an empty one after a row whose neighbor was not."""
 
     def __init__(self, skin: Skin):
-        super().__init__(offer_ports(Derived(skin)))
+        super().__init__(offer_ports(skin.derived))
 
     def elaborate(self, platform):
         m = Module()
@@ -57,7 +57,7 @@ class AllRows(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        super().__init__(offer_ports(Derived(skin)))
+        super().__init__(offer_ports(skin.derived))
 
     def elaborate(self, platform):
         m = Module()
@@ -126,7 +126,7 @@ class Motion(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         inputs = dict.fromkeys(("begins", "strobe", "pressed"), In(1))
         super().__init__({**inputs, "read": In(skin.rows), "y": In(row_bits(self.derived)), "motion": Out(1)})
 

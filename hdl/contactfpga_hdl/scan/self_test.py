@@ -38,7 +38,7 @@ class SelfTest(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         super().__init__(
             {
                 "command": In(1),

@@ -5,7 +5,7 @@ from amaranth.lib import memory, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import TIME_BITS, Derived
+from contactfpga.skin.derived import TIME_BITS
 from contactfpga.skin.units import digits_of_reading
 from contactfpga.wire.framing import DIGIT_BITS, FLAG_BITS
 from contactfpga.wire.units import KIND_UNITS, SEQUENCE_BITS, TRAILER_DIGITS, plain_bytes
@@ -38,7 +38,7 @@ class UnitPacker(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
+        self.derived = skin.derived
         self._digits = digits_of_reading(self.derived.units.converter.bits)
         super().__init__(
             {
