@@ -6,6 +6,7 @@ import argparse
 
 from contactfpga import terminal
 from contactfpga.robot.haptics import WithReadings
+from contactfpga.robot.ros import MAX_DOMAIN
 from contactfpga.tools.console import flags, interrupt, numbers
 from contactfpga.tools.console.forces import Forces
 
@@ -40,7 +41,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     flags.forces(parser, "Publish forces too")
     domain = "ROS_DOMAIN_ID (default: 0)."
-    parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)
+    parser.add_argument("--domain", type=numbers.whole(0, MAX_DOMAIN), metavar="ID", default=0, help=domain)
     network = "Reach nodes on other computers too; without it only those on this one."
     parser.add_argument("--network", action="store_true", help=network)
     flags.seconds(parser)

@@ -6,8 +6,6 @@ import argparse
 from collections.abc import Callable
 from typing import TypeVar
 
-from contactfpga.design.cover.answer import MAX_LENGTH_M
-from contactfpga.robot.ros import MAX_DOMAIN
 from contactfpga.skin import limits
 
 _Number = TypeVar("_Number", int, float)
@@ -45,7 +43,7 @@ def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
     return read
 
 
-def length(high: float = MAX_LENGTH_M, low: float = MIN_LENGTH_M) -> Callable[[str], float]:
+def length(high: float, low: float = MIN_LENGTH_M) -> Callable[[str], float]:
     """A length in m; who means mm is far outside."""
     return number(low, high, "m", hint=IN_METERS)
 
@@ -77,4 +75,3 @@ CELL = number(-1e300, 1e300)
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
 TURN = number(-7, 7, "rad", hint="angles are in rad, 90 degrees are 1.5708")
-DOMAIN = whole(0, MAX_DOMAIN)

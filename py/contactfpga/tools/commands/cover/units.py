@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 
+from contactfpga.design.cover.answer import MAX_LENGTH_M
 from contactfpga.tools.console import numbers
 
-LENGTH, LENGTH_FROM_0 = numbers.length(), numbers.length(low=0.0)
+LENGTH, LENGTH_FROM_0 = numbers.length(MAX_LENGTH_M), numbers.length(MAX_LENGTH_M, 0.0)
 ALONG = numbers.length(10.0)
 """Along an arm."""
 KG = numbers.number(1e-6, 1e6, "kg")
