@@ -117,7 +117,7 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_the_page_and_its_pictures_are_what_the_study_makes(tmp_path):
-    run = registry.Run(registry.load("arm"))
+    run = registry.StudyRun(registry.load("arm"))
     assert {name: run.text(name) for name in run.study.sections} == {
         name: section("arm.md", name) for name in run.study.sections
     }

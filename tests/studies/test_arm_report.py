@@ -184,4 +184,4 @@ PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert section("arm.md", "set") == tables.set_table(tables.Computed(None, {}, found))
+    assert section("arm.md", "set") == tables.set_table(tables.ArmRuns(None, {}, found))

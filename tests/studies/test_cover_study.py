@@ -15,7 +15,7 @@ from contactfpga.design.cover.task import FOAMS
 from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.cover import formulas, paper, pictures, tables
 
-RUN = registry.Run(registry.load("cover"))
+RUN = registry.StudyRun(registry.load("cover"))
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cover.md").read_text(encoding="utf-8")
 

@@ -17,10 +17,10 @@ from study_pages import section
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.lab import registry
-from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, tables, touch
+from contactfpga_sim.lab.failures import electric, knob_pictures, line, shapes, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
-from contactfpga_sim.lab.failures.uart import Line
+from contactfpga_sim.lab.failures.line import Line
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
@@ -421,7 +421,7 @@ def test_a_picture_shows_every_value(turn):
 @pytest.mark.parametrize("name", KNOBS)
 def test_values_lie_true_to_scale(name):
     values = KNOBS[name].values
-    spans, scale = axes.placed(values, 50.0, 400.0)
+    spans, scale = knob_pictures.placed(values, 50.0, 400.0)
     assert (spans[0].start, spans[-1].end) == (50.0, pytest.approx(450.0))
     first = 1 if "0 stands apart" in scale else 0
     there = np.log10(values[first:]) if scale else np.array(values, float)
@@ -432,10 +432,10 @@ def test_values_lie_true_to_scale(name):
 
 
 def test_zero_and_what_is_unevenly_spaced_are_said():
-    assert axes.placed((0, 1, 2, 3), 0, 100)[1] == ""
-    assert axes.placed((3, 2, 1, 0), 0, 100)[1] == ""
-    assert axes.placed((1, 2, 4, 8), 0, 100)[1] == " (logarithmic)"
-    assert axes.placed((0, 1, 10, 100), 0, 100)[1] == " (logarithmic; 0 stands apart)"
+    assert knob_pictures.placed((0, 1, 2, 3), 0, 100)[1] == ""
+    assert knob_pictures.placed((3, 2, 1, 0), 0, 100)[1] == ""
+    assert knob_pictures.placed((1, 2, 4, 8), 0, 100)[1] == " (logarithmic)"
+    assert knob_pictures.placed((0, 1, 10, 100), 0, 100)[1] == " (logarithmic; 0 stands apart)"
 
 
 @pytest.mark.parametrize(
@@ -450,7 +450,7 @@ def test_zero_and_what_is_unevenly_spaced_are_said():
     ],
 )
 def test_amounts_reach_at_most_the_top_of_the_frame(amounts, ticks):
-    assert axes.rounded_up(amounts) == ticks
+    assert knob_pictures.rounded_up(amounts) == ticks
 
 
 @pytest.mark.campaign

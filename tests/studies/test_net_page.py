@@ -18,7 +18,7 @@ def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, 
     monkeypatch.setattr(load, "measure", measure)
     tables.measured.cache_clear()
     try:
-        run = registry.Run(registry.load("net"))
+        run = registry.StudyRun(registry.load("net"))
         for name in run.study.sections:
             run.text(name)
         tables.draw(tmp_path)

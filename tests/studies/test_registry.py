@@ -12,7 +12,7 @@ from study_pages import DOCS
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
 from contactfpga_sim.lab import meaning, registry, writer
-from contactfpga_sim.lab.registry import Run, Section, Study
+from contactfpga_sim.lab.registry import Section, Study, StudyRun
 
 ROOT = DOCS.parent
 DECLARED = [registry.load(name) for name in registry.STUDIES]
@@ -66,7 +66,7 @@ def test_a_part_of_each_section_that_is_quick_to_make_is_up_to_date(study, name)
     absent = runner.lacking((*study.needs, *study.sections[name].needs))
     if absent:
         pytest.skip(f"needs {', '.join(absent)}")
-    part = Run(study).call(study.sections[name].sample)
+    part = StudyRun(study).call(study.sections[name].sample)
     assert f"\n{part}\n" in f"\n{writer.sections((DOCS / study.page_of(name)).read_text())[name].text}\n"
 
 

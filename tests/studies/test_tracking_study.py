@@ -11,7 +11,7 @@ from study_pages import outdated
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import tables as failures_tables
 from contactfpga_sim.lab.performance.scans import RECORDINGS
-from contactfpga_sim.lab.tracking import breaks, frames, judge, recorded, scenes, scores, speed
+from contactfpga_sim.lab.tracking import breaks, frames, judge, scenes, scores, speed
 from contactfpga_sim.lab.tracking.nearest import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -147,7 +147,7 @@ def test_overlap_links_the_frames_of_a_recording(tmp_path):
         cells[number, 2:4, number : number + 2] = True
         cells[number, 6, 11 - number] = True  # one cell that moves on by one: no overlap, so it is another one
     np.savez(tmp_path / "one.npz", pressed=cells, rate_hz=50.0, pitch_mm=5.0, segment=np.array([0, 0, 0, 1]))
-    first, second = recorded.histories(tmp_path / "one.npz", 1)
+    first, second = scores.histories(tmp_path / "one.npz", 1)
     assert [sorted(shown.truth) for shown in first] == [[0, 1], [0, 2], [0, 3]]
     assert [shown.zones.time_us for shown in first] == [0, 20_000, 40_000]
     assert first[1].truth[0] == (7.5, 12.5)
@@ -161,7 +161,7 @@ def test_on_recordings_it_is_no_worse_than_the_nearest_zone(name):
     path = ROOT / RECORDINGS / f"{name}.dev.npz"
     if not path.is_file():
         pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    stretches = [stretch[:200] for stretch in recorded.histories(path, 1)[:2]]
+    stretches = [stretch[:200] for stretch in scores.histories(path, 1)[:2]]
     ours, nearest = (
         judge.score([judge.followed(make(), one, judge.JUDGED_HZ) for one in stretches])
         for make in judge.TRACKERS.values()

@@ -14,6 +14,6 @@ def section(page, name):
 
 def outdated(study, *names, without=()):
     """Sections of a study, of these names or all, that it would make otherwise now."""
-    run = registry.Run(registry.load(study))
+    run = registry.StudyRun(registry.load(study))
     named = names or [name for name in run.study.sections if name not in without]
     return [name for name in named if run.text(name) != section(run.study.page_of(name), name)]

@@ -14,7 +14,7 @@ from pathlib import Path
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
 from contactfpga_sim.lab import meaning, pool, registry, writer
-from contactfpga_sim.lab.registry import Run, Study
+from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")
 QUICK_MINUTES = 2
@@ -37,14 +37,14 @@ def make(study: Study) -> None:
         writer.page(DOCS / name)
     images = outputs.folder(DOCS / "images", "the folder of the pictures")
     try:
-        _make(study, Run(study), images)
+        _make(study, StudyRun(study), images)
     except ImportError as error:
         if isinstance(error, ContactFPGAError) or (error.name or "").startswith("contactfpga"):
             raise
         raise MissingExtra(study.name, study.extra) from error
 
 
-def _make(study: Study, run: Run, images: Path) -> None:
+def _make(study: Study, run: StudyRun, images: Path) -> None:
     for name, section in study.sections.items():
         page = study.page_of(name)
         if absent := lacking(section.needs):

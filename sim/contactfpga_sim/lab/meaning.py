@@ -15,7 +15,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from contactfpga_sim.lab.registry import Run, Study
+from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.model.board import sources
 
 LENGTH = 8
@@ -35,7 +35,7 @@ def _netlists(study: Study, section: str) -> list[str]:
     from contactfpga_sim.lab import size
 
     with size.keys_alone() as keys, contextlib.redirect_stderr(io.StringIO()):
-        Run(study).text(section)
+        StudyRun(study).text(section)
     return keys
 
 

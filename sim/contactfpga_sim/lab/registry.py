@@ -91,7 +91,7 @@ def load(name: str) -> Study:
     return found
 
 
-class Run:
+class StudyRun:
     """One run of a study: what it computes is computed once, when the first function asks for it."""
 
     def __init__(self, study: Study):

@@ -23,7 +23,7 @@ STEPPED = ("closes_s", "torque_before_nm", "peak_force_n", "rest_s")
 LIMITS_N = (10.0, 15.0, 20.0, 30.0)
 
 
-class Computed(NamedTuple):
+class ArmRuns(NamedTuple):
     """The runs that tables and pictures share."""
 
     plan: latency_charts.Plan
@@ -32,16 +32,16 @@ class Computed(NamedTuple):
     """The paper's experiment by way to the controller."""
 
 
-def compute() -> Computed:
+def compute() -> ArmRuns:
     """Run them."""
     case = Case.load("paper")
     plan = latency_charts.plan(case)
     with executor() as workers, progress() as step:
         points = dict(zip(plan.all, sweep.sweep(plan.all, workers, step)))
-    return Computed(plan, points, report.columns(case, "paper", latency_charts.PAPER_S))
+    return ArmRuns(plan, points, report.columns(case, "paper", latency_charts.PAPER_S))
 
 
-def draw(folder: Path, found: Computed) -> list[Path]:
+def draw(folder: Path, found: ArmRuns) -> list[Path]:
     """Its runs, and force, speed and thickness against latency."""
     charts = latency_charts.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
     return [*run_pictures.pictures(found.columns, folder, ("svg",)), *charts]
@@ -77,7 +77,7 @@ FAILURES = (
 )
 
 
-def set_table(found: Computed) -> str:
+def set_table(found: ArmRuns) -> str:
     """What ``contactfpga study arm`` prints."""
     return writer.table_of(report.table(found.columns, True))
 
@@ -120,7 +120,7 @@ def step_table() -> str:
     return writer.table_of(lines)
 
 
-def sheet_table(found: Computed) -> str:
+def sheet_table(found: ArmRuns) -> str:
     """What the gateware's own runs take from the switch to the controller, and what that costs."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
     bounds = sweep.bounds_s(Case.load("paper"), latency_charts.Skin())
@@ -133,7 +133,7 @@ def sheet_table(found: Computed) -> str:
     return writer.table_of(lines)
 
 
-def speed_table(found: Computed) -> str:
+def speed_table(found: ArmRuns) -> str:
     """How fast the arm may be, by its peak force and, in brackets, by the force at the reaction alone."""
     lines = [["force limit, N", *found.plan.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
     for limit in LIMITS_N:

@@ -34,22 +34,22 @@ OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 """In words."""
 
 
-class Computed(NamedTuple):
+class FlipResults(NamedTuple):
     """What the sections share."""
 
     rows: Sequence[Row]
     designs: Sequence[Design]
 
 
-def compute() -> Computed:
+def compute() -> FlipResults:
     """As many flips as there is time for, and the size of each design."""
     with pool.executor() as executor, pool.progress() as step:
         done = functools.partial(step, "blocks of flips")
         rows = campaign.run(list(DESIGNS), REGISTERS, MEMORIES, executor, done, LONGEST_S)
-    return Computed(rows, summary.measured(DESIGNS))
+    return FlipResults(rows, summary.measured(DESIGNS))
 
 
-def draw(folder: Path, found: Computed) -> list[Path]:
+def draw(folder: Path, found: FlipResults) -> list[Path]:
     """The picture, and all numbers as files beside the page."""
     numbers = folder.parent / "flips"
     campaign.write(found.rows, numbers / "flips.csv")
@@ -60,7 +60,7 @@ def draw(folder: Path, found: Computed) -> list[Path]:
 
 def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
     """All sections of the page, by name."""
-    found = Computed(rows, designs)
+    found = FlipResults(rows, designs)
     return {
         "worst": lambda: worst_text(found),
         "flipped": lambda: designs_table(found),
@@ -69,7 +69,7 @@ def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
     }
 
 
-def worst_text(found: Computed) -> str:
+def worst_text(found: FlipResults) -> str:
     """What the flips of registers and of memories did at worst, with one copy and with two, and how rare that is."""
     rows = found.rows
     groups = [
@@ -100,7 +100,7 @@ def _worst(rows: Sequence[Row]) -> str:
     )
 
 
-def designs_table(found: Computed) -> str:
+def designs_table(found: FlipResults) -> str:
     """A row for each design's registers, and one for its memories."""
     lines = []
     for design in found.designs:
@@ -131,7 +131,7 @@ def _interval(share: summary.Share) -> str:
     return f"{100 * low:.1f} to {100 * high:.1f} %"
 
 
-def modules_table(found: Computed) -> str:
+def modules_table(found: FlipResults) -> str:
     """Registers of the plain designs, by module."""
     plain = [row for row in found.rows if not row.design.endswith("dual") and not row.found.memory]
     lines = []
@@ -143,7 +143,7 @@ def modules_table(found: Computed) -> str:
     return writer.table(MODULES, lines)
 
 
-def ways_table(found: Computed) -> str:
+def ways_table(found: FlipResults) -> str:
     """What is wrong with each design, or reports the flip."""
     lines = []
     for design in found.designs:

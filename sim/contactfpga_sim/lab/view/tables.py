@@ -234,29 +234,29 @@ WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
 """Of the finger that moves, in pitches."""
 
 
-class Computed(NamedTuple):
+class ViewTimes(NamedTuple):
     """What the tables share."""
 
     loads: str
     found: list[Click]
 
 
-def compute() -> Computed:
+def compute() -> ViewTimes:
     """Open the view twice: without a browser, and with one that clicks."""
     with opening.opened(http_port=0) as shown:
         loads = load_table(shown)
     with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
-        return Computed(loads, clicks(shown, visitor))
+        return ViewTimes(loads, clicks(shown, visitor))
 
 
-def loads_table(computed: Computed) -> str:
+def loads_table(times: ViewTimes) -> str:
     """What was measured without a browser."""
-    return computed.loads
+    return times.loads
 
 
-def clicks_table(computed: Computed) -> str:
+def clicks_table(times: ViewTimes) -> str:
     """What was measured with one."""
-    return click_table(computed.found)
+    return click_table(times.found)
 
 
 def draw(folder: Path) -> list[Path]:
