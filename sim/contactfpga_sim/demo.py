@@ -18,7 +18,7 @@ from contactfpga.skin import Skin
 from contactfpga.tools.console import interrupt, outputs, tables
 from contactfpga.wire.protocol import Frame
 from contactfpga_sim.lab import pool
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.golden import Timeline, Trace, predict
 from contactfpga_sim.model.scenes import drawing

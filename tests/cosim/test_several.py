@@ -14,7 +14,7 @@ from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.sheets import Sorter
 from contactfpga.skin.several import Several
 from contactfpga_hdl.several import RoundRobin
-from contactfpga_sim.model.board.several import CompiledSheets
+from contactfpga_sim.model.board.compiled import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.golden.request import request

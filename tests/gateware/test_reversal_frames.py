@@ -8,7 +8,7 @@ from reversal import FAST, slots, small, zones
 
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.received import Receiver
+from contactfpga_sim.model.board.receiver import Receiver
 from contactfpga_sim.model.golden import Timeline, predict, requests
 
 PROJECT, SETTLE, ROW = 24, 12, 20  # clocks: 1 us, 0.5 us, and 0.75 us with a gap of a clock on either side

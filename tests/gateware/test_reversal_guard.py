@@ -12,7 +12,7 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, driven, predict
 from contactfpga_sim.model.golden import reversal_guard as golden_guard
 from contactfpga_sim.model.golden.facts import facts

@@ -14,7 +14,7 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, guard, predict, requests
 from contactfpga_sim.model.golden import reversal_guard as golden_guard
 from contactfpga_sim.model.golden.facts import facts

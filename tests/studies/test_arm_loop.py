@@ -14,7 +14,7 @@ from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.usb import Chip
 from contactfpga_sim.lab.arm.world import Faults
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, predict
 
 SKIN = Skin()

@@ -149,7 +149,7 @@ BUILT = """native._cache_key(__import__('contactfpga_sim.model.board.compiled', 
 def test_what_a_library_is_compiled_from_changes_its_key(copy):
     drivers = copy / "sim/contactfpga_sim/model/board/drivers"
     taken = [*drivers.glob("*.h"), drivers / "board.cpp", drivers.parent / "native.py"]
-    others = [drivers / "label.cpp", drivers.parent / "received.py"]
+    others = [drivers / "label.cpp", drivers.parent / "receiver.py"]
     now, changed = keys(copy, BUILT, [*taken, *others])
     assert len(taken) > 5
     assert [file.name for file, key in changed.items() if key == now] == [file.name for file in others]

@@ -9,7 +9,7 @@ import pytest
 import contactfpga
 from contactfpga import Skin, SkinError
 from contactfpga.driver import health
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.verify.cosim import bench_native

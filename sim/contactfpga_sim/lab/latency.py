@@ -11,7 +11,7 @@ import numpy as np
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.received import Received, Receiver
+from contactfpga_sim.model.board.receiver import Received, Receiver
 
 GOLDEN = 0.6180339887498949
 """Its multiples lie evenly between two instants, whatever their number."""

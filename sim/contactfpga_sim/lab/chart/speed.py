@@ -11,7 +11,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.chart import steady
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, Trace, predict
 from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare

@@ -7,7 +7,7 @@ import bisect
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.model.board.received import Received, frames_in
+from contactfpga_sim.model.board.receiver import Received, frames_in
 from contactfpga_sim.model.golden import Timeline, beginnings, predict, requests
 
 FRAMES = 12

@@ -11,7 +11,7 @@ import numpy as np
 
 from contactfpga_sim.lab.flips import touches
 from contactfpga_sim.lab.flips.reference import AFTER_S, FIRST_S, LAST_S, Heard, Listener, Reference
-from contactfpga_sim.model.board.state import Bit, Place
+from contactfpga_sim.model.board.state import Bit, Storage
 
 SETTLED_STEPS = 4
 """The driver hears this many more once the board is what it was."""
@@ -83,7 +83,7 @@ def follow(reference: Reference, flip: Flip) -> Found:
     return Found(place.name, place.memory, "told" if kind else "masked", kind, 0, 0.0, gone_s)
 
 
-def _silent(place: Place, heard: list[Heard], silent: list[tuple[Heard, str]], gone_s: float) -> Found:
+def _silent(place: Storage, heard: list[Heard], silent: list[tuple[Heard, str]], gone_s: float) -> Found:
     first, last = silent[0][0].time_s, silent[-1][0].time_s
     after = [one.time_s for one in heard if one.time_s > last]
     until = after[0] if after else last

@@ -15,7 +15,7 @@ from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.wire import framing
 from contactfpga_sim.lab.flips import touches
-from contactfpga_sim.model.board.state import Moment, StateBoard
+from contactfpga_sim.model.board.state import Checkpoint, StateBoard
 
 CLOCK_HZ, BAUD = 5_000_000, 1_250_000
 """Five twelfths of the reference Skin's: as many frames are scanned per second, in fewer clocks."""
@@ -79,7 +79,7 @@ def _heard(event: Arrival, now: float, restarts: int) -> Heard:
 class Step(NamedTuple):
     """The beginning of a sheet."""
 
-    moment: Moment
+    moment: Checkpoint
     listener: Listener
     events: np.ndarray
     """Bytes until the next one."""

@@ -12,7 +12,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.adaptive import Scanner
 from contactfpga_sim.model.golden.facts import facts

@@ -1,21 +1,95 @@
-"""A compiled board: the gateware of a Skin as native code, in a sheet of switches, stepped by the clock."""
+"""Compiled boards, of one sheet or of several: gateware as native code in a sheet of switches, stepped by the clock."""
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import threading
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 
+from contactfpga.errors import BoardClosed
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several, sheets_of
 from contactfpga_sim.model.board import native
-from contactfpga_sim.model.board.running import Running
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.sheet.converter import check_simulated
 from contactfpga_sim.model.sheet.line import Line, RowLine
 from contactfpga_sim.model.sheet.matrix import Contention
 from contactfpga_sim.model.sheet.shorts import Shorts
+
+EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
+"""An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
+wire, the byte, the level or the driven lines, the 65th of which is the mark; and for a row whether it is the frame's
+last, for a record or an item whether it is the end mark."""
+
+
+class CompiledModel:
+    """A model, stepped by the clock; cycle 0 is the first after power-up, as in docs/timing.md. Safe for threads.
+
+    ``events``: what the driver can note, in its order.
+    """
+
+    def __init__(self, model: native.Model, events: tuple[str, ...]):
+        self._library = library = native.load(model)
+        for name in ("new", "events"):
+            getattr(library, f"board_{name}").restype = ctypes.c_void_p
+        library.board_cycle.restype = ctypes.c_uint64
+        self._events = events
+        self._lock = threading.RLock()  # a call of another thread would free or run the model under this one's feet
+        self._board: ctypes.c_void_p | None = ctypes.c_void_p(library.board_new())
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        """The driver's function of this name; raises :class:`BoardClosed` where there is no model any more."""
+        with self._lock:
+            if self._board is None:
+                raise BoardClosed("the virtual board was closed; make another one")
+            return getattr(self._library, f"board_{name}")(self._board, *arguments)
+
+    @property
+    def cycle(self) -> int:
+        """The cycle that runs next."""
+        return self._call("cycle")
+
+    def run(self, cycles: int) -> None:
+        """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
+        self._call("run", ctypes.c_uint64(cycles))
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
+        self._call("send", data, ctypes.c_size_t(len(data)))
+
+    def take(self, boundary: str) -> np.ndarray:
+        """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
+        index, count = ctypes.c_uint(self._events.index(boundary)), ctypes.c_size_t()
+        with self._lock:  # the address holds until the model runs on
+            address = self._call("events", index, ctypes.byref(count))
+            events = native.array_at(address, count.value, EVENT)
+            self._call("forget", index)
+        return events
+
+    def receive(self) -> bytes:
+        """The bytes decoded from the line since they were taken last."""
+        return self.take("received")["data"].astype(np.uint8).tobytes()
+
+    def close(self) -> None:
+        """Free the model; every later call raises :class:`BoardClosed`. May be called twice."""
+        with self._lock:
+            if self._board is not None:
+                self._call("free")
+                self._board = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
@@ -23,7 +97,7 @@ the transmit, the contact and the alive pin, of the rows that are driven to the 
 are driven, and bytes decoded from the line. The order is that of the driver."""
 
 
-class CompiledBoard(Running):
+class CompiledBoard(CompiledModel):
     """A compiled board of one sheet.
 
     ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is the gateware, by default what
@@ -116,7 +190,7 @@ class CompiledBoard(Running):
         self._call("load", codes.ctypes.data_as(ctypes.c_void_p))
 
     def run(self, cycles: int) -> None:
-        """As :meth:`Running.run`; raises :class:`Contention` where a column was driven against a row."""
+        """As :meth:`CompiledModel.run`; raises :class:`Contention` where a column was driven against a row."""
         super().run(cycles)
         self._check_pins()
 
@@ -178,6 +252,61 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "PACED": int(skin.derived.units.converter.pace is not None),
         },
     )
+
+
+SHEETS_CAPTURED = ("line", "contact", "received")
+"""Changes of the transmit and of the contact pin, and bytes decoded from the line, in the order of the driver."""
+
+
+class CompiledSheets(CompiledModel):
+    """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on.
+
+    ``model`` is the gateware, by default what :func:`sheets_model` says.
+    """
+
+    def __init__(self, several: Several, model: native.Model | None = None):
+        self.several = several
+        super().__init__(model or sheets_model(several), SHEETS_CAPTURED)
+
+    def restart(self, mutant: int = 0) -> None:
+        """As :meth:`CompiledBoard.restart`."""
+        self._call("restart", ctypes.c_uint(mutant))
+
+    def press(self, number: int, cells: np.ndarray) -> None:
+        """From the next cycle on these (rows, columns) bool cells of a sheet are pressed."""
+        skin = self.several.skins[number]
+        if cells.shape != (skin.rows, skin.columns):
+            raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
+        words = np.ascontiguousarray(to_words(cells))
+        self._call("press", ctypes.c_uint(number), words.ctypes.data_as(ctypes.c_void_p))
+
+
+def sheets_model(several: Several) -> native.Model:
+    """What the board of several sheets is built from."""
+
+    def elaborate() -> Any:
+        from contactfpga_hdl.several import SeveralTop
+
+        return SeveralTop(several)
+
+    keys = "".join(map(native.skin_key, several.skins))
+    return native.Model(
+        title=f"the board of {sheets_of(several.skins)}",
+        driver="several.cpp",
+        key=hashlib.sha256(keys.encode()).hexdigest(),
+        elaborate=elaborate,
+        defines={
+            "BIT_CLOCKS": several.skins[0].derived.bit_clocks,
+            "EACH_SHEET": " ".join(_sheet_entry(number, skin) for number, skin in enumerate(several.skins)),
+        },
+    )
+
+
+def _sheet_entry(number: int, skin: Skin) -> str:
+    """Of a sheet in the driver's list."""
+    sizes = (number, skin.rows, skin.columns, skin.row_chains, skin.column_chains, int(skin.selects_low))
+    lines = (f"LINES({initializer(line_of)[1:-1]})" for line_of in (skin.line_of_row, skin.line_of_column))
+    return f"SHEET({', '.join((*map(str, sizes), *lines))})"
 
 
 def initializer(numbers: Iterable[int]) -> str:

@@ -22,8 +22,7 @@ from contactfpga.design.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga_sim.model.board.several import VirtualSheets
-from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.board.virtual import VirtualBoard, VirtualSheets
 from contactfpga_sim.model.scenes.scene import Source
 
 CHUNK_S = 0.5e-3

@@ -18,7 +18,7 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
-from contactfpga_sim.model.board.received import Receiver
+from contactfpga_sim.model.board.receiver import Receiver
 from contactfpga_sim.model.scenes.recordings import Recording
 
 CHUNK = 256

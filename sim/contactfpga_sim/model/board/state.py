@@ -16,7 +16,7 @@ _WIRE = re.compile(r"^\t(?:/\*output\*/ )?wire<\d+> (\w+);", re.MULTILINE)
 _MEMORY = re.compile(r"^\tmemory<\d+> (\w+) \{ (\d+)u };", re.MULTILINE)
 
 
-class Place(NamedTuple):
+class Storage(NamedTuple):
     """A register or a memory of the gateware."""
 
     name: str
@@ -40,7 +40,7 @@ class Bit(NamedTuple):
     bit: int
 
 
-class Moment:
+class Checkpoint:
     """What a board was at one clock; of use as long as its board is open."""
 
     def __init__(self, board: StateBoard) -> None:
@@ -73,27 +73,27 @@ class StateBoard(CompiledBoard):
             raise ValueError(f"{bit} is outside of {place}")
         self._call("flip", *map(ctypes.c_uint32, bit))
 
-    def moment(self) -> Moment:
+    def moment(self) -> Checkpoint:
         """What the board is now."""
-        return Moment(self)
+        return Checkpoint(self)
 
-    def go_to(self, moment: Moment) -> None:
+    def go_to(self, moment: Checkpoint) -> None:
         """Be what it was then; what was captured since stays."""
         self._call("go_to", ctypes.c_void_p(moment.address))
 
-    def same(self, moment: Moment) -> bool:
+    def same(self, moment: Checkpoint) -> bool:
         """Whether all that follows is what followed then."""
         return bool(self._call("same", ctypes.c_void_p(moment.address)))
 
-    def drop(self, moment: Moment) -> None:
+    def drop(self, moment: Checkpoint) -> None:
         if self._board is not None:
             self._call("drop", ctypes.c_void_p(moment.address))
 
-    def _places(self) -> list[Place]:
+    def _places(self) -> list[Storage]:
         count = ctypes.c_size_t()
         address = self._call("places", ctypes.byref(count))
         array = (_Place * count.value).from_address(address)
-        return [Place(each.name.decode(), each.width, each.depth, each.now == each.next) for each in array]
+        return [Storage(each.name.decode(), each.width, each.depth, each.now == each.next) for each in array]
 
 
 class _Place(ctypes.Structure):

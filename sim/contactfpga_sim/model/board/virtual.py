@@ -1,4 +1,4 @@
-"""The virtual board: a compiled board in simulated time, behind the interface of a serial port."""
+"""The virtual board, of one sheet or of several: compiled gateware in simulated time, as a serial port."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from contactfpga.errors import PortNotFound
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.several import VirtualSheets
+from contactfpga_sim.model.board.compiled import CompiledBoard, CompiledSheets
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.felt import Felt
 from contactfpga_sim.model.scenes.recordings import Recording
@@ -147,6 +146,48 @@ class VirtualBoard:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class VirtualSheets:
+    """A board of several sheets in simulated time, which passes only in :meth:`read`.
+
+    several: the sheets; scenes: what touches each of them, for :func:`contactfpga_sim.model.scenes.scene.scene`.
+    """
+
+    def __init__(self, several: Several, scenes: Sequence[Source]):
+        self.several = several
+        self._scenes = [make_scene(skin, scene) for skin, scene in zip(several.skins, scenes, strict=True)]
+        self._board = CompiledSheets(several)
+        self._chunk = max(1, round(CHUNK_S * several.clock_hz))
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+        self._board.send(data)
+
+    def read(self, seconds: float) -> bytes:
+        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        left = round(seconds * self.several.clock_hz)
+        while True:
+            data = self._board.receive()
+            if data or left <= 0:
+                return data
+            cycles = min(left, self._chunk)
+            self.advance(cycles)
+            left -= cycles
+
+    def advance(self, cycles: int) -> None:
+        """Run clock cycles with the scenes as they are now."""
+        for number, scene in enumerate(self._scenes):
+            self._board.press(number, scene(self.clock()))
+        self._board.run(cycles)
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+        return self._board.cycle / self.several.clock_hz
+
+    def close(self) -> None:
+        """Free the board."""
+        self._board.close()
 
 
 def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga_sim.model.board import compiled, native, several
+from contactfpga_sim.model.board import compiled, native
 
 Design = Skin | Several
 
@@ -85,7 +85,7 @@ class Mutant:
 
 def plain(design: Design) -> native.Model:
     """The board without mutants."""
-    return several.model_of(design) if isinstance(design, Several) else compiled.model_of(design)
+    return compiled.sheets_model(design) if isinstance(design, Several) else compiled.model_of(design)
 
 
 def candidates(design: Design) -> list[Mutant]:

@@ -9,8 +9,7 @@ import numpy as np
 from contactfpga.skin.several import Several
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.board import native
-from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.several import CompiledSheets
+from contactfpga_sim.model.board.compiled import CompiledBoard, CompiledSheets
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.sheet.matrix import Contention
 from contactfpga_sim.verify.cosim import bench_native
