@@ -15,8 +15,9 @@ from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.board import replay
-from contactfpga_sim.model.golden import Timeline, boundaries, cylinder, predict
+from contactfpga_sim.model.golden import Timeline, boundaries, predict
 from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.zones import closed_flood
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
@@ -96,7 +97,7 @@ def test_what_programs_read_is_a_flood_of_the_cylinder(name):
 
 
 def expected_zones(skin, cells):
-    labels, turned = cylinder.flood(cells, skin.connectivity)
+    labels, turned = closed_flood(cells, skin.connectivity)
     for zone, past in enumerate(turned, 1):
         y, x = np.nonzero(labels == zone)
         winding = "ring" if past == len(x) else "wound" if past > len(x) else ""

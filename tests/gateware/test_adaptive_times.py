@@ -10,8 +10,8 @@ from decoded import decoded
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import HelloReader
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.golden import Timeline, predict, requests, seek
-from contactfpga_sim.model.golden.adaptive import Scanner
+from contactfpga_sim.model.golden import Timeline, adaptive, predict, requests
+from contactfpga_sim.model.golden.adaptive import AdaptiveScanModel
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
 from contactfpga_sim.verify.cosim.compare import compare
@@ -23,9 +23,9 @@ TALL = Skin(**SMALL | {"rows": 8})  # compiled once for several tests
 # ---- how many row times a frame takes
 
 
-def frame(rows: int, listed: frozenset[int], pressed: int) -> list[seek.Choice]:
+def frame(rows: int, listed: frozenset[int], pressed: int) -> list[adaptive.Choice]:
     """The slots of a frame; ``pressed`` has a bit for each row that reads pressed."""
-    choices = seek.frame(rows, listed)
+    choices = adaptive.row_choices(rows, listed)
     slots = [next(choices)]
     try:
         while True:
@@ -167,7 +167,7 @@ def test_a_frame_tells_the_time_of_its_first_sample():
     known = facts(skin)
     cells = np.zeros((4, 3), bool)
     cells[[1, 3], 0] = True
-    scanner = Scanner(known, Timeline([(0, cells, None)]), [])
+    scanner = AdaptiveScanModel(known, Timeline([(0, cells, None)]), [])
     for _ in range(20):
         before = len(scanner.slots)
         scan, _ = scanner.frame()

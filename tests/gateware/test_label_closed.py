@@ -6,7 +6,8 @@ import unrolled
 from unrolled import RING, RULES, WOUND, every_frame, recorded, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
-from contactfpga_sim.model.golden import all_departures, cylinder, label
+from contactfpga_sim.model.golden import all_departures, label
+from contactfpga_sim.model.golden.zones import closed_flood
 
 SHAPES = {
     # name: rows, zones with 8-connectivity as (area, sum x counted on past the seam or ring or wound, sum y)
@@ -107,7 +108,7 @@ def test_the_golden_model_floods_a_cylinder(connectivity, columns):
     found = unrolled.of_records(departures.frame, departures.moments, columns)
     assert np.array_equal(found, unrolled.zones(frames, connectivity))
     for index, cells in enumerate(frames):
-        labels, turned = cylinder.flood(cells, connectivity)
+        labels, turned = closed_flood(cells, connectivity)
         records = []
         for zone, past in enumerate(turned, 1):
             y, x = np.nonzero(labels == zone)

@@ -12,7 +12,7 @@ from contactfpga_sim.model.golden import faults
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.hello import State
 from contactfpga_sim.model.golden.link import Link
-from contactfpga_sim.model.golden.request import Heard
+from contactfpga_sim.model.golden.request import Reception
 
 SHEET = {"rows": 4, "columns": 4, "connectivity": 4, "settle_us": 5000, "baud": 6_000_000}
 SKINS = {
@@ -45,7 +45,7 @@ def predicted(skin, frames, changes, asked, cycles):
     told = faults.Told()
     for cycle, word in changes[1:]:
         told.change(cycle, word)
-    link = Link(facts(skin), State(facts(skin), [], Heard([], [])), told)
+    link = Link(facts(skin), State(facts(skin), [], Reception([], [])), told)
     decided = [taken for taken, _ in decisions(skin, frames, None)]
     period = facts(skin).hello_slots // facts(skin).row_lines
     for cycle in sorted([0, *(cycle + 1 for cycle in asked), *(cycle + 1 for cycle in decided[period - 1 :: period])]):

@@ -14,7 +14,7 @@ from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, driven, predict
-from contactfpga_sim.model.golden import reversal_guard as golden_guard
+from contactfpga_sim.model.golden import reversal_lines as golden_guard
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native

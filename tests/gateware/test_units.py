@@ -16,7 +16,7 @@ from contactfpga_sim.model.golden import Timeline, guard, predict, units
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.hello import State
 from contactfpga_sim.model.golden.link import Link
-from contactfpga_sim.model.golden.request import Heard, Request, command
+from contactfpga_sim.model.golden.request import Reception, Request, command
 from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.model.sheet import converter
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
@@ -253,7 +253,7 @@ def test_a_frame_waits_for_one_packet_of_readings_at_most_and_these_for_five_fra
     """Frames come so fast that they fill the line, or leave room."""
     known = facts(Skin(units=8, clock_hz=24_000_000, baud=baud))
     readings = [(2_000 + 3_840 * n, bytes([8] * 26) + b"\0") for n in range(100)]
-    link = Link(known, State(known, [], Heard([], [])), units=readings)
+    link = Link(known, State(known, [], Reception([], [])), units=readings)
     cycle, offered, starts = 1_000, 0, {}
     while cycle < 300_000:
         link.advance(cycle)

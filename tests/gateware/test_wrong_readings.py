@@ -16,7 +16,7 @@ from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, guard, predict, requests
-from contactfpga_sim.model.golden import reversal_guard as golden_guard
+from contactfpga_sim.model.golden import reversal_lines as golden_guard
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.sheet.matrix import Matrix
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native

@@ -21,7 +21,7 @@ from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.hello import State, hello
 from contactfpga_sim.model.golden.link import Link
 from contactfpga_sim.model.golden.packet import Packet, stuff
-from contactfpga_sim.model.golden.request import Heard
+from contactfpga_sim.model.golden.request import Reception
 from contactfpga_sim.model.golden.uart import Byte, line, received
 from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for, stimulus
 
@@ -158,7 +158,7 @@ def test_a_full_block_costs_a_cycle_with_the_byte_behind_it():
 
 def test_link_sends_a_hello_first_and_answers_several_wishes_once():
     known = facts(Skin())
-    link = Link(known, State(known, [], Heard([], [])))
+    link = Link(known, State(known, [], Reception([], [])))
     size = len(hello(known))
     link.want_hello(0)
     link.offer(0, b"f\0")

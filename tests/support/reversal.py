@@ -11,7 +11,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_sim.model.golden import Timeline, guard, requests
-from contactfpga_sim.model.golden import reversal_guard as golden_guard
+from contactfpga_sim.model.golden import reversal_lines as golden_guard
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.verify.cosim import record
 

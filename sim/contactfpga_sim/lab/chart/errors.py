@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from contactfpga.skin import Skin
 from contactfpga_sim.model.golden import label, zones
-from contactfpga_sim.model.golden.divide import barycenter
+from contactfpga_sim.model.golden.frame import barycenter
 from contactfpga_sim.model.scenes.truth import Truth
 
 Z95 = 1.959963984540054

@@ -14,7 +14,7 @@ from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline
-from contactfpga_sim.model.golden.adaptive import Scanner
+from contactfpga_sim.model.golden.adaptive import AdaptiveScanModel
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS
@@ -168,7 +168,9 @@ def gain_row(name: str, frames: np.ndarray) -> str:
     _, rows, columns = frames.shape
     known = facts(adaptive_skin(rows, columns))
     hold = HELD_SCANS * known.scan_clocks
-    scanner = Scanner(known, Timeline([(index * hold, cells, None) for index, cells in enumerate(frames)]), [])
+    scanner = AdaptiveScanModel(
+        known, Timeline([(index * hold, cells, None) for index, cells in enumerate(frames)]), []
+    )
     ends: list[int] = []
     while not ends or ends[-1] < len(frames) * hold:
         scanner.frame()

@@ -1,22 +1,98 @@
-"""The adaptive scanner: its slots, what is sampled in them, and the contact pin."""
+"""The adaptive scan: which rows it drives slot by slot, what is sampled in them, and the contact pin."""
 
 from __future__ import annotations
 
 import bisect
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 
 import numpy as np
 
-from contactfpga_sim.model.golden import debounce, seek
+from contactfpga_sim.model.golden import debounce
 from contactfpga_sim.model.golden.facts import Facts
 from contactfpga_sim.model.golden.request import Request
-from contactfpga_sim.model.golden.scan import Play, Scan, Scanned, ScanRule, last_number
+from contactfpga_sim.model.golden.scan import Play, Scan, ScanOutput, ScanRule, last_number
 from contactfpga_sim.model.golden.trace import Timeline
+
+Choice = tuple[frozenset[int], bool]
+"""The rows of a slot, and whether it is one row driven alone; else it is a probe."""
+
+Choices = Generator[Choice, bool, None]
+"""Yields the choice for each slot; is sent whether any column read pressed in it."""
+
+
+def row_choices(rows: int, listed: frozenset[int]) -> Choices:
+    """The slots of a frame that begins with these rows on the list."""
+    return _RowSearch(rows, listed).slots()
+
+
+class _RowSearch:
+    def __init__(self, rows: int, listed: frozenset[int]):
+        self._rows = rows
+        self._alone = set(listed)
+        self._unknown = set(range(rows)) - listed
+        self._spare = len(self._unknown) - 1
+        self._suspects: set[int] = set()
+        self._searches = 0
+
+    def slots(self) -> Choices:
+        yield from self._look_at_the_rest()
+        while self._alone:
+            row = min(self._alone)
+            self._alone.remove(row)
+            pressed = yield frozenset([row]), True
+            if row in self._suspects:
+                self._suspects.remove(row)
+                if pressed and row + 1 in self._alone | self._unknown:
+                    self._drive_alone({row + 1})
+                    self._suspects.add(row + 1)
+                if not self._suspects:
+                    yield from self._look_at_the_rest()
+
+    def _drive_alone(self, found: set[int]) -> None:
+        self._alone |= found
+        self._unknown -= found
+
+    def _look_at_the_rest(self) -> Choices:
+        if not self._unknown:
+            return
+        if self._spare < 1:
+            self._drive_alone(set(self._unknown))
+            return
+        self._spare -= 1
+        hit = yield frozenset(self._unknown), False
+        if not hit:
+            self._unknown.clear()
+        elif self._searches == 2:
+            self._drive_alone(set(self._unknown))
+        else:
+            self._searches += 1
+            yield from self._search()
+
+    def _search(self) -> Choices:
+        suspects = set(self._unknown)
+        half = 1 << (self._rows - 1).bit_length() >> 1
+        while half > 1:
+            low = {row for row in suspects if not row & half}
+            high = suspects - low
+            half //= 2
+            if not low or not high:
+                continue
+            if self._spare < 1:
+                self._drive_alone(set(self._unknown))
+                return
+            self._spare -= 1
+            if (yield frozenset(low), False):
+                suspects = low
+            else:
+                self._unknown -= low
+                suspects = high
+        self._suspects = suspects
+        self._drive_alone(set(suspects))
 
 
 @dataclasses.dataclass(frozen=True)
-class Slot:
+class RowTime:
     """A row time and the rows that are driven in it."""
 
     begin: int
@@ -29,11 +105,11 @@ class Slot:
     """The cycle in which the next slot begins."""
 
 
-class Scanner:
+class AdaptiveScanModel:
     """Goes through a timeline frame by frame, with the requests in the order in which they were received."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request]):
-        self.slots: list[Slot] = []
+        self.slots: list[RowTime] = []
         """All slots so far."""
         self.contact: list[tuple[int, int]] = []
         """(cycle, level) of every change of the contact pin so far."""
@@ -57,7 +133,7 @@ class Scanner:
         alone_in: dict[int, int] = {}
         stuck = np.zeros(facts.columns, bool)
         first = len(self.slots)
-        choices = seek.frame(facts.rows, self._listed)
+        choices = row_choices(facts.rows, self._listed)
         choice = next(choices)
         while choice:
             rows, alone = choice
@@ -113,11 +189,11 @@ class Scanner:
         facts = self._facts
         end = begin + facts.row_clocks
         if not self._idle(rows):
-            self.slots.append(Slot(begin, rows, strobe, begin + facts.settle, end))
+            self.slots.append(RowTime(begin, rows, strobe, begin + facts.settle, end))
         elif hit:
-            self.slots.append(Slot(begin, rows, strobe, strobe + 1, strobe + 1 + facts.release))
+            self.slots.append(RowTime(begin, rows, strobe, strobe + 1, strobe + 1 + facts.release))
         else:
-            self.slots.append(Slot(begin, rows, strobe, end, end))
+            self.slots.append(RowTime(begin, rows, strobe, end, end))
 
     def _idle(self, rows: frozenset[int]) -> bool:
         return len(rows) == self._facts.rows
@@ -174,7 +250,7 @@ class Scanner:
         return self._answered > before
 
 
-def driven(facts: Facts, slots: Iterable[Slot]) -> list[tuple[int, int]]:
+def driven(facts: Facts, slots: Iterable[RowTime]) -> list[tuple[int, int]]:
     """(cycle, rows) of every change of the rows that are driven; bit r is row r."""
     changes: list[tuple[int, int]] = []
     for slot in slots:
@@ -198,12 +274,12 @@ class Adaptive(ScanRule):
     def frame_slots(self, facts: Facts) -> int:
         return facts.rows + 2 * facts.halvings + 2
 
-    def scan(self, play: Play) -> Scanned:
-        scanner, beginnings = Scanner(play.facts, play.timeline, play.requests), [play.facts.row_shift]
+    def scan(self, play: Play) -> ScanOutput:
+        scanner, beginnings = AdaptiveScanModel(play.facts, play.timeline, play.requests), [play.facts.row_shift]
         while beginnings[-1] <= play.cycles:
             play.stages.frame(*scanner.frame())
             beginnings.append(scanner.slots[-1].end)
-        return Scanned(scanner.contact, driven(play.facts, scanner.slots), beginnings)
+        return ScanOutput(scanner.contact, driven(play.facts, scanner.slots), beginnings)
 
 
 ADAPTIVE = Adaptive()

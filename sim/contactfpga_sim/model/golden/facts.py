@@ -5,13 +5,14 @@ Worked out here a second time, in exact fractions, so that a slip in the gatewar
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import functools
 import hashlib
 import json
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,6 +35,23 @@ def upwards(value: Fraction) -> int:
 def downwards(value: Fraction) -> int:
     """The next whole number downward. A billionth below one does not count."""
     return math.floor(value + Fraction(1, 10**9))
+
+
+class ScanTiming(abc.ABC):
+    """The part of a scan's golden rule that clocks and widths depend on."""
+
+    even: bool
+    """Every frame takes the same time, every row once."""
+    waits: bool
+    """It waits for the stages after it, and the link counts no frames but time."""
+
+    @abc.abstractmethod
+    def choice(self, facts: Facts) -> int:
+        """Clocks that the scan takes to choose its next rows."""
+
+    @abc.abstractmethod
+    def frame_slots(self, facts: Facts) -> int:
+        """The most row times that a frame takes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,9 +147,9 @@ class Facts:
         return 0 if self.skin.column_read == "direct" else self.shift_bit
 
     @functools.cached_property
-    def scan(self) -> Any:
-        """The rule of the Skin's scan, a :class:`~contactfpga_sim.model.golden.scan.ScanRule`; it asks for facts."""
-        return scans.find(self.skin.scan).load_golden()
+    def scan(self) -> ScanTiming:
+        found: ScanTiming = scans.find(self.skin.scan).load_golden()
+        return found
 
     @functools.cached_property
     def halvings(self) -> int:
@@ -212,10 +230,10 @@ class Facts:
         return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
 
     @property
-    def keep_alive_turns(self) -> int:
-        """The same for a scan that waits, in turns of 1024 us."""
-        turns = exact(self.skin.keep_alive_ms) * 1000 / 1024
-        return downwards(turns) - 1 - math.ceil(2 * self.scan_clocks / Fraction(1024 * self.clocks_per_us))
+    def keep_alive_periods(self) -> int:
+        """The same for a scan that waits, in periods of 1024 us."""
+        periods = exact(self.skin.keep_alive_ms) * 1000 / 1024
+        return downwards(periods) - 1 - math.ceil(2 * self.scan_clocks / Fraction(1024 * self.clocks_per_us))
 
     @functools.cached_property
     def press_ticks(self) -> int:

@@ -12,7 +12,7 @@ from contactfpga_sim.model.golden.packet import Packet
 KIND, SLOT = 9, 1
 
 
-class Told:
+class FaultHistory:
     """What a scan knows of its lines, a word, by cycle; 0 until it says otherwise."""
 
     def __init__(self) -> None:
@@ -63,11 +63,11 @@ class Reports:
     over; while none is, the place of cycle t is t modulo a power of two, and a digit that would not be the one sent
     last makes a report due two cycles later."""
 
-    def __init__(self, facts: Facts, told: Told):
+    def __init__(self, facts: Facts, told: FaultHistory):
         self._facts = facts
         self._told = told
         self._places = -(-facts.fault_bits // 7)
-        self._turn = 1 << math.ceil(math.log2(self._places + 2))
+        self._period = 1 << math.ceil(math.log2(self._places + 2))
         self._since = 0
         self._handed: Sequence[int] | None = None
         self._due: int | None = None
@@ -108,7 +108,7 @@ class Reports:
         found = []
         for begin, end, word in self._told.between(self._since, last):
             for place, digit in enumerate(_digits(word, self._facts.fault_bits), 1):
-                cycle = begin + (place - begin) % self._turn
+                cycle = begin + (place - begin) % self._period
                 if digit != sent[place - 1] and cycle <= end:
                     found.append(cycle + 2)
         return min(found, default=None)

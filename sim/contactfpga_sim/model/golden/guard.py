@@ -37,7 +37,7 @@ def stuck(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
     return lines
 
 
-class Told:
+class FaultyLines:
     """Faulty lines as the board tells them."""
 
     def __init__(self, facts: Facts):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contactfpga.choices import converters
 from contactfpga_sim.model.golden.facts import Facts
 from contactfpga_sim.model.golden.packet import Packet
-from contactfpga_sim.model.golden.request import Heard
+from contactfpga_sim.model.golden.request import Reception
 from contactfpga_sim.model.golden.scan import Scan
 
 KIND = 4
@@ -58,7 +58,7 @@ def _units(facts: Facts) -> bytes:
 class State:
     """The counters that a hello tells, by cycle."""
 
-    def __init__(self, facts: Facts, scanned: Sequence[Scan], heard: Heard):
+    def __init__(self, facts: Facts, scanned: Sequence[Scan], heard: Reception):
         self._facts = facts
         self._scanned = scanned
         self._heard = heard

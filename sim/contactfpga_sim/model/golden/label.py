@@ -1,6 +1,6 @@
 """When a labeller emits its zones: where zones end is geometry, how many clocks that takes is the labeller's rule in
-docs/timing.md. The clocks of ``run``, clusters and steps, are here, those of ``serial`` in :mod:`label_serial`;
-labellers that are not exact have their own idea of a zone in :mod:`label_shadows`."""
+docs/timing.md: clusters and steps of ``run``, columns of ``serial``. Labellers that are not exact, ``projection`` and
+``single``, have their own idea of a zone."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.model.golden import cylinder, label_serial, volume
+from contactfpga_sim.model.golden import volume
 from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
-from contactfpga_sim.model.golden.zones import flood, moments
+from contactfpga_sim.model.golden.zones import closed_flood, flood, moments
 
 StripClocks = Callable[[np.ndarray, int], tuple[np.ndarray, int, int]]
 
@@ -40,7 +40,7 @@ def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks, close
     shape = cells.shape
     above = np.vstack([np.zeros((1, shape[1]), bool), cells])
     strips = [strip_clocks(above[y : y + 2], connectivity) for y in range(shape[0])]
-    labels, turned = cylinder.flood(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
+    labels, turned = closed_flood(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
     above_labels = np.vstack([np.zeros((1, shape[1]), int), labels])
     departures = []
     for zone in range(1, len(turned) + 1):
@@ -97,16 +97,93 @@ def runs(row: np.ndarray) -> int:
     return int(row[0]) + int(np.sum(row[1:] & ~row[:-1]))
 
 
+def serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
+    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
+    when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
+
+    The first is a (2, C) int array, 0 where nothing is pressed.
+    """
+    labels, count = flood(strip, connectivity)
+    columns = [np.nonzero(labels == cluster)[1] for cluster in range(1, count + 1)]
+    first, last = [column.min() for column in columns], [column.max() for column in columns]
+    clocks = np.ones(strip.shape[1], int)
+    for x in range(strip.shape[1]):
+        begins = strip[:, x] & ~(strip[:, x - 1] if x else np.zeros(2, bool))
+        right_behind = x in first and x - 1 in last
+        clocks[x] += begins[0] or (begins[1] and right_behind)
+    done = np.cumsum(clocks)  # the clock of a column's last cell or run
+    leaves = np.zeros(strip.shape, int)
+    for cluster in range(count):
+        leaves[labels == cluster + 1] = done[last[cluster]] + 1
+    over = int(done[-1]) + 2
+    return leaves, over, over
+
+
+def closed_serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
+    """The same where the ends meet: two clocks more after the last column if cells are joined over the seam."""
+    leaves, busy, end = serial_clocks(strip, connectivity)
+    first, last = strip[:, 0], strip[:, -1]
+    seam = 2 if (first.any() and last.any() if connectivity == 8 else (first & last).any()) else 0
+    leaves[:, -1][last] += seam
+    return leaves, busy + seam, end + seam
+
+
+def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
+    """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band.
+    ``connectivity`` makes no difference."""
+    rows, columns = cells.shape
+    pressed = np.any(cells, axis=1)
+    walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
+    departures = []
+    for first, past in _runs(pressed):
+        closing = min(past, rows - 1)
+        for left, right in _runs(np.any(cells[first:past], axis=0)):
+            box = np.zeros_like(cells)
+            box[first:past, left:right] = cells[first:past, left:right]
+            departures.append(Departure(closing, right + 2, *_moments(box)))
+    return _work(walks, columns, departures)
+
+
+def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
+    """All pressed cells of an (R, C) bool frame as one zone. ``connectivity`` makes no difference."""
+    rows, columns = cells.shape
+    any_pressed = bool(cells.any())
+    walks = [*np.any(cells[:-1], axis=1).tolist(), any_pressed]
+    departures = [Departure(rows - 1, columns + 2, *_moments(cells))] if any_pressed else []
+    return _work(walks, columns + 1, departures)
+
+
+def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labelling:
+    """A row that is walked takes this many clocks more; the end mark comes three clocks after the last row's walk."""
+    steps = [clocks if walk else 0 for walk in walks]
+    return Labelling(tuple(step + 1 for step in steps), steps[-1] + 3, tuple(departures))
+
+
+def _runs(line: np.ndarray) -> list[tuple[int, int]]:
+    """(first, past the last) of the runs of ones."""
+    edges = np.flatnonzero(np.diff(np.pad(line.astype(int), 1)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _moments(cells: np.ndarray) -> tuple[int, int, int]:
+    y, x = np.nonzero(cells)
+    return len(x), int(x.sum()), int(y.sum())
+
+
+PROJECTION = LabellerRule(projection)
+SINGLE = LabellerRule(single)
+
+
 RUN = LabellerRule(
     functools.partial(exact, strip_clocks=run_clocks),
     volume.run_clocks,
     LabellerRule(functools.partial(exact, strip_clocks=closed_run_clocks, closed=True), volume.closed_run_clocks),
 )
 SERIAL = LabellerRule(
-    functools.partial(exact, strip_clocks=label_serial.cluster_clocks),
-    label_serial.strip_clocks,
+    functools.partial(exact, strip_clocks=serial_clocks),
+    volume.serial_clocks,
     LabellerRule(
-        functools.partial(exact, strip_clocks=label_serial.closed_cluster_clocks, closed=True),
-        label_serial.closed_strip_clocks,
+        functools.partial(exact, strip_clocks=closed_serial_clocks, closed=True),
+        volume.closed_serial_clocks,
     ),
 )

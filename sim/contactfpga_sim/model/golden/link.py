@@ -1,14 +1,87 @@
-"""Link: hellos, reports of faults, frames and readings of units take turns on the wire; the newest complete frame
-waits, and the newest sweep of all units."""
+"""Link: hellos, reports of faults, frames and readings of units share the wire; the newest complete frame waits, and
+the newest sweep of all units. Several sheets share one line, round-robin."""
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Sequence
+from typing import Protocol
 
 from contactfpga_sim.model.golden.facts import Facts
-from contactfpga_sim.model.golden.faults import Reports, Told, report, slot
+from contactfpga_sim.model.golden.faults import FaultHistory, Reports, report, slot
 from contactfpga_sim.model.golden.hello import DIGITS, State, hello
-from contactfpga_sim.model.golden.turns import Line
+
+
+class Sender(Protocol):
+    """A sheet's link, as the line sees it."""
+
+    def waits_from(self, cycle: int) -> int | None:
+        """The cycle from which on something waits, as far as is known in ``cycle``; None: nothing does."""
+
+    def take(self, taken: int, cycle: int) -> None:
+        """Send what is next from the cycle ``taken`` on."""
+
+
+class SharedLine:
+    """Asks one sheet per cycle, round and round, until the one asked sends a packet; then the next one is asked.
+
+    Each sheet's time moves forward by :meth:`advance`. What the line takes is known up to the cycle that all of them
+    have reached, so whoever is ahead waits there for the threads of the others.
+    """
+
+    def __init__(self, sheets: int):
+        self.links: dict[int, Sender] = {}
+        """By the number of the sheet."""
+        self.idle_from = 0
+        """The cycle from which on a packet can be taken."""
+        self.uart_from = 0
+        """The cycle from which on a byte can be handed over."""
+        self._sheets = sheets
+        self._first_asked = 0
+        """The sheet asked in the cycle ``idle_from``."""
+        self._reached = [-1.0] * sheets
+        self._changed = threading.Condition()
+
+    def advance(self, number: int, cycle: int) -> None:
+        """Let the line take what it takes up to and including ``cycle``."""
+        with self._changed:
+            self._reach(number, cycle)
+            while min(self._reached) < cycle:
+                self._changed.wait()
+
+    def leave(self, number: int) -> None:
+        """A sheet's time is over: nobody waits for it any more."""
+        with self._changed:
+            self._reach(number, math.inf)
+
+    def _reach(self, number: int, cycle: float) -> None:
+        """Nobody but this sheet moves on to a cycle that is not yet reached by all, so their links stand still."""
+        before, self._reached[number] = min(self._reached), cycle
+        known = min(self._reached)
+        if known > before or self._sheets == 1:
+            self._take_to(known)
+            self._changed.notify_all()
+
+    def _take_to(self, cycle: float) -> None:
+        if cycle == math.inf:
+            return
+        known = int(cycle)
+        while waiting := [found for number in self.links if (found := self._first(number, known)) is not None]:
+            taken, number = min(waiting)
+            if taken > known:
+                return
+            self._first_asked = (number + 1) % self._sheets
+            self.links[number].take(taken, known)
+
+    def _first(self, number: int, known: int) -> tuple[int, int] | None:
+        """When something of this sheet is taken, if nothing of another one is before; and the sheet."""
+        wait = self.links[number].waits_from(known)
+        if wait is None:
+            return None
+        cycle = max(self.idle_from, wait)
+        asked = self._first_asked + cycle - self.idle_from
+        return cycle + (number - asked) % self._sheets, number
 
 
 class Link:
@@ -23,9 +96,9 @@ class Link:
         self,
         facts: Facts,
         state: State,
-        told: Told | None = None,
+        told: FaultHistory | None = None,
         units: Sequence[tuple[int, bytes]] = (),
-        line: Line | None = None,
+        line: SharedLine | None = None,
     ):
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
@@ -39,7 +112,7 @@ class Link:
         """Hellos whose state is not filled in: where they begin in ``bytes``, when they were taken, how many frames
         had been sent."""
         self._frame: tuple[int, bytes] | None = None
-        self._reports = Reports(facts, told or Told()) if facts.fault_bits else None
+        self._reports = Reports(facts, told or FaultHistory()) if facts.fault_bits else None
         self._reported: list[int] = []
         """Where reports begin in ``bytes``; they are not filled in either."""
         self._after_report = -1
@@ -51,7 +124,7 @@ class Link:
         """Sweeps that were taken, or replaced by one that was."""
         self._frames_since = 0
         """Frames that went since the last sweep did."""
-        self._line = line or Line(1)
+        self._line = line or SharedLine(1)
         self._number = 0 if facts.place is None else facts.place[0]
         self._line.links[self._number] = self
 

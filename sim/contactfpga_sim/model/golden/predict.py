@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.model.golden import divide, label, request, safe, scan, uart, units
+from contactfpga.choices import scans
+from contactfpga_sim.model.golden import label, request, scan, uart, units
 from contactfpga_sim.model.golden.facts import Facts, facts
-from contactfpga_sim.model.golden.faults import Told
-from contactfpga_sim.model.golden.frame import Items, Packer, Queue, join
+from contactfpga_sim.model.golden.faults import FaultHistory
+from contactfpga_sim.model.golden.frame import Divider, Items, Packer, Queue, join
 from contactfpga_sim.model.golden.hello import State
-from contactfpga_sim.model.golden.link import Link
+from contactfpga_sim.model.golden.link import Link, SharedLine
 from contactfpga_sim.model.golden.trace import Timeline, Trace
-from contactfpga_sim.model.golden.turns import Line
 from contactfpga_sim.model.golden.work import Departure
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
+import bisect
+from collections.abc import Iterable
 
 
 def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
@@ -37,7 +39,7 @@ def predict_several(skins: Sequence[Skin], timelines: Sequence[Timeline], cycles
     others where it shares the line with them.
     """
     known = [Facts(skin, (number, len(skins))) for number, skin in enumerate(skins)]
-    line = Line(len(skins))
+    line = SharedLine(len(skins))
     with ThreadPoolExecutor(len(skins)) as pool:
         plays = [pool.submit(_play_one, line, *one, cycles) for one in zip(known, timelines, strict=True)]
         played = [play.result() for play in plays]
@@ -45,14 +47,14 @@ def predict_several(skins: Sequence[Skin], timelines: Sequence[Timeline], cycles
     contact: list[tuple[int, int]] = []
     for trace, link in played:
         trace.bytes, trace.line = link.bytes, sent
-        contact = safe.either(contact, trace.contact)
-    contact = safe.later(contact)
+        contact = _either(contact, trace.contact)
+    contact = _later(contact)
     for trace, _ in played:
         trace.contact = contact
     return [trace.until(cycles) for trace, _ in played]
 
 
-def _play_one(line: Line, known: Facts, timeline: Timeline, cycles: int) -> tuple[Trace, Link]:
+def _play_one(line: SharedLine, known: Facts, timeline: Timeline, cycles: int) -> tuple[Trace, Link]:
     assert known.place is not None
     try:
         return _play(known, timeline, cycles, line)[:2]
@@ -70,37 +72,40 @@ def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
     return _play(facts(skin), timeline, cycles)[2].beginnings
 
 
-def _play(known: Facts, timeline: Timeline, cycles: int, line: Line | None = None) -> tuple[Trace, Link, scan.Scanned]:
+def _play(
+    known: Facts, timeline: Timeline, cycles: int, line: SharedLine | None = None
+) -> tuple[Trace, Link, scan.ScanOutput]:
     skin = known.skin
     heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands), known.closing)
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
-    told = Told()
+    told = FaultHistory()
     pressed = units.play(known, timeline, heard.requests, cycles)
     link = Link(known, State(known, frames, heard), told, pressed.packets, line)
     half_second = 2**19 * known.clocks_per_us
     timed = range(half_second + 1, cycles, half_second) if known.scan.waits else ()
     for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):
         link.want_hello(cycle)
-    packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
-    stages = Stages(known, trace, packer, frames, told, link)
-    scanned = known.scan.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
+    packer = Packer(known, link, Divider(known, trace) if known.divided else Queue())
+    stages = Pipeline(known, trace, packer, frames, told, link)
+    rule: scan.ScanRule = scans.find(skin.scan).load_golden()
+    scanned = rule.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
-    faulty = safe.fault(frames, stages.told)
-    touched = safe.either(scanned.contact, pressed.over)
+    faulty = _fault(frames, stages.told)
+    touched = _either(scanned.contact, pressed.over)
     unwatched = [(0, 1), *((cycle, 1 - level) for cycle, level in pressed.armed)] if skin.units else []
     if skin.fail_safe:
-        touched = safe.either(touched, safe.either(faulty, unwatched))
-    trace.contact = safe.later(touched) if skin.fail_safe or skin.units else touched
-    trace.alive = safe.alive(known, sorted(stages.well), faulty, cycles) if skin.alive else []
+        touched = _either(touched, _either(faulty, unwatched))
+    trace.contact = _later(touched) if skin.fail_safe or skin.units else touched
+    trace.alive = _alive(known, sorted(stages.well), faulty, cycles) if skin.alive else []
     return trace, link, scanned
 
 
-class Stages:
+class Pipeline:
     """The stages after the scan: rows are handed over, records leave, frames are packed; all noted in a trace."""
 
     def __init__(
-        self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: Told, link: Link
+        self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: FaultHistory, link: Link
     ):
         self._facts = facts
         self._reported = reported
@@ -139,11 +144,11 @@ class Stages:
         work = self.labelling(cells)
         handed = []
         for row, offered in enumerate(one.offered):
-            cycle = max(max(offered, self._handed + 1) + self._late * (row in one.alone), self._free)
-            handed.append(self._hand_over(cycle, cells[row], row == self._facts.rows - 1))
+            last = row == self._facts.rows - 1
+            handed.append(self.hand_over(self.taken(offered), cells[row], row in one.alone, last))
             if self._facts.zones:
-                self._free = cycle + work.busy[row]
-        self._end(one, cells, cells, range(self._facts.rows), handed, work)
+                self.keep_busy(handed[-1] + work.busy[row])
+        self.end(one, cells, cells, range(self._facts.rows), handed, work)
 
     def labelling(self, cells: np.ndarray) -> label.Labelling:
         """The labeller's work on rows that are handed over as a frame."""
@@ -155,16 +160,26 @@ class Stages:
         """The cycle from which on a frame is due, for a scan that waits."""
         return self._packer.due
 
-    def rows(self) -> Rows:
+    def rows(self) -> RowPipeline:
         """The rows of the next frame, for a scan that waits until a row is taken."""
-        return Rows(self._facts, self)
+        return RowPipeline(self._facts, self)
 
-    def _hand_over(self, cycle: int, cells: np.ndarray, last: bool) -> int:
+    def taken(self, offered: int) -> int:
+        """The cycle in which a row that is offered from a cycle on is taken; at most one is in a clock."""
+        return max(offered, self._handed + 1)
+
+    def hand_over(self, taken: int, cells: np.ndarray, alone: bool, last: bool, earliest: int = 0) -> int:
+        """Hand a row that was taken to the labeller, a row driven alone through the debounce; returns the cycle."""
+        cycle = max(taken + self._late * alone, self._free, earliest)
         self._handed = cycle
         self._trace.rows.append((cycle, _word(cells), last))
         return cycle
 
-    def _end(
+    def keep_busy(self, until: int) -> None:
+        """The labeller takes no row before this cycle."""
+        self._free = until
+
+    def end(
         self,
         one: scan.Scan,
         cells: np.ndarray,
@@ -198,10 +213,10 @@ class Stages:
         return join(tuple(fields))[0]
 
 
-class Rows:
+class RowPipeline:
     """A frame row by row: an empty one parts rows that are no neighbors, so a zone lies in rows without a gap."""
 
-    def __init__(self, facts: Facts, stages: Stages):
+    def __init__(self, facts: Facts, stages: Pipeline):
         self._facts = facts
         self._stages = stages
         self._cells: list[np.ndarray] = []
@@ -211,19 +226,19 @@ class Rows:
     def take(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> int:
         """Hand over a row, its (C,) cells debounced; returns the cycle in which the scan's offer is taken."""
         stages = self._stages
-        taken = max(offered, stages._handed + 1)
-        cycle = max(taken + stages._late * alone, stages._free, self._counted() if cells.any() else 0)
+        taken = stages.taken(offered)
+        cycle = stages.hand_over(taken, cells, alone, last, self._counted() if cells.any() else 0)
         self._cells.append(cells)
         self._places.append(place)
-        self._handed.append(stages._hand_over(cycle, cells, last))
+        self._handed.append(cycle)
         if self._facts.zones:
-            stages._free = cycle + self._work([*self._cells, np.zeros_like(cells)]).busy[len(self._cells) - 1]
-        return taken if alone and stages._late else cycle
+            stages.keep_busy(cycle + self._work([*self._cells, np.zeros_like(cells)]).busy[len(self._cells) - 1])
+        return taken if alone and self._facts.debounced else cycle
 
     def end(self, one: scan.Scan, cells: np.ndarray) -> int:
         """The frame is complete; returns the cycle from which the next one may begin."""
         rows = self._cells
-        return self._stages._end(one, cells, np.array(rows), self._places, self._handed, self._work(rows))
+        return self._stages.end(one, cells, np.array(rows), self._places, self._handed, self._work(rows))
 
     def _work(self, rows: list[np.ndarray]) -> label.Labelling:
         return self._stages.labelling(np.array(rows))
@@ -257,3 +272,59 @@ def _sum_y(zone: Departure, taken: np.ndarray, places: Sequence[int]) -> int:
 
 def _word(cells: np.ndarray) -> int:
     return int(np.sum(1 << np.nonzero(cells)[0].astype(object)))
+
+
+TICK_US = 1000
+
+
+def _fault(scanned: Iterable[scan.Scan], told: scan.Changes) -> scan.Changes:
+    """(cycle, level) of every change of whether the board knows of a fault: by a frame's tag, or by what is told of
+    lines."""
+    marks = [(one.told, 0, one.fault) for one in scanned] + [(cycle, 1, word > 0) for cycle, word in told]
+    by_tag = by_lines = False
+    levels = []
+    for cycle, of_lines, level in sorted(marks):
+        by_tag, by_lines = (by_tag, level) if of_lines else (level, by_lines)
+        levels.append((cycle, int(by_tag or by_lines)))
+    return _changes(levels)
+
+
+def _either(one: scan.Changes, other: scan.Changes) -> scan.Changes:
+    """Of a level that is high while one of two is."""
+    cycles = sorted({cycle for cycle, _ in (*one, *other)})
+    return _changes((cycle, _level(one, cycle) | _level(other, cycle)) for cycle in cycles)
+
+
+def _later(level: scan.Changes) -> scan.Changes:
+    """The same from a register."""
+    return [(cycle + 1, high) for cycle, high in level]
+
+
+def _alive(facts: Facts, well: Sequence[int], faulty: scan.Changes, cycles: int) -> scan.Changes:
+    """Of the alive pin, for the rising cycles in which the sheet was ``well``."""
+    period, level, changes = TICK_US * facts.clocks_per_us, 0, []
+    for tick in range(period - 1, cycles, period):
+        last = bisect.bisect_left(well, tick) - 1  # the last time before the tick, as a later one is after more faults
+        seen = well[last] if last >= 0 else -1
+        if seen >= max(0, tick - period) and not _level(faulty, seen) and not _rises(faulty, seen, tick - 1):
+            level ^= 1
+            changes.append((tick + 1, level))
+    return changes
+
+
+def _level(changes: scan.Changes, cycle: int) -> int:
+    index = bisect.bisect_right(changes, cycle, key=lambda change: change[0]) - 1
+    return changes[index][1] if index >= 0 else 0
+
+
+def _rises(changes: scan.Changes, begin: int, end: int) -> bool:
+    return any(begin < cycle <= end and level for cycle, level in changes)
+
+
+def _changes(levels: Iterable[tuple[int, int]]) -> scan.Changes:
+    """Those of (cycle, level) that differ from the one before, the last one of each cycle; low at first."""
+    found: scan.Changes = []
+    for cycle, level in dict(levels).items():
+        if level != (found[-1][1] if found else 0):
+            found.append((cycle, level))
+    return found

@@ -10,9 +10,9 @@ import numpy as np
 from contactfpga_sim.model.golden import guard
 from contactfpga_sim.model.golden.debounce import debounced
 from contactfpga_sim.model.golden.facts import Facts
-from contactfpga_sim.model.golden.guard import Told, closed, stuck
+from contactfpga_sim.model.golden.guard import FaultyLines, closed, stuck
 from contactfpga_sim.model.golden.request import Request
-from contactfpga_sim.model.golden.scan import Changes, Play, Scan, Scanned, ScanRule, early_clocks, last_number
+from contactfpga_sim.model.golden.scan import Changes, Play, Scan, ScanOutput, ScanRule, early_clocks, last_number
 from contactfpga_sim.model.golden.trace import Timeline
 
 
@@ -28,7 +28,7 @@ class Raster(ScanRule):
     def frame_slots(self, facts: Facts) -> int:
         return facts.row_lines
 
-    def scan(self, play: Play) -> Scanned:
+    def scan(self, play: Play) -> ScanOutput:
         facts, frames = play.facts, play.cycles // play.facts.scan_clocks + 1
         scanned = scans(facts, play.timeline, play.requests, frames)
         counted = debounced(
@@ -44,7 +44,7 @@ class Raster(ScanRule):
             start = facts.row_shift + slot * facts.row_clocks
             driven += [(start, 1 << _line(facts, slot)), (start + facts.settle, 0)]
         beginnings = [facts.row_shift + number * facts.scan_clocks for number in range(frames + 1)]
-        return Scanned(contact(facts, scanned), driven, beginnings)
+        return ScanOutput(contact(facts, scanned), driven, beginnings)
 
 
 RASTER = Raster()
@@ -148,7 +148,7 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
     checked in a frame that is sampled early."""
     if not facts.skin.guard:
         return [[]] * count
-    told, result = Told(facts), []
+    told, result = FaultyLines(facts), []
     for frame in range(count):
         changes, renews = [], _renews(facts, frame)
         slots = row_slots(facts, frame)
@@ -171,11 +171,11 @@ def _renews(facts: Facts, frame: int) -> bool:
     which ends with its last row's strobe."""
     late = facts.column_shift + (facts.rows - 1) * facts.row_clocks
 
-    def turns(ended: int) -> int:
+    def retries(ended: int) -> int:
         return (
             0
             if ended < 0
             else (strobe(facts, row_slots(facts, ended)[-1]) - late) // (guard.RETRY_US * facts.clocks_per_us)
         )
 
-    return turns(frame - 1) != turns(frame - 2)
+    return retries(frame - 1) != retries(frame - 2)

@@ -27,7 +27,7 @@ class Request:
 
 
 @dataclasses.dataclass(frozen=True)
-class Heard:
+class Reception:
     """What the board makes of the bytes at its receive pin."""
 
     requests: list[Request]
@@ -88,10 +88,10 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
 
 def heard(
     received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False, closing: bytes = b""
-) -> Heard:
+) -> Reception:
     """Requests, and on a board that takes them ``commands``, among (cycle, bytes), each of which begin at the pin back
     to back in that cycle; ``closing``: of those for this one of several sheets."""
-    found = Heard([], [])
+    found = Reception([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):
         in_number = packet is not None and 1 <= len(packet) <= 3

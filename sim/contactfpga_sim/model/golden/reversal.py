@@ -6,15 +6,12 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.model.golden import debounce, reversal_guard
+from contactfpga_sim.model.golden import debounce, reversal_lines
 from contactfpga_sim.model.golden.facts import Facts
 from contactfpga_sim.model.golden.guard import closed, stuck
-from contactfpga_sim.model.golden.handed import Handed
-from contactfpga_sim.model.golden.held import Held
 from contactfpga_sim.model.golden.request import Request
-from contactfpga_sim.model.golden.reversal_guard import Checks
-from contactfpga_sim.model.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, early_clocks, last_number
-from contactfpga_sim.model.golden.self_test import SelfTest
+from contactfpga_sim.model.golden.reversal_lines import GuardChecks, SelfTestModel, StuckColumns
+from contactfpga_sim.model.golden.scan import Changes, Play, Rows, Scan, ScanOutput, ScanRule, early_clocks, last_number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +29,46 @@ class Slot:
         return self.sample + 2
 
 
-class Scanner:
+class RowOffers:
+    """Which rows of a frame are offered: where zones are found those that were driven, each with an empty one after it
+    whose neighbor is not; otherwise all."""
+
+    def __init__(self, facts: Facts, rows: Rows):
+        self.taken = 0
+        """The cycle in which the last one was taken."""
+        self._facts = facts
+        self._rows = rows
+        self._place = 0
+        self._nothing = np.zeros(facts.columns, bool)
+
+    def driven(self, row: int, cells: np.ndarray, offered: int, following: int | None) -> None:
+        if self._facts.zones:
+            self._offer(row, cells, offered, True, following is None)
+            if following is not None and following != row + 1:
+                self._offer(row + 1, self._nothing, self.taken + 1, False, False)
+            return
+        self._all_until(row, offered)
+        self._offer(row, cells, max(offered, self.taken + 1), True, row == self._facts.rows - 1)
+        if following is None:
+            self._all_until(self._facts.rows, offered)
+
+    def nothing(self, offered: int) -> None:
+        if self._facts.zones:
+            self._offer(0, self._nothing, offered, False, True)
+        else:
+            self._all_until(self._facts.rows, offered)
+
+    def _all_until(self, end: int, offered: int) -> None:
+        while self._place < end:
+            last = self._place == self._facts.rows - 1
+            self._offer(self._place, self._nothing, max(offered, self.taken + 1), False, last)
+
+    def _offer(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> None:
+        self.taken = self._rows.take(place, cells, offered, alone, last)
+        self._place = place + 1
+
+
+class ReversalScanModel:
     """Goes through a timeline frame by frame; the stages say when they take a row and a frame."""
 
     def __init__(self, play: Play):
@@ -51,9 +87,9 @@ class Scanner:
         self._listens = 1  # the first cycle in which all columns are driven and rows let go
         self._packed = 0  # the cycle from which on a frame may begin
         self._rests = False
-        self._held = Held(facts, play.timeline)
-        self.checks = Checks(facts, play.timeline, self._held) if facts.skin.guard else None
-        self.test = SelfTest(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
+        self._held = StuckColumns(facts, play.timeline)
+        self.checks = GuardChecks(facts, play.timeline, self._held) if facts.skin.guard else None
+        self.test = SelfTestModel(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
 
     def frame(self) -> None:
         """The next frame."""
@@ -142,9 +178,9 @@ class Scanner:
 
     def _watch(self, begin: int, end: int) -> None:
         """The sheet rests in these cycles; without guard lines that is told now and then."""
-        turn = reversal_guard.CHECK_US * self._facts.clocks_per_us
+        period = reversal_lines.CHECK_US * self._facts.clocks_per_us
         if not self.checks:
-            for cycle in range(-(-begin // turn) * turn, end + 1, turn):
+            for cycle in range(-(-begin // period) * period, end + 1, period):
                 self._stages.watch(cycle)
 
     def _wake(self, touched: int) -> int:
@@ -189,8 +225,8 @@ class Scanner:
 
     def _first_touched(self, begin: int, end: int) -> int | None:
         """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
-        turns = {begin, *self._changes, *self._held.driven_anew(begin, end)}
-        return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
+        changes = {begin, *self._changes, *self._held.driven_anew(begin, end)}
+        return next((cycle for cycle in sorted(changes) if begin <= cycle <= end and self._touched(cycle)), None)
 
     # ---- rows that are driven
 
@@ -198,7 +234,7 @@ class Scanner:
         """Drives the rows and fills in ``cells``; returns (R, C) bool: what counts, debounced."""
         facts = self._facts
         counted = np.zeros_like(cells)
-        handed = Handed(facts, rows)
+        offers = RowOffers(facts, rows)
         begin = begun + max(4, facts.precharge - facts.project)
         ahead = early_clocks(facts, self._requests, begun)
         for row in todo:
@@ -212,10 +248,10 @@ class Scanner:
             self._busy = busy if facts.debounced else frozenset()
             counted[row] = counts[row]
             following = min((other for other in todo if other > row), default=None)
-            handed.driven(row, counted[row], slot.strobe + 1, following)
-            begin = max(slot.begin + facts.row_clocks, handed.taken + 4)
+            offers.driven(row, counted[row], slot.strobe + 1, following)
+            begin = max(slot.begin + facts.row_clocks, offers.taken + 4)
         if not todo:
-            handed.nothing(begun + 1)
+            offers.nothing(begun + 1)
         else:
             self._listens = self.slots[-1].end + 2
             if self.checks:
@@ -244,8 +280,8 @@ class Reversal(ScanRule):
     def frame_slots(self, facts: Facts) -> int:
         return facts.rows + -(-facts.project // facts.row_clocks)
 
-    def scan(self, play: Play) -> Scanned:
-        scanner, facts = Scanner(play), play.facts
+    def scan(self, play: Play) -> ScanOutput:
+        scanner, facts = ReversalScanModel(play), play.facts
         while not scanner.begun or scanner.begun[-1] <= play.cycles:
             scanner.frame()
         slots = [(slot.begin, slot.end, slot.row) for slot in scanner.slots]
@@ -254,7 +290,7 @@ class Reversal(ScanRule):
         driven = [change for begin, end, row in slots for change in ((begin, 1 << row), (end + 1, 0))]
         if scanner.test:
             driven = sorted(driven + scanner.test.discharged)
-        return Scanned(scanner.contact, driven, scanner.begun)
+        return ScanOutput(scanner.contact, driven, scanner.begun)
 
 
 REVERSAL = Reversal()

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.facts import Facts, ScanTiming
 from contactfpga_sim.model.golden.request import Request
 from contactfpga_sim.model.golden.trace import Timeline
 
@@ -38,7 +38,7 @@ class Scan:
     alone: frozenset[int]
     """Rows that were driven alone."""
     faults: int = 0
-    """What was told of faulty lines when it ended, as :attr:`contactfpga_sim.model.golden.guard.Told.word` has it."""
+    """What was told of faulty lines when it ended: :attr:`contactfpga_sim.model.golden.guard.FaultyLines.word`."""
 
     motion: bool = False
     """A row read touched as the frame began, and empty when it was driven."""
@@ -54,7 +54,7 @@ Changes = list[tuple[int, int]]
 
 
 @dataclasses.dataclass(frozen=True)
-class Scanned:
+class ScanOutput:
     """What a scan does at the pins in the cycles it was asked for, and beyond."""
 
     contact: Changes
@@ -115,24 +115,11 @@ class Play:
     stages: Stages
 
 
-class ScanRule(abc.ABC):
+class ScanRule(ScanTiming):
     """The golden rule of a scan."""
 
-    even: bool
-    """Every frame takes the same time, every row once."""
-    waits: bool
-    """It waits for the stages after it, and the link counts no frames but time."""
-
     @abc.abstractmethod
-    def choice(self, facts: Facts) -> int:
-        """Clocks that the scan takes to choose its next rows."""
-
-    @abc.abstractmethod
-    def frame_slots(self, facts: Facts) -> int:
-        """The most row times that a frame takes."""
-
-    @abc.abstractmethod
-    def scan(self, play: Play) -> Scanned:
+    def scan(self, play: Play) -> ScanOutput:
         """The frames of all its cycles, or more; each is handed to its stages."""
 
 

@@ -6,22 +6,20 @@ import bisect
 import dataclasses
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from contactfpga.choices import converters
 from contactfpga_sim.model.golden.facts import Facts
 from contactfpga_sim.model.golden.packet import Packet
 from contactfpga_sim.model.golden.request import Request
-
-if TYPE_CHECKING:
-    from contactfpga_sim.model.golden.scan import Changes
-    from contactfpga_sim.model.golden.trace import Timeline
+from contactfpga_sim.model.golden.scan import Changes
+from contactfpga_sim.model.golden.trace import Timeline
 
 KIND, OVER, ARMED = 8, 1, 2
 SET_ZERO, SET_THRESHOLD, SET_SUM_THRESHOLD = 3, 4, 5
 
 
-class Taken(NamedTuple):
+class UnitSample(NamedTuple):
     """A unit's reading."""
 
     sampled: int
@@ -59,14 +57,14 @@ class ConverterRule:
         between = self.levels * self.level(facts)
         return between, between * facts.skin.units
 
-    def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
+    def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[UnitSample]]:
         """The sweeps that begin before ``cycles``."""
         level, begin = self.level(facts), self.first(facts)
         while begin < cycles:
             sweep = []
             for _ in range(facts.skin.units):
                 sampled = begin + self.sampled * level
-                sweep.append(Taken(sampled, begin + self.last_bit * level + 2, sampled // facts.clocks_per_us))
+                sweep.append(UnitSample(sampled, begin + self.last_bit * level + 2, sampled // facts.clocks_per_us))
                 begin += self.levels * level
             yield sweep
 
@@ -101,7 +99,7 @@ class PacedRule:
         """Cycles from one unit to the next, and from sweep to sweep."""
         return 0, 2 * self.periods * self.pace(facts)
 
-    def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
+    def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[UnitSample]]:
         """The first two conversions are left out; the n-th is that of what was there one and a half periods before."""
         whole, pace, level = self.spans(facts)[1], self.pace(facts), self.level(facts)
         late_us = round(1.5e6 * whole / facts.skin.clock_hz)
@@ -110,7 +108,7 @@ class PacedRule:
             time_us = (ready + 3) // facts.clocks_per_us - late_us
             sampled = ready - 3 * whole // 2
             yield [
-                Taken(sampled, ready + 6 + (unit + 2) * self.word_levels * level, time_us)
+                UnitSample(sampled, ready + 6 + (unit + 2) * self.word_levels * level, time_us)
                 for unit in range(facts.skin.units)
             ]
             ready += whole

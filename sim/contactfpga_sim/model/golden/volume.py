@@ -1,6 +1,6 @@
 """Zones and labeller timing of very many frames at once, for volume tests.
 
-The same rules as :mod:`zones` and :mod:`label`, written for arrays: (N, R, C) bool frames go in.
+The same rules as :mod:`zones` and :mod:`label`, written a second time, for arrays: (N, R, C) bool frames go in.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.model.golden import cylinder_volume
 from contactfpga_sim.model.golden.work import LabellerRule
 
 _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
@@ -29,7 +28,7 @@ class Departures:
     """(n,) int64: in which clock after the one in which that row was handed over it leaves."""
     moments: np.ndarray
     """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave. Where the sheet's ends
-    meet (n, 4), with :func:`contactfpga_sim.model.golden.cylinder.turned`."""
+    meet (n, 4), with :func:`contactfpga_sim.model.golden.zones.turned`."""
 
     def sorted_moments(self) -> np.ndarray:
         """The moments, sorted by area, sum x, sum y within each frame instead."""
@@ -110,7 +109,7 @@ def _clocks(
 
 def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller, closed: bool) -> Departures:
     count, rows, columns = frames.shape
-    labels, turns, disagree = cylinder_volume.labels(frames, connectivity) if closed else _flat(frames, connectivity)
+    labels, turns, disagree = closed_labels(frames, connectivity) if closed else _flat(frames, connectivity)
     roots, zone = np.unique(labels[frames], return_inverse=True)
     frame, y, x = np.nonzero(frames)
     total = len(roots)
@@ -124,7 +123,7 @@ def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | 
         np.maximum.at(clock, zone[near], last_clock[frame[near], leaves[zone[near]], x[near]])
     fields = [np.bincount(zone, weight, total) for weight in (np.ones(len(y)), x, y)]
     if closed:
-        fields.append(cylinder_volume.turned(zone, turns[frames], disagree[frames], rows * columns))
+        fields.append(turned(zone, turns[frames], disagree[frames], rows * columns))
     moments = np.stack(fields, axis=1)
     owner = roots // (rows * columns)
     order = np.lexsort((clock, leaves, owner))
@@ -177,3 +176,90 @@ def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray
     steps = steps + joined
     last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
     return last_step + 2, steps + 1, steps + 3
+
+
+def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of (N, R, C) bool frames, (N, R, C) int64 each: for a pressed cell the least index, over all frames, of its
+    zone's cells, else -1; on which turn it lies, seen from that cell; and 1 where a neighbor disagrees about that.
+
+    The least label spreads to neighbors, and the turn with it, until nothing changes.
+    """
+    nothing = frames.size
+    least = np.where(frames, np.arange(nothing).reshape(frames.shape), nothing)
+    turns = np.zeros(frames.shape, int)
+    steps = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if connectivity == 8 or (dy == 0) != (dx == 0)]
+    changes = True
+    while changes:
+        changes = False
+        for step in steps:
+            other, turn = _beside(least, step, nothing), _beside(turns, step, 0) - _crossed(frames, step)
+            nearer = frames & (other < least)
+            if nearer.any():
+                changes = True
+                least, turns = np.where(nearer, other, least), np.where(nearer, turn, turns)
+    disagree = np.zeros(frames.shape, int)
+    for step in steps:
+        turn = _beside(turns, step, 0) - _crossed(frames, step)
+        disagree |= frames & _beside(frames, step, 0).astype(bool) & (turn != turns)
+    return np.where(frames, least, -1), turns, disagree
+
+
+def turned(zone: np.ndarray, turns: np.ndarray, disagree: np.ndarray, most: int) -> np.ndarray:
+    """(n,) int64, of all pressed cells the number of their zone, from 0 to n - 1, and what :func:`closed_labels` says
+    of them: what the records say of the turns. ``most``: the sheet's cells."""
+    count = int(zone.max(initial=-1)) + 1
+    lowest, highest = np.full(count, len(turns)), np.full(count, -len(turns))
+    np.minimum.at(lowest, zone, turns)
+    np.maximum.at(highest, zone, turns)
+    area = np.bincount(zone, minlength=count)
+    upper = np.bincount(zone, turns > lowest[zone], count).astype(int)
+    upper[highest - lowest > 1] = (1 << most.bit_length()) - 1
+    ring = np.bincount(zone, disagree, count) > 0
+    upper[ring] = area[ring]
+    return upper
+
+
+def _beside(cells: np.ndarray, step: tuple[int, int], outside: int) -> np.ndarray:
+    """What lies a step further, above the first and below the last row ``outside``."""
+    dy, dx = step
+    found = np.roll(cells, -dx, axis=2).astype(int)
+    if dy:
+        found = np.roll(found, -dy, axis=1)
+        found[:, -1 if dy > 0 else 0] = outside
+    return found
+
+
+def _crossed(frames: np.ndarray, step: tuple[int, int]) -> np.ndarray:
+    """(C,) int64: 1 where the step goes over the seam to the next turn, -1 where it goes to the one before."""
+    crossed = np.zeros(frames.shape[2], int)
+    if step[1]:
+        crossed[-1 if step[1] > 0 else 0] = step[1]
+    return crossed
+
+
+def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
+    above = np.zeros_like(frames)
+    above[:, 1:] = frames[:, :-1]
+    above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
+    more = above & ~above_left
+    if connectivity == 4:
+        more |= frames & ~left & above_left & ~above
+        joined = frames & left | above & above_left
+    else:
+        joined = (frames | above) & (left | above_left)
+    leaves = np.cumsum(1 + more, axis=2) + 1
+    busy = leaves[..., -1] + 1
+    for column in range(frames.shape[2] - 2, -1, -1):
+        leaves[..., column] = np.where(joined[..., column + 1], leaves[..., column + 1], leaves[..., column])
+    return leaves * (frames | above), busy, busy
+
+
+def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """:func:`serial_clocks` where the ends meet."""
+    leaves, busy, end = serial_clocks(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    seam = 2 * (ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
+    leaves[..., -1] += seam * (before | frames)[..., -1]
+    return leaves, busy + seam, end + seam

@@ -18,7 +18,7 @@ class Departure:
     sum_x: int
     sum_y: int
     turned: int = 0
-    """Where the sheet's ends meet: :func:`contactfpga_sim.model.golden.cylinder.turned`."""
+    """Where the sheet's ends meet: :func:`contactfpga_sim.model.golden.zones.turned`."""
 
 
 @dataclasses.dataclass(frozen=True)

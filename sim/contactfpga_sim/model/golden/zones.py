@@ -1,4 +1,4 @@
-"""Zones by flood fill over the whole frame."""
+"""Zones by flood fill over the whole frame, and over the unrolled cylinder of a sheet whose ends meet."""
 
 from __future__ import annotations
 
@@ -44,3 +44,51 @@ def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
     """Area, sum x, sum y of every zone of an (R, C) bool frame, sorted."""
     labels, count = flood(np.asarray(cells, bool), connectivity)
     return sorted(moments(labels, zone) for zone in range(1, count + 1))
+
+
+def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
+    """Label the connected pieces of an (R, C) bool array whose last column is a neighbor of the first.
+
+    Returns an (R, C) int array, 0 where nothing is pressed and 1 to n elsewhere, and what a record says of the turns of
+    each piece, :func:`turned`.
+    """
+    columns = cells.shape[1]
+    labels = np.zeros(cells.shape, int)
+    pieces: list[int] = []
+    for y, x in zip(*map(np.ndarray.tolist, np.nonzero(cells)), strict=True):
+        if not labels[y, x]:
+            unrolled, ring = _unroll(cells, connectivity, (y, x))
+            for row, column in unrolled:
+                labels[row, column] = len(pieces) + 1
+            pieces.append(turned([place // columns for place in unrolled.values()], ring, cells.size))
+    return labels, pieces
+
+
+def turned(turns: list[int], ring: bool, most: int) -> int:
+    """How many of a piece's cells lie on the upper one of its two turns: fewer than there are. As many as there are: it
+    is a ring; all ones, in the bits that the number of the sheet's cells takes: it needs more than two turns."""
+    lowest = min(turns)
+    if ring:
+        return len(turns)
+    if max(turns) - lowest > 1:
+        return int("1" * len(f"{most:b}"), 2)
+    return sum(turn - lowest for turn in turns)
+
+
+def _unroll(cells: np.ndarray, connectivity: int, seed: tuple[int, int]) -> tuple[dict[tuple[int, int], int], bool]:
+    """The piece of a cell: of each of its cells a column counted on past the seam, and whether a way leads round."""
+    rows, columns = cells.shape
+    unrolled = {seed: seed[1]}
+    todo = [(seed[0], seed[1])]
+    ring = False
+    while todo:
+        y, place = todo.pop()
+        for dy, dx in EDGES + (CORNERS if connectivity == 8 else ()):
+            cell = (y + dy, (place + dx) % columns)
+            if not (0 <= y + dy < rows and cells[cell]):
+                continue
+            if cell not in unrolled:
+                unrolled[cell] = place + dx
+                todo.append((y + dy, place + dx))
+            ring |= unrolled[cell] != place + dx
+    return unrolled, ring

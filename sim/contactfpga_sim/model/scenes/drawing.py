@@ -14,8 +14,7 @@ from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.model.golden import cylinder
-from contactfpga_sim.model.golden.zones import flood
+from contactfpga_sim.model.golden.zones import closed_flood, flood
 
 COLORS = style.PALETTE[:6]
 """Of the zones: those that show on dark terminals, too."""
@@ -53,7 +52,7 @@ def _sheet(out: Drawn, unicode: bool) -> Text:
 
 
 def _labels(out: Drawn) -> np.ndarray:
-    find = cylinder.flood if out.skin.closed else flood
+    find = closed_flood if out.skin.closed else flood
     return find(out.cells, out.skin.connectivity)[0]
 
 
