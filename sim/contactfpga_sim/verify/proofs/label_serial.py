@@ -13,8 +13,15 @@ from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.turned import TurnedRow, empty_row, next_row, turned_rows_agree, turns_are_known
-from contactfpga_sim.verify.proofs.zones import OpenRow, open_rows_agree
+from contactfpga_sim.verify.proofs.zones import (
+    OpenRow,
+    TurnedRow,
+    empty_row,
+    next_row,
+    open_rows_agree,
+    turned_rows_agree,
+    turns_are_known,
+)
 
 
 def _skin(rows: int, columns: int, connectivity: int, closed: bool) -> Skin:

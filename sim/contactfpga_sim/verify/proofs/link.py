@@ -1,16 +1,19 @@
-"""The link after the packer: which frame is sent, and that its bytes are those that were packed."""
+"""The link after the packer: which frame is sent, and that its bytes are those that were packed; what it sends unasked;
+and that the odometer's digits are the counts."""
 
 from functools import partial
+from typing import Any
 from unittest import mock
 
-from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
+from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
 from contactfpga_hdl.link.link import HELLO_REGION, Link, hello_words, offset_bits, stored_hello
-from contactfpga_hdl.link.odometer import LIVE_DIGITS
+from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -229,8 +232,110 @@ _BUGS = (
 )  # fmt: skip
 _HELLO = protocol.encode_hello(_SKIN)
 _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames after it
+
+
+def first_is_sent(proof: Proof, **changes: Any) -> None:
+    """Free: when it is decided about frames, and what these say. Given: each took a row time or more.
+
+    Claimed: no frame is left out before one was sent. So from a restart on, which begins with all registers of the link
+    as at power-up, a frame is packed before any is left out: where ``contact`` waits for the first frame, it can wait
+    for its ``commit``.
+    """
+    dut = Link(Skin(rows=2, columns=2, send="on_change", **changes))
+    inside = proof.put(dut)
+    for port, name in ((dut.summary, "summary"), (dut.tag, "tag"), (dut.time, "time")):
+        proof.m.d.comb += Value.cast(port).eq(proof.free(Value.cast(port).shape(), name))
+    decide, sends = dut.frames.decide, dut.frames.verdict.send
+    proof.m.d.comb += decide.eq(proof.free(1, "decide"))
+    if changes["scan"] == "adaptive":
+        proof.given(dut.tag.slots != 0)
+    sent = Signal(name="sent_one")
+    proof.m.d.sync += sent.eq(sent | decide & sends)
+    proof.claim(~decide | sends | sent)
+    derived = dut.derived
+    due = ("turns", derived.keep_alive_turns) if derived.scan.waits else ("pause", derived.keep_alive_frames - 1)
+    proof.lemma(sent | (inside[due[0]] == due[1]))
+
+
+_FIRST_BUGS = (
+    Bug("a hello counts for it", Link, "due", lambda due, inside: due & inside["hello_due"]),
+    Bug("the time runs out", Link, "pause", lambda _, inside: inside["pause"] + 1),
+)
+
+
+_REST, _READ, _WRITE, _CLEAR = range(4)
+
+
+def digits_are_the_counts(proof: Proof, counter: str) -> None:
+    """Free: pulses of both counters at any time, hold, and the place that is read. Assumed: no pulse comes while one of
+    its kind waits.
+
+    Claimed: once the digits were cleared, and with no carry under way or waiting, the digits of the counter make up how
+    many pulses there were, modulo what they can hold; ``digit`` is that of the place a clock before; other places hold
+    0.
+    """
+    m = proof.m
+    dut = Odometer()
+    inside = proof.put(dut)
+    for port, name in ((dut.sent, "sent"), (dut.epoch, "epoch"), (dut.hold, "hold"), (dut.place, "place")):
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    state, at = inside["carry_state"], inside["at"]
+    waits = {"sent": inside["sent_waits"], "epoch": inside["epoch_waits"]}
+    proof.given(~(dut.sent & waits["sent"]) & ~(dut.epoch & waits["epoch"]))
+    first, last = (LIVE_DIGITS, SENT_DIGITS - 1) if counter == "sent" else (SENT_DIGITS, SENT_DIGITS + EPOCH_DIGITS - 1)
+    words = {place: inside.word("digits", Const(place, 4)) for place in range(16)}
+    value = Cat(words[place] for place in range(first, last + 1))
+    counted = Signal(len(value), name="counted")
+    with m.If(getattr(dut, counter)):
+        m.d.sync += counted.eq(counted + 1)
+    ours = (at >= first) & (at <= last)
+    carry = Signal(len(value), name="carry")
+    for place in range(first, last + 1):
+        with m.If((state != _REST) & (state != _CLEAR) & (at == place)):
+            m.d.comb += carry.eq(1 << DIGIT_BITS * (place - first))
+    with m.If((state == _REST) & ~waits[counter]):
+        proof.claim(value == counted)
+    with m.If(proof.before(state == _REST)):
+        before = proof.before(dut.place)
+        for place in range(16):
+            with m.If((before == place) & (state == _REST)):
+                proof.claim(dut.digit == words[place])
+    for place in (*range(LIVE_DIGITS), *range(SENT_DIGITS + EPOCH_DIGITS, 16)):
+        proof.claim((words[place] == 0) | (state == _CLEAR))
+    with m.If(state == _CLEAR):
+        proof.lemma(counted == waits[counter])
+        for place, word in words.items():
+            proof.lemma((word == 0) | (place >= at))
+    with m.Else():
+        proof.lemma((value + carry + waits[counter])[: len(value)] == counted)
+        proof.lemma((state == _REST) | ours | _others(at, counter))
+    with m.If(state == _WRITE):
+        read = Signal(DIGIT_BITS, name="read")
+        for place, word in words.items():
+            with m.If(at == place):
+                m.d.comb += read.eq(word)
+        proof.lemma(dut.digit == read)
+
+
+def _others(at, counter: str):
+    low, high = (SENT_DIGITS, SENT_DIGITS + EPOCH_DIGITS - 1) if counter == "sent" else (LIVE_DIGITS, SENT_DIGITS - 1)
+    return (at >= low) & (at <= high)
+
+
+_ODOMETER_BUGS = (
+    Bug("the epoch begins a place late", Odometer, "at",
+        lambda at, inside: at + ((inside["carry_state"] == _REST) & (at == SENT_DIGITS) & (inside["at"] != at))),
+    Bug("a pulse is lost while the other counter's waits", Odometer, "epoch_waits",
+        lambda waits, inside: waits & ~((inside["carry_state"] == _REST) & inside["sent_waits"])),
+)  # fmt: skip
 CASES = (
     Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3, campaign=True),
     Case("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
          _BUGS, bug_clocks=40),
+    Case("the first frame is sent", "raster", partial(first_is_sent, scan="raster"), 2, _FIRST_BUGS),
+    Case("the first frame is sent", "adaptive", partial(first_is_sent, scan="adaptive"), 2),
+    Case("the first frame is sent", "line reversal", partial(first_is_sent, scan="reversal", precharge_us=1.0), 2),
+    Case("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
+    Case("digits are the counts", "epoch", partial(digits_are_the_counts, counter="epoch"), 2, _ODOMETER_BUGS,
+         bug_clocks=30),
 )  # fmt: skip

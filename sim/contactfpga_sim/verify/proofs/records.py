@@ -14,15 +14,18 @@ from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import mask_of_first_cluster, rows_into, skin_of
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.turned import (
+from contactfpga_sim.verify.proofs.zones import (
+    OpenRow,
+    RowStep,
     TurnedRow,
     empty_row,
     flood_around,
+    flood_fill,
     next_row,
+    open_rows_agree,
     turned_rows_agree,
     turns_are_known,
 )
-from contactfpga_sim.verify.proofs.zones import OpenRow, RowStep, flood_fill, open_rows_agree
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:

@@ -1,9 +1,10 @@
-"""The UART's framing."""
+"""The UART's framing, and pulses that are read by their length."""
 
 from functools import partial
 
 from amaranth.hdl import Array, Cat, Const, Mux, Signal
 
+from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -55,8 +56,63 @@ _BUGS = (
     Bug("taken a bit early", Transmitter, "bytes__ready",
         lambda ready, inside: ready | (inside["bits_left"] == 2) & (inside["clock"] == 0)),
 )  # fmt: skip
+
+
+def read_by_length(proof: Proof, bit_clocks: int) -> None:
+    """Free: the level of the pin.
+
+    Claimed: a bit or a mark comes where the level, two clocks late, rises, and in no other clock. The low level before
+    is up to 3 bits long for a one, over 7 for a zero, and between for a mark. ``good`` comes a clock after the eighth
+    bit since a byte or a mark, at once for a mark between bytes, and a clock after ``bad`` for one in a byte.
+    """
+    m = proof.m
+    dut = PulseReceiver(bit_clocks)
+    inside = proof.put(dut)
+    pin = proof.free(1, "pin")
+    m.d.comb += dut.pin.eq(pin)
+    one, mark = 3 * bit_clocks, 7 * bit_clocks
+    level = proof.before(proof.before(pin, init=1), init=1)
+    past = Signal(mark + 1, init=(1 << mark + 1) - 1)  # levels before, the last one lowest
+    m.d.sync += past.eq(Cat(level, past))
+    rises = level & ~past[0]
+    short, long = past[: one + 1].any(), ~past.any()
+    is_bit, is_mark = rises & (short | long), rises & ~short & ~long
+    bits = Signal(range(9))  # of the byte so far, or all of one that is whole
+    begun = Mux(bits == 8, 0, bits)
+    with m.If(is_bit):
+        m.d.sync += bits.eq(begun + 1)
+    with m.Elif(is_mark | (bits == 8)):
+        m.d.sync += bits.eq(0)
+    proof.claim(dut.bits.bit == is_bit)
+    with m.If(is_bit):
+        proof.claim((dut.bits.level == short) & (dut.bits.index == begun))
+    cut = is_mark & (bits != 0)
+    was_cut = proof.before(cut)
+    proof.claim(dut.bits.good == ((bits == 8) | was_cut | is_mark & (bits == 0)))
+    proof.claim(dut.bits.bad == cut)
+    proof.lemma((bits <= 8) & (inside["bits__index"] == bits[:3]) & (inside["whole"] == (was_cut | (bits == 8))))
+    for length in range(mark + 2):
+        ended = past[length] if length <= mark else 1
+        with m.If(~past[:length].any() & ended):
+            proof.lemma(inside["low"] == length)
+    with m.If((bits == 8) | was_cut):
+        proof.lemma(past[0])
+
+
+_PULSE_BUGS = (
+    Bug("a mark has to last a clock longer", PulseReceiver, "mark", lambda mark, inside: mark & (inside["low"] != 7)),
+    Bug("a mark within a byte leaves its bits", PulseReceiver, "bits__index",
+        lambda index, inside: Mux(inside["mark"], inside["bits__index"], index)),
+    Bug("a mark of no bits is bad", PulseReceiver, "bits__bad", lambda bad, inside: inside["ends"] & inside["mark"]),
+    Bug("a long low level is counted over", PulseReceiver, "low",
+        lambda low, inside: Mux(inside["low"] == 15, 0, low)),
+)  # fmt: skip
 CASES = (
     Case("UART framing", "4 clocks per bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
     Case("UART framing", "5 clocks per bit", partial(framing, bit_clocks=5), 2),
     Case("UART framing", "104 clocks per bit", partial(framing, bit_clocks=104), 2),
+    Case(
+        "pulses by their length", "2 clocks a bit", partial(read_by_length, bit_clocks=2), 4, _PULSE_BUGS, bug_clocks=24
+    ),
+    Case("pulses by their length", "3 clocks a bit", partial(read_by_length, bit_clocks=3), 4),
 )
