@@ -23,7 +23,7 @@ from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.golden import Timeline, Trace, predict
 from contactfpga_sim.model.scenes import drawing
 from contactfpga_sim.model.scenes import scene as scenes
-from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.felt import UnitReadings
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_native
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
@@ -52,7 +52,7 @@ RUNS = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class DemoResult:
     """One scene through one engine."""
 
     skin: Skin
@@ -71,7 +71,7 @@ class Outcome:
     difference: str
 
 
-def run(name: str, engine: str, skin: Skin) -> Outcome:
+def run(name: str, engine: str, skin: Skin) -> DemoResult:
     """The scene from the second scan on; compared over all cycles."""
     scan = skin.derived.frame_clocks
     scene = scenes.scene(skin, name)
@@ -87,7 +87,7 @@ def run(name: str, engine: str, skin: Skin) -> Outcome:
     first, last, size, frame = _first_touched(trace, skin)
     us = skin.clock_hz / 1e6
     touch = TOUCH_SCAN * scan
-    return Outcome(
+    return DemoResult(
         skin=skin,
         scene=name,
         engine=engine,
@@ -106,7 +106,7 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
     """What the pressure units of a Skin that has some read from cycle to cycle; they feel the scene from the start."""
     if not skin.units:
         return []
-    read = Felt(scenes.CONTACTS[name](skin), load_cells(), skin)
+    read = UnitReadings(scenes.CONTACTS[name](skin), load_cells(), skin)
     return [(cycle, read(cycle / skin.clock_hz)) for cycle in range(0, SCANS * scan, LOOKS)]
 
 
@@ -172,7 +172,7 @@ HEADS = (
 VERDICT = HEADS.index("verdict")
 
 
-def rows_of(outcomes: list[Outcome]) -> list[list[str]]:
+def rows_of(outcomes: list[DemoResult]) -> list[list[str]]:
     """The head, and a line per scene and engine."""
     rows = [list(HEADS)]
     for out in outcomes:
@@ -217,7 +217,7 @@ def main() -> int:
     return 1 if wrong else 0
 
 
-def _run_all(skin: Skin) -> list[Outcome]:
+def _run_all(skin: Skin) -> list[DemoResult]:
     runs = [(name, engine) for name, engines in RUNS.items() for engine in engines if _available(engine)]
     skins = {FORCED: with_force(), **dict.fromkeys(scenes.AROUND, forearm())}
     outcomes = []

@@ -31,7 +31,7 @@ def test_a_small_sheet_in_each_phase(name, diode):
     circuit = Circuit() if diode == "schottky" else Circuit(diode=SILICON, switch_ohm=800.0, column_pull_ohm=30_000.0)
     make, names = agreement.PHASES[name]
     phase = make(Network(circuit, patterns.named(8, 8)[names[-1]]), Levels.of(circuit))
-    check(agreement.Case(circuit, names[-1], phase))
+    check(agreement.SpiceCase(circuit, names[-1], phase))
 
 
 def test_a_model_without_the_diodes_charge_is_told_apart():

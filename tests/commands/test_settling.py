@@ -18,7 +18,7 @@ from contactfpga.tools import cli
 from contactfpga.tools.commands.wire import settle
 from contactfpga.tools.console import flags
 from contactfpga_sim.model.board.virtual import VirtualBoard
-from contactfpga_sim.model.sheet.line import Line
+from contactfpga_sim.model.sheet.line import ColumnLine
 
 SKIN = Skin(rows=4, columns=4, report="cells", settle_us=20.0, precharge_us=0.5)
 SETTLE, CLOCKS_PER_US = 240, 12
@@ -30,7 +30,7 @@ FACTOR = 3.0
 def predicted(pressed):
     """(4, 4) of clocks, 0 where nothing is pressed: once released a column goes exponentially to where it comes to
     rest, as fast as the number of pressed switches in its row lets it, a slow line by a factor slower."""
-    line, clocks = Line.of(CIRCUIT, 4, 4), np.zeros((4, 4), int)
+    line, clocks = ColumnLine.of(CIRCUIT, 4, 4), np.zeros((4, 4), int)
     for row, column in zip(*pressed.nonzero(), strict=True):
         count = pressed[row].sum()
         slower = FACTOR ** (int(row == SLOW_ROW) + int(column == SLOW_COLUMN))

@@ -105,7 +105,7 @@ def test_a_disturbed_register_of_an_untouched_sheet_is_right_again_one_slot_late
     lost, touched = 20 * known.row_clocks + 7, 22 * known.row_clocks + 7
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[2, 1] = True
-    forgets = record.Stimulus.pins
+    forgets = record.InputDriver.pins
     outputs = []
 
     def pins(self, cycle, levels):
@@ -115,7 +115,7 @@ def test_a_disturbed_register_of_an_untouched_sheet_is_right_again_one_slot_late
         outputs.append(registers.latched[0])
         return forgets(self, cycle, levels)
 
-    monkeypatch.setattr(record.Stimulus, "pins", pins)
+    monkeypatch.setattr(record.InputDriver, "pins", pins)
     timeline, cycles = Timeline([(touched, cells, None)]), touched + 30 * known.row_clocks
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 100
     assert outputs[lost] == (1 << skin.rows) - 1

@@ -17,7 +17,7 @@ from contactfpga_sim.model.golden.raster import checks
 from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare
-from contactfpga_sim.verify.cosim.record import Stimulus
+from contactfpga_sim.verify.cosim.record import InputDriver
 
 TINY = {"clock_hz": 1_000_000, "baud": 250_000, "guard": True}
 SKINS = {
@@ -89,7 +89,7 @@ def test_the_whole_board_is_the_golden_models_in_every_clock(name):
 def told_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
     """What the scanner tells of its lines in each cycle."""
     dut = Scanner(skin)
-    sim, sheet = bench(dut), Stimulus(skin, timeline)
+    sim, sheet = bench(dut), InputDriver(skin, timeline)
     watched = sim.watch(dut.faults)
     sim.sink(dut.rows)
     ports = [getattr(dut.pins, name) for name in sheet.reads]

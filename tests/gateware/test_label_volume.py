@@ -12,7 +12,7 @@ from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
 from contactfpga_sim.model.golden import all_departures, row_clocks
 from contactfpga_sim.model.scenes import shapes
-from contactfpga_sim.verify.cosim.bench_labeller import LabelBench, Labelled
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench, LabellerRecords
 
 EXACT = tuple(name for name, labeller in LABELLERS.items() if labeller.exact)
 BOTH = pytest.mark.parametrize("labeller", EXACT)
@@ -70,7 +70,7 @@ def random_frames(rows: int, columns: int, count: int, seed: int) -> np.ndarray:
     return frames
 
 
-def check_exact(bench: LabelBench, frames: np.ndarray) -> Labelled:
+def check_exact(bench: LabelBench, frames: np.ndarray) -> LabellerRecords:
     """Frames back to back: every record, its place in the order and its clock; the issue's bounds on the last one."""
     rule = bench.skin.connectivity, bench.skin.labeller
     got = bench.run(frames)

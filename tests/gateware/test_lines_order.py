@@ -8,7 +8,7 @@ from contactfpga import Skin
 from contactfpga_sim.model.golden import Timeline, driven, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Cuts
-from contactfpga_sim.model.sheet.shift import Sheet
+from contactfpga_sim.model.sheet.shift import SheetAtPins
 from contactfpga_sim.verify.cosim import bench_amaranth, record
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
@@ -63,7 +63,7 @@ def test_a_sheet_that_is_soldered_in_another_order_is_seen(field, monkeypatch):
     skin = skin_of("direct", True, 2)
     order = getattr(skin, field)
     soldered = skin.replace(**{field: (order[1], order[0], *order[2:])})
-    monkeypatch.setattr(record, "Sheet", lambda _: Sheet(soldered))
+    monkeypatch.setattr(record, "SheetAtPins", lambda _: SheetAtPins(soldered))
     timeline, cycles = scene(skin, 3, 5), 3 * facts(skin).scan_clocks
     with pytest.raises(Mismatch):
         compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles))

@@ -19,7 +19,7 @@ from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
 from contactfpga_sim.verify.cosim.compare import compare
-from contactfpga_sim.verify.cosim.record import Stimulus
+from contactfpga_sim.verify.cosim.record import InputDriver
 
 SLOW = {"clock_hz": 1_000_000, "baud": 100_000, "precharge_us": 1.0, "settle_us": 2.0, "release_us": 1.0, "guard": True}
 
@@ -41,7 +41,7 @@ class Life:
 def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
     """A scanner whose rows are taken at once; a frame is packed two clocks after its last row."""
     dut = ReversalScanner(skin)
-    sim, sheet = bench(dut), Stimulus(skin, timeline)
+    sim, sheet = bench(dut), InputDriver(skin, timeline)
     sink, packed, driven = sim.sink(dut.rows), [], []
     ports = [getattr(dut.pins, name) for name in sheet.reads]
     places = list(itertools.accumulate((len(port) for port in ports), initial=0))

@@ -16,7 +16,7 @@ from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import command, request
-from contactfpga_sim.model.sheet.shift import Sheet
+from contactfpga_sim.model.sheet.shift import SheetAtPins
 from contactfpga_sim.model.sheet.shorts import Shorts
 from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare
@@ -90,7 +90,7 @@ def self_test(bench, skin: Skin, pressed: np.ndarray, shorts: Shorts, stuck: np.
     """The self-test of a scanner whose sheet has these faults, as the host reads it, and the bit that the board tells.
     No line is driven against another one."""
     dut = ReversalScanner(skin)
-    sim, sheet = bench(dut), Sheet(skin)
+    sim, sheet = bench(dut), SheetAtPins(skin)
     sheet.matrix.join(shorts)
     sheet.matrix.press(pressed, stuck)
     ports = [getattr(dut.pins, name) for name in sheet.reads]

@@ -17,7 +17,7 @@ from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.raster import scans
-from contactfpga_sim.model.sheet.shift import COLUMN_PINS, ROW_PINS, ColumnRegisters, RowRegisters, Sheet
+from contactfpga_sim.model.sheet.shift import COLUMN_PINS, ROW_PINS, ColumnRegisters, RowRegisters, SheetAtPins
 from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.covering import stimulus
@@ -78,7 +78,7 @@ def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, dist
     """Run the scanner in a sheet with ``cells[cycle]`` pressed, R words each."""
     dut = Scanner(skin)
     sim = bench(dut)
-    sheet = sheet or Sheet(skin)
+    sheet = sheet or SheetAtPins(skin)
     ports = [getattr(dut.pins, name) for name in sheet.reads]
     seen = {name: [] for name in sheet.reads}
     idle = (1 << skin.rows) - 1 if skin.diodes == "col2row" else 0
@@ -257,7 +257,7 @@ def test_a_chip_may_take_nearly_a_whole_bit_to_answer(bench, rng, bit):
     assert times(skin).bit == bit
     cells = changing(rng, skin, slots(skin, 4))
     for delay in range(bit + 1):
-        got = run(bench, skin, cells, Sheet(skin, column_delay=delay))
+        got = run(bench, skin, cells, SheetAtPins(skin, column_delay=delay))
         assert (got.rows == expected_rows(skin, cells)) == (delay < bit), delay
 
 
@@ -265,7 +265,7 @@ def test_a_chip_may_take_nearly_a_whole_bit_to_answer(bench, rng, bit):
 def test_power_up_contents_never_reach_the_sheet(bench, power_up):
     skin = skin_of((9, 2), (5, 1))
     full = [[31] * 9] * slots(skin, 10)
-    got = run(bench, skin, full, Sheet(skin, power_up))
+    got = run(bench, skin, full, SheetAtPins(skin, power_up))
     assert got.driven == expected_driven(skin, len(full))
     assert got.driven[: times(skin).first] == [[]] * times(skin).first
     assert got.rows == expected_rows(skin, full)
@@ -363,7 +363,7 @@ def test_wrong_wiring_is_seen(bench, rng, wrong):
     skin = skin_of((10, 2), (10, 2))
     cells = changing(rng, skin, slots(skin, 12))
     assert run(bench, skin, cells).rows == expected_rows(skin, cells)
-    sheet = Sheet(skin)
+    sheet = SheetAtPins(skin)
     registers = "row_registers" if issubclass(wrong, RowRegisters) else "column_registers"
     setattr(sheet, registers, wrong(10, 2, random.Random(0)))
     assert run(bench, skin, cells, sheet).rows != expected_rows(skin, cells)
@@ -395,4 +395,4 @@ def test_the_compiled_board_with_registers_is_the_golden_models_in_every_clock(r
 def test_the_sheets_pins_are_those_of_the_gateware():
     for skin in (skin_of(), skin_of((5, 2), (5, 3))):
         assert ROW_PINS[skin.row_drive] == tuple(row_pins(skin))
-        assert (*COLUMN_PINS[skin.column_read], *Sheet(skin).drives) == tuple(column_pins(skin))
+        assert (*COLUMN_PINS[skin.column_read], *SheetAtPins(skin).drives) == tuple(column_pins(skin))

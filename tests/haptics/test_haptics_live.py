@@ -26,7 +26,7 @@ from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
-from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.felt import UnitReadings
 from contactfpga_sim.model.scenes.scene import Scene
 
 SKIN = Skin(rows=4, columns=4, units=3, unit_sums=[[1, 1, 1], [127, -127, 5]])  # which other tests compile, too
@@ -140,7 +140,7 @@ def test_what_drags_and_turns_is_felt_by_units_alone():
     hexapod = LoadCells.load(contactfpga.examples() / "units.toml")
     cells = LoadCells(hexapod.units, surface=Cylinder(0.043), sheet_m=(0.0, -0.075))
     one = finger(20.0, 60.0, 12.0, drag_n=(3.0, -2.0), torsion_nm=0.02)
-    read = Felt(Scene((one,)), cells, SKIN.replace(surface="cylinder", radius_mm=38.0), noise=False).exact(0.0)
+    read = UnitReadings(Scene((one,)), cells, SKIN.replace(surface="cylinder", radius_mm=38.0), noise=False).exact(0.0)
     center = cells.surface.center(cells.wrench(read))
     assert center.sheet_m == pytest.approx((0.020 * 43 / 38, -0.015))
     assert (center.normal_n, center.tangential_n) == pytest.approx((12.0, 13**0.5))
@@ -149,7 +149,7 @@ def test_what_drags_and_turns_is_felt_by_units_alone():
 
 def test_units_of_a_scene_lift_and_clip():
     cells = bumper(preload_n=2.0)
-    read = Felt(Scene((finger(-40, 15, 300.0),)), cells, SKIN, noise=False)(0.0)
+    read = UnitReadings(Scene((finger(-40, 15, 300.0),)), cells, SKIN, noise=False)(0.0)
     wrench = cells.wrench(read)
     assert wrench.lifted
     assert wrench.saturated

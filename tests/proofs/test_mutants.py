@@ -13,7 +13,7 @@ from contactfpga_sim.model.golden import Timeline, units
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import heard
 from contactfpga_sim.verify.cosim.compare import Mismatch
-from contactfpga_sim.verify.mutants import aig, campaign, netlist, options, proof, sheets, solve, stimuli, trial
+from contactfpga_sim.verify.mutants import aig, campaign, netlist, proof, sheets, stimuli, trial
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
@@ -90,7 +90,7 @@ def test_no_noise_comes_where_pulses_are_bits():
 def test_stimuli_of_units_notice_amounts_one_off_and_thresholds_without_a_bit(monkeypatch, skin, wrong):
     """Sum 2 of this Skin never reaches 2**15. Its thresholds may have more bits."""
     skin = OPTIONS[skin][0]
-    timeline, cycles = options.thresholds(skin, 240)
+    timeline, cycles = stimuli.thresholds(skin, 240)
     asked = heard(timeline.received, facts(skin).bit_clocks, commands=True).requests
     right = units.play(facts(skin), timeline, asked, cycles).over
 
@@ -181,10 +181,10 @@ def test_a_counter_reaches_what_it_counts_to_and_nothing_above(highest, tmp_path
         counted = graph.both(graph.differ(bit, carry), ends ^ 1)
         carry = graph.both(bit, carry)
         nexts[bit >> 1] = graph.any([graph.both(counts, counted), graph.both(counts ^ 1, bit)])
-    answer = solve.reached(graph, nexts, equals(graph, bits, highest), 10, tmp_path)
+    answer = aig.reached(graph, nexts, equals(graph, bits, highest), 10, tmp_path)
     assert answer.outcome == "reached"
     assert sum(clock[counts >> 1] for clock in answer.path[:-1]) % (highest + 1) == highest
-    assert solve.reached(graph, nexts, equals(graph, bits, highest + 1), 10, tmp_path).outcome == "never"
+    assert aig.reached(graph, nexts, equals(graph, bits, highest + 1), 10, tmp_path).outcome == "never"
 
 
 def test_a_graph_computes_what_its_gates_say():

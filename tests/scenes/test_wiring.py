@@ -13,7 +13,7 @@ from contactfpga.design.circuit.phases import Levels
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.sheet.levels import at_rest
-from contactfpga_sim.model.sheet.line import Line, RowLine, lines_of
+from contactfpga_sim.model.sheet.line import ColumnLine, RowLine, lines_of
 from contactfpga_sim.model.sheet.wiring import Wiring
 
 SIZE = 3
@@ -132,7 +132,7 @@ def test_a_column_rises_and_falls_as_the_closed_form_says():
 
     def read(press_s, rest, release_s):
         with CompiledBoard(skin, capture=("rows",)) as board:  # from power-up: all columns are up
-            board.settle(Line((press_s, press_s), (rest, rest), release_s, 0.5))
+            board.settle(ColumnLine((press_s, press_s), (rest, rest), release_s, 0.5))
             board.hold(cells[None], 3 * 2 * 72)
             events = board.take("rows")
         return [int(data) for data in events["data"][:2]]
@@ -157,7 +157,7 @@ def test_a_compiled_board_settles_when_its_circuit_does():
 
     def reads(circuit):
         with CompiledBoard(skin, capture=("rows",)) as board:
-            board.settle(Line.of(circuit, 2, 1))
+            board.settle(ColumnLine.of(circuit, 2, 1))
             board.hold(np.ones((1, 2, 1), bool), 3 * 2 * 72)
             return int(board.take("rows")["data"][0])
 
@@ -167,13 +167,13 @@ def test_a_compiled_board_settles_when_its_circuit_does():
 
 
 def test_more_pressed_switches_make_a_row_slower():
-    line = Line.of(Circuit(column_pull_ohm=20_000.0), 8, 8)
+    line = ColumnLine.of(Circuit(column_pull_ohm=20_000.0), 8, 8)
     assert len(line.press_s) == len(line.pulled) == 9
     assert line.press_s[8] > 1.5 * line.press_s[1]
     assert line.pulled[8] < line.pulled[1]
 
 
-AT_ONCE = Line((1e-12,) * (FAST.columns + 1), (1.0,) * (FAST.columns + 1), 1e-12, 0.5)
+AT_ONCE = ColumnLine((1e-12,) * (FAST.columns + 1), (1.0,) * (FAST.columns + 1), 1e-12, 0.5)
 
 
 @pytest.mark.parametrize(("rise_clocks", "lifted"), [(0.01, 0.9), (40.0, 0.9), (300.0, 0.7), (1.0, 0.49)])

@@ -12,7 +12,7 @@ from amaranth.sim import Simulator
 from contactfpga.skin.several import Several
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_sim.model.golden.trace import Timeline, Trace
-from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
+from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, InputDriver, OutOfTime, TraceRecorder, ports
 
 _SHARED = ("tx", "rx", "contact")
 
@@ -50,7 +50,7 @@ class _Sheet:
             return getattr(top, name if name in _SHARED else f"{name}_{number}")
 
         self.recorder = TraceRecorder(cycles)
-        self._stimulus = Stimulus(skin, timeline)
+        self._stimulus = InputDriver(skin, timeline)
         self._reads = {name: port(name) for name in self._stimulus.reads}
         self._drives = [
             (place, port(name)) for place, name in enumerate(self._stimulus.drives) if number == 0 or name != "rx"

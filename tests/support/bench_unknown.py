@@ -21,7 +21,7 @@ from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Timeline, Trace
 from contactfpga_sim.model.sheet.matrix import Contention, Matrix
 from contactfpga_sim.verify.cosim.bench_cocotb import SimulatorFailed
-from contactfpga_sim.verify.cosim.record import OutOfTime, Stimulus
+from contactfpga_sim.verify.cosim.record import InputDriver, OutOfTime
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -218,7 +218,7 @@ always @(posedge clk)
 def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:
     """Assignments to the bench's inputs, by the cycle from which they hold."""
     moves: dict[int, str] = {}
-    line = Stimulus(skin, Timeline([], timeline.received))
+    line = InputDriver(skin, Timeline([], timeline.received))
     before = 1
     for cycle in range(cycles):
         *_, level = line.pins(cycle, dict.fromkeys(line.reads, 0))

@@ -56,13 +56,13 @@ def never_let_go(monkeypatch) -> None:
 def noted_pins(monkeypatch) -> list[dict[str, int]]:
     """Levels of the top's outputs to the sheet, cycle by cycle, of each board that is put into Amaranth's simulator."""
     noted: list[dict[str, int]] = []
-    step = record.Stimulus.pins
+    step = record.InputDriver.pins
 
     def note(self, cycle, levels):
         noted.append(dict(levels))
         return step(self, cycle, levels)
 
-    monkeypatch.setattr(record.Stimulus, "pins", note)
+    monkeypatch.setattr(record.InputDriver, "pins", note)
     return noted
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.board.receiver import Received, Receiver
+from contactfpga_sim.model.board.receiver import ReceivedFrame, Receiver
 
 GOLDEN = 0.6180339887498949
 """Its multiples lie evenly between two instants, whatever their number."""
@@ -137,7 +137,7 @@ class _Bench:
     def __exit__(self, *_: object) -> None:
         self._board.close()
 
-    def touch(self, cells: np.ndarray, share: float) -> tuple[int, int, Received]:
+    def touch(self, cells: np.ndarray, share: float) -> tuple[int, int, ReceivedFrame]:
         """Clocks to the end of the last byte of the frame that holds all of the contact, and to the contact pin."""
         for _ in range(TRIES):
             self._let_go()
@@ -187,7 +187,7 @@ class _Bench:
         self._board.press(self._untouched)
         self._wait(0)
 
-    def _wait(self, cells: int) -> tuple[Received, bool]:
+    def _wait(self, cells: int) -> tuple[ReceivedFrame, bool]:
         """The first frame with this many cells, and whether a keep-alive was on the wire before."""
         until = self._board.cycle + self._patience
         kept_alive = False
@@ -202,7 +202,7 @@ class _Bench:
             "cells out?"
         )
 
-    def _frames(self) -> list[Received]:
+    def _frames(self) -> list[ReceivedFrame]:
         events = self._board.take("bytes")
         return list(self._receiver.take(zip(events["cycle"].tolist(), events["data"].tolist(), strict=True)))
 

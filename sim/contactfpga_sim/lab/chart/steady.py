@@ -7,7 +7,7 @@ import bisect
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.model.board.receiver import Received, frames_in
+from contactfpga_sim.model.board.receiver import ReceivedFrame, frames_in
 from contactfpga_sim.model.golden import Timeline, beginnings, predict, requests
 
 FRAMES = 12
@@ -61,7 +61,7 @@ def _longest(skin: Skin, size: int) -> int:
     return derived.frame_clocks + 10 * derived.bit_clocks * size
 
 
-def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[Received]:
+def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[ReceivedFrame]:
     """Frames of a board on which ``cells`` are pressed from the start, once hello and debounce are over."""
     debounce_us = skin.debounce_press_us if skin.debounce != "none" else 0.0
     settled = round(max(debounce_us, WARM_US) * skin.clock_hz / 1e6)

@@ -29,7 +29,7 @@ def _broken(skin: Skin, line: str, count: float) -> Outcome:
     cells[4:11, 5:12] = True
     lines = tuple(range(7, 7 + int(count)))
     cut = dict.fromkeys(lines, 0)
-    cuts = guards.Cuts(cut, {}) if line == "row" else guards.Cuts({}, cut)
+    cuts = guards.LineCuts(cut, {}) if line == "row" else guards.LineCuts({}, cut)
     return judged(still(skin, cells, cuts), cells, [cells])
 
 

@@ -12,7 +12,7 @@ from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Place
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.sheet.guards import Cuts
+from contactfpga_sim.model.sheet.guards import LineCuts
 
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)
@@ -57,12 +57,12 @@ def hello_clocks(skin: Skin) -> int:
     return scan * (math.ceil(HELLO_BYTES * 10 * skin.derived.bit_clocks / scan) + 2)
 
 
-def still(skin: Skin, cells: np.ndarray, cuts: Cuts | None = None) -> Zones:
+def still(skin: Skin, cells: np.ndarray, cuts: LineCuts | None = None) -> Zones:
     """The frame of a sheet that is pressed so, with its lines cut."""
     return seen(skin, cells[None], cuts)[0]
 
 
-def seen(skin: Skin, frames: np.ndarray, cuts: Cuts | None = None) -> list[Zones]:
+def seen(skin: Skin, frames: np.ndarray, cuts: LineCuts | None = None) -> list[Zones]:
     """What the host gets of each of (n, rows, columns) bool frames of few zones that are pressed one after the other,
     for some whole scans each: the last frame of each."""
     with Rig(skin) as rig:

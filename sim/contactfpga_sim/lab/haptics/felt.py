@@ -22,7 +22,7 @@ from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.haptics.coverage import MIDDLE, POINT, reach_of
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
-from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.felt import UnitReadings
 from contactfpga_sim.model.scenes.scene import Scene
 
 RATE_N_S = 1600.0
@@ -218,7 +218,7 @@ def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) ->
     fingers = tuple(
         Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push) for (x, y), push in zip(places, pushes)
     )
-    units = Felt(Scene(fingers), cells, skin, seed)
+    units = UnitReadings(Scene(fingers), cells, skin, seed)
     if kind == POINTS:
         each = np.array([1 / Touching(setting, 1e-3 * np.array(place), seed).closing_n for place in places])
         closed = push_n * each.sum(axis=0) >= 1

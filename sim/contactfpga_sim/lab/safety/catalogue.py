@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.safety.hurt import Hurt
-from contactfpga_sim.model.sheet.line import Line
+from contactfpga_sim.model.sheet.line import ColumnLine
 
 Places = Callable[[Skin], Mapping[str, Hurt]]
 
@@ -124,7 +124,7 @@ def _slow(skin: Skin) -> Mapping[str, Hurt]:
             ("40 kΩ pull-up", Circuit(column_pull_ohm=40_000.0)),
             ("22 kΩ pull-up", Circuit(column_pull_ohm=22_000.0)),
         ):
-            line = Line.of(
+            line = ColumnLine.of(
                 circuit.replace(line_pf=float(picofarad)), skin.row_lines, skin.column_lines, skin.diodes, most=4
             )
             found[f"{picofarad} pF, {name}"] = Hurt(line=line)

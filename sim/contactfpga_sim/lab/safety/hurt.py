@@ -9,7 +9,7 @@ import numpy as np
 
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.sheet import guards
-from contactfpga_sim.model.sheet.line import Line
+from contactfpga_sim.model.sheet.line import ColumnLine
 from contactfpga_sim.model.sheet.wiring import Wiring
 
 Cell = tuple[int, int]
@@ -40,7 +40,7 @@ class Hurt:
     """Pairs of columns."""
     pulls_win: bool = False
     """How undefined levels read, where two pins drive against each other: as released."""
-    line: Line | None = None
+    line: ColumnLine | None = None
     """The columns' time; None: none."""
     running: bool = True
     """The board has its supply, its clock and its configuration."""

@@ -9,7 +9,7 @@ from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.settle import breaks, shorted
 from contactfpga_sim.model.sheet import agreement
-from contactfpga_sim.model.sheet.agreement import Compared
+from contactfpga_sim.model.sheet.agreement import SpiceComparison
 
 SHEETS = {
     "nominal": (16, Circuit()),
@@ -41,7 +41,7 @@ def _us(time: Time) -> str:
 
 
 @functools.cache
-def compared() -> tuple[Compared, ...]:
+def compared() -> tuple[SpiceComparison, ...]:
     """Every circuit of the comparison."""
     return tuple(map(agreement.compared, agreement.cases()))
 

@@ -17,7 +17,7 @@ from contactfpga.skin.several import Several, sheets_of
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.sheet.converter import check_simulated
-from contactfpga_sim.model.sheet.line import Line, RowLine
+from contactfpga_sim.model.sheet.line import ColumnLine, RowLine
 from contactfpga_sim.model.sheet.matrix import Contention
 from contactfpga_sim.model.sheet.shorts import Shorts
 
@@ -157,7 +157,7 @@ class CompiledBoard(CompiledModel):
             for one, other in pairs:
                 self._call("join", *map(ctypes.c_uint, (kind, one, other)))
 
-    def settle(self, line: Line, rows: RowLine | None = None) -> None:
+    def settle(self, line: ColumnLine, rows: RowLine | None = None) -> None:
         """From the next cycle on columns take the time that such a line takes, and not none; so do ``rows`` that are
         let go."""
         self._settle("settle", line.press_s, line.pulled, line.release_s, line.threshold)
@@ -168,9 +168,9 @@ class CompiledBoard(CompiledModel):
         if len(toward_s) != self.skin.column_lines + 1:
             raise ValueError(f"a line for {len(toward_s) - 1} columns; the sheet has {self.skin.column_lines}")
         clock_s = 1 / self.skin.clock_hz
-        shares = np.array([Line.share(tau, clock_s) for tau in toward_s])
+        shares = np.array([ColumnLine.share(tau, clock_s) for tau in toward_s])
         arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (shares, np.array(ends, float)))
-        self._call(name, *arrays, *map(ctypes.c_double, (Line.share(back_s, clock_s), at)))
+        self._call(name, *arrays, *map(ctypes.c_double, (ColumnLine.share(back_s, clock_s), at)))
 
     def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
         """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all

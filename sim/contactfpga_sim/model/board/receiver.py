@@ -13,7 +13,7 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.wire.units import KIND_UNITS
 
 
-class Received(NamedTuple):
+class ReceivedFrame(NamedTuple):
     """A frame, and the times at which its bytes came, in the clock of whoever saw them."""
 
     frame: Frame
@@ -36,7 +36,7 @@ class Receiver:
         self._first = 0
         self.hellos = 0
 
-    def take(self, stream: Iterable[tuple[int, int]]) -> Iterator[Received]:
+    def take(self, stream: Iterable[tuple[int, int]]) -> Iterator[ReceivedFrame]:
         """The frames that these (time, byte) pairs complete. Raises :class:`PacketError` for a damaged packet."""
         for time, value in stream:
             if value != framing.DELIMITER:
@@ -50,9 +50,9 @@ class Receiver:
                 self.hellos += kind == framing.KIND_HELLO
                 if kind not in (framing.KIND_HELLO, KIND_FAULTS, KIND_UNITS):
                     frame = protocol.decode_frame(plain, self._widths)
-                    yield Received(frame, self._first, time, len(packet) + 1)
+                    yield ReceivedFrame(frame, self._first, time, len(packet) + 1)
 
 
-def frames_in(skin: Skin, stream: Iterable[tuple[int, int]]) -> Iterator[Received]:
+def frames_in(skin: Skin, stream: Iterable[tuple[int, int]]) -> Iterator[ReceivedFrame]:
     """All whole frames among the (time, byte) pairs that a board of this Skin sent from its power-up on."""
     return Receiver(skin).take(stream)

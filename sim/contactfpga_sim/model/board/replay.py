@@ -33,7 +33,7 @@ class ReplayError(ContactFPGAError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Replayed:
+class ReplayedFrame:
     """What the gateware made of one input frame."""
 
     frame: Frame
@@ -115,7 +115,7 @@ def skin_for(
     )
 
 
-def replay(frames: np.ndarray, skin: Skin) -> Iterator[Replayed]:
+def replay(frames: np.ndarray, skin: Skin) -> Iterator[ReplayedFrame]:
     """Hold each (rows, columns) bool frame for exactly one scan of a board built from ``skin``; results in order.
 
     Scans in which the board says hello, and some at the start, are left to an untouched sheet. Raises
@@ -183,7 +183,7 @@ class _Collector:
         self._board.hold(cells)
         return _Events(*(self._board.take(name) for name in ("rows", "records", "received")))
 
-    def collect(self, events: _Events) -> Iterator[Replayed]:
+    def collect(self, events: _Events) -> Iterator[ReplayedFrame]:
         """The input frames whose last byte is among the events."""
         self._note_times(events)
         stream = zip(events.received["cycle"].tolist(), events.received["data"].tolist())
@@ -205,7 +205,7 @@ class _Collector:
             else:
                 self._pending.append(cycle)
 
-    def _place(self, frame: Frame, end: int) -> Iterator[Replayed]:
+    def _place(self, frame: Frame, end: int) -> Iterator[ReplayedFrame]:
         """Find the scan by its time; an untouched sheet's frames may be overwritten by each other."""
         scan = self._next
         while self._time(scan) != frame.time_us:
@@ -216,7 +216,7 @@ class _Collector:
         first_row, last_row, *records = self._times.pop(scan)
         if self._plan.frame_of[scan] is not None:
             first, last = (cycle - last_row for cycle in records) if records else (None, None)
-            yield Replayed(frame, first, last, end - first_row)
+            yield ReplayedFrame(frame, first, last, end - first_row)
 
     def _time(self, scan: int) -> int:
         derived = self._derived
@@ -229,9 +229,9 @@ class _Collector:
             raise ReplayError(f"{left} frames of the input did not reach the host")
 
 
-def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, object]:
+def to_json(index: int, result: ReplayedFrame, skin: Skin) -> dict[str, object]:
     """One input frame as ``contactfpga replay --json`` prints it: as ``contactfpga zones --json`` does, with its number
-    in the input and, under ``cycles``, the clocks of :class:`Replayed`."""
+    in the input and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
     cycles = {
         "last_row_to_first_record": result.first_record,
         "last_row_to_last_record": result.last_record,

@@ -17,7 +17,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
 from contactfpga_sim.model.board.compiled import CompiledBoard, CompiledSheets
 from contactfpga_sim.model.scenes import contacts
-from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.felt import UnitReadings
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
 from contactfpga_sim.model.scenes.scene import scene as make_scene
@@ -40,10 +40,10 @@ def _unit_source(skin: Skin, scene: Source, units: UnitSource | LoadCells | None
     contacts = contacts_of(skin, scene)
     if contacts is None:
         raise ValueError(f"scene {scene!r} has no forces, which units need; take one of {', '.join(CONTACTS)}")
-    return Felt(contacts, units, skin)
+    return UnitReadings(contacts, units, skin)
 
 
-class Finger(Protocol):
+class RoundContact(Protocol):
     """A round contact, placed on the sheet laid flat."""
 
     x_mm: float
@@ -113,7 +113,7 @@ class VirtualBoard:
             self.advance(cycles)
             left -= cycles
 
-    def touch(self, fingers: Iterable[Finger]) -> None:
+    def touch(self, fingers: Iterable[RoundContact]) -> None:
         """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
         placed = [
             contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
@@ -121,7 +121,7 @@ class VirtualBoard:
         ]
         scene = Scene(tuple(placed))
         self._touch = scene.on(self.skin, self._cover) if placed else None
-        if isinstance(self._units, Felt):
+        if isinstance(self._units, UnitReadings):
             self._units.touching = scene
 
     def advance(self, cycles: int) -> None:

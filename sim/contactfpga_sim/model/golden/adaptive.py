@@ -92,7 +92,7 @@ class _RowSearch:
 
 
 @dataclasses.dataclass(frozen=True)
-class RowTime:
+class RowSlot:
     """A row time and the rows that are driven in it."""
 
     begin: int
@@ -109,7 +109,7 @@ class AdaptiveScanModel:
     """Goes through a timeline frame by frame, with the requests in the order in which they were received."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request]):
-        self.slots: list[RowTime] = []
+        self.slots: list[RowSlot] = []
         """All slots so far."""
         self.contact: list[tuple[int, int]] = []
         """(cycle, level) of every change of the contact pin so far."""
@@ -120,7 +120,7 @@ class AdaptiveScanModel:
         self._answered = 0
         self._listed: frozenset[int] = frozenset()
         self._busy: frozenset[int] = frozenset()
-        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
+        self._debounce = debounce.TimedDebounce(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
         self._present: np.ndarray = ~np.all(facts.mask, axis=0)
         self._clean: np.ndarray = ~np.any(facts.mask, axis=0)
 
@@ -189,11 +189,11 @@ class AdaptiveScanModel:
         facts = self._facts
         end = begin + facts.row_clocks
         if not self._idle(rows):
-            self.slots.append(RowTime(begin, rows, strobe, begin + facts.settle, end))
+            self.slots.append(RowSlot(begin, rows, strobe, begin + facts.settle, end))
         elif hit:
-            self.slots.append(RowTime(begin, rows, strobe, strobe + 1, strobe + 1 + facts.release))
+            self.slots.append(RowSlot(begin, rows, strobe, strobe + 1, strobe + 1 + facts.release))
         else:
-            self.slots.append(RowTime(begin, rows, strobe, end, end))
+            self.slots.append(RowSlot(begin, rows, strobe, end, end))
 
     def _idle(self, rows: frozenset[int]) -> bool:
         return len(rows) == self._facts.rows
@@ -250,7 +250,7 @@ class AdaptiveScanModel:
         return self._answered > before
 
 
-def driven(facts: Facts, slots: Iterable[RowTime]) -> list[tuple[int, int]]:
+def driven(facts: Facts, slots: Iterable[RowSlot]) -> list[tuple[int, int]]:
     """(cycle, rows) of every change of the rows that are driven; bit r is row r."""
     changes: list[tuple[int, int]] = []
     for slot in slots:

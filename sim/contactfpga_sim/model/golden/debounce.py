@@ -16,7 +16,7 @@ class DebounceRule:
 
     even: Callable[[list[bool], int, int], list[bool]]
     """What the switch counts as, from what it reads, a sample per scan; press and release in scan periods."""
-    timed: Callable[[Timed, Switch, bool, int], None]
+    timed: Callable[[TimedDebounce, SwitchState, bool, int], None]
     """The same sample by sample: changes the switch's state by what it reads in a tick."""
 
 
@@ -70,7 +70,7 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
     return counts
 
 
-class Timed:
+class TimedDebounce:
     """The same where samples are not a scan apart; times are counted in ticks, row times or us.
 
     A time is over at the first sample that comes ``press`` or ``release`` ticks or more after its beginning.
@@ -79,7 +79,7 @@ class Timed:
     def __init__(self, method: object, press: int, release: int):
         self._rule = _rule(method).timed
         self._press, self._release = press, release
-        self._switches: dict[tuple[int, int], Switch] = {}
+        self._switches: dict[tuple[int, int], SwitchState] = {}
 
     def take(self, cells: np.ndarray, ticks: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
         """(R, C) bool samples of a frame; ``ticks`` tells when, for the rows that were driven alone.
@@ -91,17 +91,17 @@ class Timed:
             for column in range(cells.shape[1]):
                 reads, place = bool(cells[row, column]), (row, column)
                 if reads or place in self._switches:
-                    switch = self._switches.setdefault(place, Switch())
+                    switch = self._switches.setdefault(place, SwitchState())
                     self._rule(self, switch, reads, tick)
                     counts[place] = switch.pressed
                     if not switch.pressed and switch.since is None:
                         del self._switches[place]
         return counts, frozenset(row for row, _ in self._switches)
 
-    def none(self, switch: Switch, reads: bool, tick: int) -> None:
+    def none(self, switch: SwitchState, reads: bool, tick: int) -> None:
         switch.pressed = reads
 
-    def sym(self, switch: Switch, reads: bool, tick: int) -> None:
+    def sym(self, switch: SwitchState, reads: bool, tick: int) -> None:
         if reads == switch.pressed:
             switch.since = None
             return
@@ -111,7 +111,7 @@ class Timed:
         if tick - switch.since >= time:
             switch.pressed, switch.since = reads, None
 
-    def eager(self, switch: Switch, reads: bool, tick: int) -> None:
+    def eager(self, switch: SwitchState, reads: bool, tick: int) -> None:
         if not switch.pressed:
             switch.pressed, switch.ignored_since = reads, tick
             return
@@ -131,7 +131,7 @@ class Timed:
 
 
 @dataclasses.dataclass
-class Switch:
+class SwitchState:
     """State of a switch."""
 
     pressed: bool = False
@@ -141,6 +141,6 @@ class Switch:
     """The tick of its press, while what it reads is ignored."""
 
 
-NONE = DebounceRule(lambda reads, press, release: reads, Timed.none)
-SYM_DEFER = DebounceRule(_sym_defer, Timed.sym)
-ASYM_EAGER_DEFER = DebounceRule(_asym_eager_defer, Timed.eager)
+NONE = DebounceRule(lambda reads, press, release: reads, TimedDebounce.none)
+SYM_DEFER = DebounceRule(_sym_defer, TimedDebounce.sym)
+ASYM_EAGER_DEFER = DebounceRule(_asym_eager_defer, TimedDebounce.eager)

@@ -82,7 +82,7 @@ class ReversalScanModel:
         self._changes = [*(piece[0] for piece in play.timeline.pieces), *(cut[0] for cut in play.timeline.cuts)]
         self._requests = play.requests
         self._stages = play.stages
-        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
+        self._debounce = debounce.TimedDebounce(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
         self._busy: frozenset[int] = frozenset()
         self._listens = 1  # the first cycle in which all columns are driven and rows let go
         self._packed = 0  # the cycle from which on a frame may begin

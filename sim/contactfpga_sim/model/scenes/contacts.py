@@ -143,7 +143,7 @@ def _scaled(scale: float, *ellipses: tuple[float, float, float, float]) -> Shape
 
 
 @dataclasses.dataclass(frozen=True)
-class Pressed:
+class ChangingPatch:
     """The shape of a ball's patch while its force changes: a disc of Hertz's radius."""
 
     ball: Ball
@@ -156,7 +156,7 @@ class Pressed:
 
 def pressed_ball(ball: Ball, force_n: Value, x_mm: Value, y_mm: Value) -> Contact:
     """A ball whose patch grows with the force on it."""
-    return Contact(shape=Pressed(ball, force_n), force_n=force_n, x_mm=x_mm, y_mm=y_mm)
+    return Contact(shape=ChangingPatch(ball, force_n), force_n=force_n, x_mm=x_mm, y_mm=y_mm)
 
 
 def pair(

@@ -14,7 +14,7 @@ from contactfpga_sim.model.scenes.contacts import Contact, at
 from contactfpga_sim.model.scenes.scene import Scene
 
 
-class Felt:
+class UnitReadings:
     """Readings of all units as a function of the time in s, with their noise, in whole steps of the converter.
 
     Units share a load by least squares where there are more of them than the load needs; one that nothing presses any

@@ -32,7 +32,7 @@ PATTERN_SEED = 13
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Case:
+class SpiceCase:
     """A circuit with a pattern, in a phase that ends."""
 
     circuit: Circuit
@@ -41,10 +41,10 @@ class Case:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Compared:
+class SpiceComparison:
     """Seconds of both, and the lowest volts of a column that should stay high, in a phase that settles."""
 
-    case: Case
+    case: SpiceCase
     ours_s: float
     spice_s: float
     ours_v: float
@@ -56,7 +56,7 @@ class Compared:
         return self.ours_s / self.spice_s - 1
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[SpiceCase]:
     """Some 40 circuits, the same ones each time."""
     rng = np.random.default_rng(PATTERN_SEED)
     for turn in range(ROUNDS):
@@ -71,14 +71,14 @@ def _case(
     size: tuple[int, int],
     rng: np.random.Generator,
     nominal: bool,
-) -> Case:
+) -> SpiceCase:
     """Circuits are drawn until one comes to levels that can be read."""
     pressed = rng.random(size) < 0.3 if pattern == "random" else patterns.named(*size)[pattern]
     while True:
         circuit = Circuit() if nominal else _drawn(rng)
         phase = make(Network(circuit, pressed), Levels.of(circuit))
         if not phase.bad(phases.rest_volts(phase)).any():
-            return Case(circuit, pattern, phase)
+            return SpiceCase(circuit, pattern, phase)
         nominal = False
 
 
@@ -102,13 +102,13 @@ def _drawn(rng: np.random.Generator) -> Circuit:
     )
 
 
-def compared(case: Case) -> Compared:
+def compared(case: SpiceCase) -> SpiceComparison:
     """Both opinions."""
     phase = case.phase
     ours = phases.passed(phase)
     seconds, volts = spice.run(phase, float(ours.trace.seconds[-1]))
     last = phase.arrived(seconds, volts).max()
-    return Compared(case, ours.seconds, float(last), _lowest(phase, ours.trace.volts), _lowest(phase, volts))
+    return SpiceComparison(case, ours.seconds, float(last), _lowest(phase, ours.trace.volts), _lowest(phase, volts))
 
 
 def _lowest(phase: Phase, volts: np.ndarray) -> float:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Cuts(NamedTuple):
+class LineCuts(NamedTuple):
     """As :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut` takes them."""
 
     rows: dict[int, int]
@@ -22,10 +22,10 @@ def extended(cells: np.ndarray, guard: bool = True) -> np.ndarray:
     return found
 
 
-def missed(read: np.ndarray) -> Cuts:
+def missed(read: np.ndarray) -> LineCuts:
     """Of what an extended sheet reads: lines whose guard switch reads open, as lines that are cut right before it."""
     rows, columns = (number - 1 for number in read.shape)
-    return Cuts(
+    return LineCuts(
         dict.fromkeys(np.flatnonzero(~read[:rows, columns]).tolist(), columns),
         dict.fromkeys(np.flatnonzero(~read[rows, :columns]).tolist(), rows),
     )

@@ -15,7 +15,7 @@ from contactfpga.skin import Skin
 
 
 @dataclasses.dataclass(frozen=True)
-class Line:
+class ColumnLine:
     """A column goes exponentially to the level that a pressed switch pulls it to, or back to the released one.
 
     Levels are shares of the way from the supply to ground. Both exponentials cross the threshold when the circuit's
@@ -32,7 +32,9 @@ class Line:
     """Share at which the pin reads pressed."""
 
     @classmethod
-    def of(cls, circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", most: int | None = None) -> Line:
+    def of(
+        cls, circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", most: int | None = None
+    ) -> ColumnLine:
         """Of a sheet whose rows are all pressed alike, the slowest; with at most ``most`` pressed switches a row."""
         levels = Levels.of(circuit, diodes)
         threshold = 1 - levels.low / circuit.supply_v
@@ -84,11 +86,11 @@ class RowLine:
         return cls(tuple(rise.tolist()), tuple(lifted.tolist()), fall / math.log(1 / threshold), threshold)
 
 
-def lines_of(circuit: Circuit, skin: Skin, most: int | None = None) -> tuple[Line, RowLine | None]:
+def lines_of(circuit: Circuit, skin: Skin, most: int | None = None) -> tuple[ColumnLine, RowLine | None]:
     """Columns of a Skin's sheet, with at most ``most`` pressed switches a row, and rows if they are read."""
     if skin.guard:
         most = None  # the guard row presses all columns
-    columns = Line.of(circuit, skin.row_lines, skin.column_lines, skin.diodes, most)
+    columns = ColumnLine.of(circuit, skin.row_lines, skin.column_lines, skin.diodes, most)
     return columns, RowLine.of(circuit, skin.column_lines, skin.diodes) if skin.reads_rows else None
 
 

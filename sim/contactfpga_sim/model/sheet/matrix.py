@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.model.sheet.shorts import Lines, Shorts, bits, followers
+from contactfpga_sim.model.sheet.shorts import LineBits, Shorts, bits, followers
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -52,9 +52,9 @@ class Matrix:
         self._pressed = [0] * skin.rows
         self._reaches = [self._all_columns] * skin.row_lines
         self.stuck = 0
-        """Lines of the columns that are stuck."""
+        """LineBits of the columns that are stuck."""
         self._shorts: Shorts | None = None
-        self._released = Lines(0, 0)  # let go, and lifted to the released level
+        self._released = LineBits(0, 0)  # let go, and lifted to the released level
         self._keeps = skin.derived.settle_clocks + 1 if skin.self_test else 0  # clocks
         self._kept, self._left = 0, 0  # columns, and clocks for which they are
         self.closed = [0] * skin.row_lines
@@ -113,7 +113,9 @@ class Matrix:
         if self._shorts is None:
             pulled, lifted = self._pulled(selected), columns_driven
         else:
-            pulled, lifted = self._follow(Lines(selected, columns_held), Lines(driven & ~selected, columns_driven))
+            pulled, lifted = self._follow(
+                LineBits(selected, columns_held), LineBits(driven & ~selected, columns_driven)
+            )
         if fights := pulled & columns_driven:
             raise Contention(f"columns {fights:#b} are driven against rows {selected:#b}")
         pressed = pulled | self.stuck | columns_held | self._keep(columns_held, lifted)
@@ -135,12 +137,12 @@ class Matrix:
                 drained |= word
         return drained & ~(columns_driven | lifted.columns)
 
-    def _lifted(self, columns_driven: int) -> Lines:
+    def _lifted(self, columns_driven: int) -> LineBits:
         """What follows the columns that are driven to the released level; with shorts what did in this clock."""
         if self._shorts is not None:
-            return Lines(self._released.rows, self._released.columns | bits(self._shorts.pulled))
+            return LineBits(self._released.rows, self._released.columns | bits(self._shorts.pulled))
         feeding = columns_driven & ~self.stuck
-        return Lines(sum(1 << row for row, word in enumerate(self.closed) if word & feeding), feeding)
+        return LineBits(sum(1 << row for row, word in enumerate(self.closed) if word & feeding), feeding)
 
     def _keep(self, held: int, lifted: int) -> int:
         """Columns that are let go and still at the selecting level."""
@@ -152,15 +154,15 @@ class Matrix:
             return self._kept
         return 0
 
-    def _follow(self, selecting: Lines, releasing: Lines) -> tuple[int, int]:
+    def _follow(self, selecting: LineBits, releasing: LineBits) -> tuple[int, int]:
         """With shorts: columns that follow a line at the selecting level, and those that follow one at the released
         level. A pin may work against the supply, and against no other pin."""
         assert self._shorts is not None
-        feeding = Lines(releasing.rows, releasing.columns & ~self.stuck)
+        feeding = LineBits(releasing.rows, releasing.columns & ~self.stuck)
         low = followers(self._shorts, self.closed, selecting, selecting=True)
         if low.rows & feeding.rows | low.columns & feeding.columns:
             raise Contention(f"lines {feeding} are driven against {selecting}, which shorts join")
-        supplied = Lines(feeding.rows | bits(self._shorts.supplied), feeding.columns)
+        supplied = LineBits(feeding.rows | bits(self._shorts.supplied), feeding.columns)
         self._released = followers(self._shorts, self.closed, supplied, selecting=False)
         return low.columns, self._released.columns | bits(self._shorts.pulled)
 

@@ -69,7 +69,7 @@ class ColumnRegisters:
         return self._outputs[0]
 
 
-class Sheet:
+class SheetAtPins:
     """A :class:`Matrix` at the pins of the gateware's top, cycle by cycle.
 
     ``reads`` names the top's outputs it looks at, ``drives`` the inputs it gives. ``column_delay``: see

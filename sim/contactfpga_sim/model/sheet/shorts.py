@@ -36,14 +36,14 @@ class Shorts:
         )
 
 
-class Lines(NamedTuple):
+class LineBits(NamedTuple):
     """Lines as bits."""
 
     rows: int
     columns: int
 
 
-def followers(shorts: Shorts, closed: list[int], sources: Lines, selecting: bool) -> Lines:
+def followers(shorts: Shorts, closed: list[int], sources: LineBits, selecting: bool) -> LineBits:
     """Lines that take the level of the ``sources``: the selecting one, which passes switches from row to column, or the
     released one, which passes them the other way. ``closed``: by row the columns that it reaches."""
     ties = [_both(1 << one, 1 << other) for one, other in shorts.rows]
@@ -56,27 +56,27 @@ def followers(shorts: Shorts, closed: list[int], sources: Lines, selecting: bool
             wider = tie(wider)
         for row, column in crossed:
             if wider.rows >> row & 1 or wider.columns >> column & 1:
-                wider = Lines(wider.rows | 1 << row, wider.columns | 1 << column)
+                wider = LineBits(wider.rows | 1 << row, wider.columns | 1 << column)
         if wider == found:
             return found
         found = wider
 
 
-def _widened(found: Lines, closed: list[int], selecting: bool) -> Lines:
+def _widened(found: LineBits, closed: list[int], selecting: bool) -> LineBits:
     rows, columns = found
     for row, word in enumerate(closed):
         if selecting and rows >> row & 1:
             columns |= word
         if not selecting and word & columns:
             rows |= 1 << row
-    return Lines(rows, columns)
+    return LineBits(rows, columns)
 
 
-def _both(one: int, other: int, columns: bool = False) -> Callable[[Lines], Lines]:
-    def tie(found: Lines) -> Lines:
+def _both(one: int, other: int, columns: bool = False) -> Callable[[LineBits], LineBits]:
+    def tie(found: LineBits) -> LineBits:
         word = found[columns]
         word |= (one | other) if word & (one | other) else 0
-        return Lines(found.rows, word) if columns else Lines(word, found.columns)
+        return LineBits(found.rows, word) if columns else LineBits(word, found.columns)
 
     return tie
 

@@ -11,7 +11,7 @@ from amaranth.sim import Simulator
 
 from contactfpga_hdl.top import Top
 from contactfpga_sim.model.golden.trace import Timeline, Trace
-from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
+from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, InputDriver, OutOfTime, TraceRecorder, ports
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -23,7 +23,7 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
     simulator = Simulator(top)
     simulator.add_clock(1e-6)
     recorder = TraceRecorder(cycles)
-    stimulus = Stimulus(skin, timeline)
+    stimulus = InputDriver(skin, timeline)
     there = ports(LEVELS, skin)
     levels = Cat(*(getattr(top, name) if name in there else Const(0, 1) for name in LEVELS))
     names = ports(PAYLOADS, skin)

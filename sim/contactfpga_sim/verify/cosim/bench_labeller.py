@@ -17,7 +17,7 @@ _TIMING = np.dtype([("first_row", "<u8"), ("last_row", "<u8"), ("end", "<u8")])
 
 
 @dataclasses.dataclass(frozen=True)
-class Labelled:
+class LabellerRecords:
     """What the labeller made of N frames; cycles count from the bench's start."""
 
     frame: np.ndarray
@@ -63,7 +63,7 @@ class LabelBench:
         self._library = library
         self._bench = ctypes.c_void_p(library.bench_new())
 
-    def run(self, frames: np.ndarray, *, gap: int = 0, stall: int = 0, seed: int = 1) -> Labelled:
+    def run(self, frames: np.ndarray, *, gap: int = 0, stall: int = 0, seed: int = 1) -> LabellerRecords:
         """Feed (N, R, C) bool frames back to back and take all records.
 
         gap: chance in percent that no row is offered in a clock; stall: that the record port is not ready.
@@ -103,7 +103,7 @@ class LabelBench:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _collect(self, frames: int) -> Labelled:
+    def _collect(self, frames: int) -> LabellerRecords:
         count = ctypes.c_size_t()
         address = self._library.bench_records(self._bench, ctypes.byref(count))
         records = native.array_at(address, count.value, _RECORD)
@@ -113,7 +113,7 @@ class LabelBench:
         for width in self._derived.record_bits:
             fields.append((word & np.uint64((1 << width) - 1)).astype(np.int64))
             word = word >> np.uint64(width)
-        return Labelled(
+        return LabellerRecords(
             frame=records["frame"].astype(np.int64),
             cycle=records["cycle"].astype(np.int64),
             moments=np.stack(fields, axis=1),

@@ -12,7 +12,7 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, Timer
 
-from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, Stimulus, TraceRecorder, ports
+from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, InputDriver, TraceRecorder, ports
 
 
 @cocotb.test()
@@ -20,7 +20,7 @@ async def record(dut: Any) -> None:
     """Every cycle is looked at in its second half, when all of the design has settled."""
     job = pickle.loads(Path(os.environ["CONTACTFPGA_JOB"]).read_bytes())
     recorder = TraceRecorder(job["cycles"])
-    stimulus = Stimulus(job["skin"], job["timeline"])
+    stimulus = InputDriver(job["skin"], job["timeline"])
     levels = {LEVELS.index(name): getattr(dut, name) for name in ports(LEVELS, job["skin"])}
     payloads = {name: getattr(dut, name) for name in ports(PAYLOADS, job["skin"])}
     deadline = time.monotonic() + job["limit_s"]

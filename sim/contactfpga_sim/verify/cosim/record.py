@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Timeline, Trace
 from contactfpga_sim.model.sheet import converter
-from contactfpga_sim.model.sheet.shift import Sheet
+from contactfpga_sim.model.sheet.shift import SheetAtPins
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -33,14 +33,14 @@ class OutOfTime(RuntimeError):
     """A simulation passed its wall-clock limit."""
 
 
-class Stimulus:
+class InputDriver:
     """What the sheet and the line give the board, cycle by cycle; cycles must be asked for in order.
 
     ``reads`` names the top's outputs that this depends on, ``drives`` the inputs it gives.
     """
 
     def __init__(self, skin: Skin, timeline: Timeline):
-        self._sheet = Sheet(skin)
+        self._sheet = SheetAtPins(skin)
         self._converter = converter.converter_of(skin)
         self.reads = self._sheet.reads + (self._converter.reads if self._converter else ())
         self.drives = (*self._sheet.drives, "rx", *(self._converter.gives if self._converter else ()))

@@ -54,7 +54,7 @@ def examine(
 ) -> list[Result]:
     """The fates of ``count`` mutants of what is :func:`chosen`; ``long_s`` are the seconds of a longer proof.
 
-    Raises :class:`contactfpga_sim.verify.mutants.proof.ProofFailed` when a mutant that was killed is proved equivalent.
+    Raises :class:`contactfpga_sim.verify.mutants.proof.Contradiction` when a killed mutant is proved equivalent.
     """
     design, stages = chosen(name)
     given = sheets if isinstance(design, Several) else stimuli
@@ -66,7 +66,7 @@ def examine(
     killed = [mutant for mutant in drawn if mutant not in left][:CHECKED]
     proved = _proved(design, [*left, *killed], proof.QUICK_S)
     if wrong := proved & {*killed}:
-        raise proof.ProofFailed(f"killed, yet proved equivalent: {', '.join(map(str, wrong))}")
+        raise proof.Contradiction(f"killed, yet proved equivalent: {', '.join(map(str, wrong))}")
     left = [mutant for mutant in left if mutant not in proved]
     say(f"{len(left)} left, long stimuli")
     longest = [stimuli.until_time_wraps(SKINS[name])] if name in SKINS else []  # minutes in the model of an option

@@ -22,8 +22,8 @@ from types import TracebackType
 from contactfpga.errors import ContactFPGAError
 from contactfpga_sim.model.board import native
 from contactfpga_sim.verify.mutants import aig
+from contactfpga_sim.verify.mutants.aig import reached
 from contactfpga_sim.verify.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
-from contactfpga_sim.verify.mutants.solve import reached
 
 QUICK_S, LONG_S = 4, 45
 """How long may be asked with the same registers cut."""
@@ -46,7 +46,7 @@ _HANDED = {
 }
 
 
-class ProofFailed(ContactFPGAError):
+class Contradiction(ContactFPGAError):
     """Something is wrong with the proof itself; the message says what."""
 
 
@@ -102,7 +102,7 @@ class Prover:
                 return answer.outcome == "never"
             values = self._last(takes, answer.path, [bad, *differing.values()])
             if not _value(values, bad):
-                raise ProofFailed("the solver's path does not lead where gateware and mutant differ")
+                raise Contradiction("the solver's path does not lead where gateware and mutant differ")
             found = {index for index, differ in differing.items() if _value(values, differ)}
             if not found or found & cut:
                 return False

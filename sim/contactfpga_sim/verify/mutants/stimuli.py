@@ -1,7 +1,9 @@
-"""What is done to the boards of mutants."""
+"""What is done to the boards of mutants: touches, noise and requests, and to the options of a Skin lines that break,
+lines that touch, readings that change, commands."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -9,15 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import SELF_TEST, Derived
+from contactfpga.skin.units import NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
 from contactfpga_sim.model.golden import uart
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.hello import hello
-from contactfpga_sim.model.golden.request import requests
-from contactfpga_sim.model.golden.trace import Timeline
+from contactfpga_sim.model.golden.request import command, requests
+from contactfpga_sim.model.golden.trace import Cuts, Timeline
 from contactfpga_sim.model.scenes import shapes
 from contactfpga_sim.model.sheet.shorts import Shorts
 from contactfpga_sim.verify.cosim import covering
-from contactfpga_sim.verify.mutants import options
 
 _TIME_WRAPS_US = 1 << 24
 _AT_REST = 400_000
@@ -48,7 +51,7 @@ def quick(skin: Skin) -> Iterator[Stimulus]:
     closed sheet also shapes around it. With guard lines or a self-test also a sheet at rest with lines that break and
     touch."""
     for seed in range(3):
-        yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, options.least_cycles(skin)))
+        yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, least_cycles(skin)))
     yield from _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
     yield from _optional(skin)
     yield _frames(skin, "shapes", np.stack([cells for _, cells in shapes.variants(skin.rows, skin.columns)]))
@@ -60,9 +63,9 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
     """For the mutants that :func:`quick` leaves: the same for longer, all frames of a small sheet, random ones of a
     larger one, and more than half a second of board time, after which a hello comes unasked."""
     for seed in range(3, 9):
-        yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks, 4 * options.least_cycles(skin)))
+        yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks, 4 * least_cycles(skin)))
     if skin.units:
-        timeline, cycles = options.thresholds(skin, 240)
+        timeline, cycles = thresholds(skin, 240)
         yield Stimulus("more thresholds", timeline, cycles)
     yield from _noisy(skin, 300)
     yield _crowded(skin, 300)
@@ -83,21 +86,21 @@ def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
     scan = known.scan_clocks
     usual = [0, 0, 1, 7, scan, 8 * scan, 30 * scan]
     if skin.self_test:
-        usual += [options.test_clocks(skin)] * 3
+        usual += [test_clocks(skin)] * 3
     gaps = rng.choice(usual, size=cycles // (10 * known.bit_clocks))
     received = covering.traffic(skin, gaps.tolist(), int(rng.integers(scan)), cycles, rng)
     timeline = Timeline(covering.stimulus(skin, cycles, seed).pieces, received)
-    return Stimulus(f"random {seed}", options.added(skin, timeline, cycles, seed), cycles)
+    return Stimulus(f"random {seed}", added(skin, timeline, cycles, seed), cycles)
 
 
 def _optional(skin: Skin) -> Iterator[Stimulus]:
     if skin.units:
-        timeline, cycles = options.thresholds(skin, 60)
+        timeline, cycles = thresholds(skin, 60)
         yield Stimulus("thresholds", timeline, cycles)
     if skin.guard or skin.self_test:
-        yield Stimulus("at rest", options.at_rest(skin, _AT_REST), _AT_REST)
+        yield Stimulus("at rest", at_rest(skin, _AT_REST), _AT_REST)
     if skin.self_test:
-        for timeline, shorts, cycles in (options.joined(skin), *options.bridged(skin)):
+        for timeline, shorts, cycles in (joined(skin), *bridged(skin)):
             yield Stimulus("joined lines", timeline, cycles, shorts=shorts)
 
 
@@ -180,4 +183,158 @@ def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
         for start in range(0, microseconds, 300_001)
     ]
     cycles = microseconds * clocks
-    return Stimulus(name, options.added(skin, Timeline(pieces), cycles, 13), cycles)
+    return Stimulus(name, added(skin, Timeline(pieces), cycles, 13), cycles)
+
+
+def least_cycles(skin: Skin) -> int:
+    """In which the options have had their turn: sweeps of the units, slots of a few self-tests."""
+    sweeps = 40 * skin.derived.units.sweep_clocks if skin.units else 0
+    return max(sweeps, 5 * test_clocks(skin) if skin.self_test else 0)
+
+
+def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
+    """A timeline in which lines break, the guard column is stuck and units read something now and then."""
+    rng = np.random.default_rng([seed, 23])
+    pieces, cuts, units = list(timeline.pieces), [], []
+    if skin.guard:
+        pieces = [(start, cells, _with_guard(skin, stuck, rng)) for start, cells, stuck in pieces]
+        cuts = [(start, _cuts(skin, rng)) for start in _starts(rng, cycles, 6 * facts(skin).scan_clocks)]
+    if skin.units:
+        most = 2 ** skin.derived.units.converter.bits - 1
+        sweep = skin.derived.units.sweep_clocks
+        units = [(start, _readings(skin.units, most, rng)) for start in _starts(rng, cycles, sweep)]
+    return Timeline(pieces, timeline.received, cuts, units)
+
+
+def at_rest(skin: Skin, cycles: int) -> Timeline:
+    """Hardly a touch; lines are cut for so long that what is told of them is renewed, and self-tests come to an end."""
+    rng = np.random.default_rng(37)
+    pieces: list[tuple[int, np.ndarray, None]] = []
+    for start in range(100, cycles, 30_000):
+        cells = rng.random((skin.rows, skin.columns)) < 0.1
+        pieces += [(start, cells, None), (start + 40 * facts(skin).scan_clocks, np.zeros_like(cells), None)]
+    cuts = [(start, _cuts(skin, rng)) for start in _starts(rng, cycles, 70_000)] if skin.guard else []
+    return Timeline(pieces, _self_tests(skin, range(5_000, cycles, 40_000)), cuts)
+
+
+def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
+    """One zero and one threshold after the other, of readings about them and on either side of the zero; nothing else
+    touches the sheet."""
+    rng = np.random.default_rng(41)
+    units, bits = skin.derived.units, facts(skin).bit_clocks
+    most = 2**units.converter.bits - 1
+    zeros = [0] * skin.units
+    received: list[tuple[int, bytes]] = []
+    readings: list[tuple[int, list[int]]] = []
+    start, before = 0, (THRESHOLD, 0)
+    for _ in range(epochs):
+        around = [_of_bits(units.converter.bits, rng) for _ in range(skin.units)]
+        what, place, weights, shift = _watched(skin, rng)
+        unit, zero = int(rng.choice(np.flatnonzero(weights))), _of_bits(NUMBER_BITS, rng)
+        zeros[unit] = (zero << number_shift(units.converter.bits)) % (most + 1)
+        total = sum(weight * (read - zero) for weight, read, zero in zip(weights, around, zeros, strict=True))
+        number = _number(abs(total) >> shift, rng)
+        if rng.random() < 0.5:  # numbers are coarse: without this no reading comes close
+            wanted = number << shift if total >= 0 else -(number << shift)
+            around[unit] = min(max(around[unit] + (wanted - total) // weights[unit], 0), most)
+        for order, value in (before, (ZERO, unit | zero << 3), (what, place | number << 3)):
+            received.append((start, command(129 + len(received) % 64, order, value, False, bits)))
+            start += 14 * 10 * bits
+        before = (what, place)
+        for step in (0, -1, 1, 2):
+            moved = min(max(around[unit] + step, 0), most)
+            readings.append((start, [*around[:unit], moved, *around[unit + 1 :]]))
+            start += 2 * units.sweep_clocks
+    return Timeline([], received, units=readings), start
+
+
+def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int], int]:
+    """Whose threshold is next, a unit's or a sum's: command, place, weights, and in steps of 2 to which power."""
+    units, of_sum = skin.derived.units, bool(rng.random() < 0.5)
+    if of_sum:
+        place = int(rng.integers(len(skin.unit_sums)))
+        return SUM_THRESHOLD, place, list(skin.unit_sums[place]), number_shift(units.sum_bits)
+    place = int(rng.integers(skin.units))
+    weights = [int(place == unit) for unit in range(skin.units)]
+    return THRESHOLD, place, weights, number_shift(units.converter.bits)
+
+
+def _number(reached: int, rng: np.random.Generator) -> int:
+    """A threshold that is reached, or missed by one step; or far above that, in one more bit."""
+    number = reached + int(rng.integers(2))
+    if rng.random() < 0.25:
+        number |= 1 << int(rng.integers(min(reached.bit_length(), NUMBER_BITS - 1), NUMBER_BITS))
+    return min(2**NUMBER_BITS - 1, max(1, number))
+
+
+def _of_bits(most: int, rng: np.random.Generator) -> int:
+    """A number of up to ``most`` bits: any of them, or each count of bits as likely as another."""
+    return int(rng.integers(1 << (most if rng.random() < 0.5 else int(rng.integers(most + 1)))))
+
+
+def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
+    """Each pair of rows and of columns joined, each row joined with the supply and each column with a strong pull,
+    alone and joined with another one; a whole sheet after each of them, and a self-test in either. Timeline, what is
+    joined from which cycle on, and for how many cycles."""
+    shorts = [Shorts(rows=(pair,)) for pair in itertools.combinations(range(skin.rows), 2)]
+    shorts += [Shorts(columns=(pair,)) for pair in itertools.combinations(range(skin.columns), 2)]
+    shorts += [Shorts(supplied=(row,)) for row in range(skin.rows)]
+    pulled = [
+        (column, pair) for column in range(skin.columns) for pair in (((column - 1) % skin.columns, column), None)
+    ]
+    shorts += [Shorts(pulled=(column,), columns=(pair,) if pair else ()) for column, pair in pulled]
+    each = 2 * test_clocks(skin)
+    starts = range(each, each * (1 + 2 * len(shorts)), each)
+    changes = list(zip(starts, itertools.chain(*((one, Shorts()) for one in shorts)), strict=True))
+    return Timeline([], _self_tests(skin, starts)), changes, starts[-1] + each
+
+
+def bridged(skin: Skin) -> Iterator[tuple[Timeline, list[tuple[int, Shorts]], int]]:
+    """Likewise each diode bridged at power-up, its switch pressed for the self-test: a frame would drive the row
+    against the column."""
+    first = (1 + skin.rows + skin.columns) * (2 * facts(skin).project + facts(skin).settle + 8)
+    for place in itertools.product(range(skin.rows), range(skin.columns)):
+        cells = np.zeros((skin.rows, skin.columns), bool)
+        cells[place] = True
+        timeline = Timeline([(0, cells, None), (first, np.zeros_like(cells), None)])
+        yield timeline, [(0, Shorts(bridged=(place,)))], 300 * 10 * facts(skin).bit_clocks
+
+
+def test_clocks(skin: Skin) -> int:
+    """More than a self-test takes whose slots go out."""
+    slots = 1 + skin.rows + skin.columns
+    packet = 10 * facts(skin).bit_clocks * (12 + (skin.rows + skin.columns) // 7)
+    return slots * (3 * packet + facts(skin).scan_clocks)
+
+
+def _self_tests(skin: Skin, starts: range) -> list[tuple[int, bytes]]:
+    if not skin.self_test:
+        return []
+    return [(start, command(129 + index % 64, SELF_TEST, 0, False, facts(skin).bit_clocks)) for index, start in
+            enumerate(starts)]  # fmt: skip
+
+
+def _starts(rng: np.random.Generator, cycles: int, mean: int) -> Iterator[int]:
+    start = int(rng.integers(mean))
+    while start < cycles:
+        yield start
+        start += 1 + int(rng.integers(2 * mean))
+
+
+def _with_guard(skin: Skin, stuck: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
+    return np.append(np.zeros(skin.columns, bool) if stuck is None else stuck, rng.random() < 0.2)
+
+
+def _cuts(skin: Skin, rng: np.random.Generator) -> Cuts:
+    """None, some, or half of the lines, each at any place."""
+    share = rng.choice([0, 0, 0.2, 0.5])
+    ends = (
+        {line: int(rng.integers(across + 1)) for line in range(lines) if rng.random() < share}
+        for lines, across in ((skin.row_lines, skin.column_lines), (skin.column_lines, skin.row_lines))
+    )
+    return Cuts(*ends)
+
+
+def _readings(units: int, most: int, rng: np.random.Generator) -> list[int]:
+    low = rng.integers(min(most + 1, 256), size=units)
+    return [int(rng.choice(np.array([0, 1, most // 2, most, near, rng.integers(most + 1)], np.int64))) for near in low]

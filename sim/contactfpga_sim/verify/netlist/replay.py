@@ -59,7 +59,7 @@ read their pins; of these the third has guard lines, and the last one a self-tes
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class NetlistReplay:
     """A netlist that did what the golden model predicts."""
 
     frames: int
@@ -70,21 +70,21 @@ class Outcome:
     changes: int
     """Of the transmit and the contact pin."""
 
-    def __add__(self, other: Outcome) -> Outcome:
+    def __add__(self, other: NetlistReplay) -> NetlistReplay:
         pairs = zip(dataclasses.astuple(self), dataclasses.astuple(other), strict=True)
-        return Outcome(*(one + two for one, two in pairs))
+        return NetlistReplay(*(one + two for one, two in pairs))
 
 
-def replay(skin: Skin, model: native.Model, frames: np.ndarray) -> Outcome:
+def replay(skin: Skin, model: native.Model, frames: np.ndarray) -> NetlistReplay:
     """Hold each of (n, rows, columns) bool frames for one scan; raises :class:`Mismatch` at the first difference."""
     reset = reset_clocks(skin, model)
-    total = Outcome(0, 0, 0, 0)
+    total = NetlistReplay(0, 0, 0, 0)
     for start in range(0, len(frames), BATCH):
         total += _replay(skin, model, frames[start : start + BATCH], reset)
     return total
 
 
-def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> Outcome:
+def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> NetlistReplay:
     derived = skin.derived
     scan = derived.frame_clocks
     cycles = len(frames) * scan + 2 * derived.max_frame_bytes * 10 * derived.bit_clocks
@@ -94,7 +94,7 @@ def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> 
     expected = predict(skin, timeline, cycles)
     got = bench_native.run(skin, _after(timeline, reset), cycles + reset, model)
     changes = compare(expected.at_the_pins(), got.at_the_pins().since(reset))
-    return Outcome(len(frames), sum(value == 0 for _, value in expected.bytes), cycles, changes)
+    return NetlistReplay(len(frames), sum(value == 0 for _, value in expected.bytes), cycles, changes)
 
 
 def reset_clocks(skin: Skin, model: native.Model) -> int:
