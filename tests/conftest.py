@@ -37,6 +37,18 @@ def board():
 
 
 @pytest.fixture
+def run(capsys):
+    """Runs a command in this process; returns status, output and errors."""
+    from contactfpga.tools import cli
+
+    def run(*arguments):
+        status = cli.main([str(argument) for argument in arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
 def _closed_ports():
     """`read_zones` keeps its ports open in the process; the next test starts without them."""
     yield

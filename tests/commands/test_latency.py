@@ -1,5 +1,6 @@
 """`contactfpga latency`: what it prints, what it refuses, and the figures of the examples."""
 
+import functools
 import json
 
 import numpy as np
@@ -15,14 +16,9 @@ FILE = str(examples() / "fast.toml")
 
 
 @pytest.fixture
-def run(capsys):
-    """Runs the command in this process; returns status, output and errors."""
-
-    def run(*arguments):
-        status = cli.main(["latency", *arguments])
-        return status, *capsys.readouterr()
-
-    return run
+def run(run):
+    """Runs `contactfpga latency`; returns status, output and errors."""
+    return functools.partial(run, "latency")
 
 
 @pytest.mark.campaign  # it has a board to compile

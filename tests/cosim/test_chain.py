@@ -4,7 +4,7 @@ import random
 
 import numpy as np
 import pytest
-from shadows import zones_by_image_tools
+from zone_oracles import zones_by_image_tools
 
 import contactfpga
 from contactfpga import Skin, SkinError

@@ -1,5 +1,6 @@
 """The commands `contactfpga cover design` and `contactfpga cover figures`."""
 
+import functools
 import json
 import math
 import subprocess
@@ -11,21 +12,15 @@ from sample import sample
 
 import contactfpga
 from contactfpga.design.cover import elastic, sense
-from contactfpga.tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRST, SECOND = (ROOT / "examples" / f"paper-{name}-design.toml" for name in ("first", "second"))
 
 
 @pytest.fixture
-def run(capsys):
-    """Runs a command in this process; returns status, output and errors."""
-
-    def run(*arguments):
-        status = cli.main(["cover", *map(str, arguments)])
-        return status, *capsys.readouterr()
-
-    return run
+def run(run):
+    """Runs `contactfpga cover`; returns status, output and errors."""
+    return functools.partial(run, "cover")
 
 
 # ---- commands

@@ -3,8 +3,7 @@
 import random
 
 import pytest
-from model_board import SCAN_US, ModelBoard
-from straight_line import SKIN, Line, arrived
+from model_board import SCAN_US, SKIN, Line, ModelBoard, arrived
 from wire import EPOCH_US, Wire, last_byte
 
 from contactfpga.driver.conversation import Conversation

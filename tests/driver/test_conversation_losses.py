@@ -3,8 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from model_board import SCAN_US, ModelBoard
-from straight_line import SKIN, Line, arrived
+from model_board import SCAN_US, SKIN, Line, ModelBoard, arrived
 from wire import Wire, old_frame, old_hello
 
 import contactfpga

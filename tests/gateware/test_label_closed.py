@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import unrolled
-from unrolled import RING, RULES, WOUND, every_frame, recorded, skin_of
+import zone_oracles
+from zone_oracles import RING, RULES, WOUND, every_frame, recorded, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model.golden import all_departures, label
@@ -92,8 +92,8 @@ def test_the_golden_model_knows_shapes_by_hand_and_agrees_with_an_unrolled_sheet
     for connectivity in (8, 4):
         work = label.labelling(cells, connectivity, "run", closed=True)
         records = [(zone.area, zone.sum_x, zone.sum_y, zone.turned) for zone in work.departures]
-        found = unrolled.of_records(0, records, columns)
-        assert np.array_equal(found, unrolled.zones(cells[None], connectivity))
+        found = zone_oracles.of_records(0, records, columns)
+        assert np.array_equal(found, zone_oracles.zones(cells[None], connectivity))
         if connectivity == 8:
             by_hand = [(0, a, x if x in (RING, WOUND) else x % (columns * a), y) for a, x, y in zones]
             assert found.tolist() == sorted(map(list, by_hand))
@@ -105,8 +105,8 @@ def test_the_golden_model_floods_a_cylinder(connectivity, columns):
     rng = np.random.default_rng(columns)
     frames = rng.random((100, 5, columns)) < rng.uniform(0.3, 0.9, (100, 1, 1))
     departures = all_departures(frames, connectivity, closed=True)
-    found = unrolled.of_records(departures.frame, departures.moments, columns)
-    assert np.array_equal(found, unrolled.zones(frames, connectivity))
+    found = zone_oracles.of_records(departures.frame, departures.moments, columns)
+    assert np.array_equal(found, zone_oracles.zones(frames, connectivity))
     for index, cells in enumerate(frames):
         labels, turned = closed_flood(cells, connectivity)
         records = []

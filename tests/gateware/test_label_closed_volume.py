@@ -3,9 +3,9 @@ docs/timing.md."""
 
 import numpy as np
 import pytest
-import unrolled
+import zone_oracles
 from sample import sample
-from unrolled import RULES, every_frame, recorded, skin_of
+from zone_oracles import RULES, every_frame, recorded, skin_of
 
 from contactfpga_sim.model.golden import all_departures, row_clocks
 from contactfpga_sim.model.scenes import shapes
@@ -37,9 +37,9 @@ def check_compiled(frames, connectivity, labeller):
     skin = skin_of(rows, columns, connectivity, labeller)
     with LabelBench(skin) as bench:
         got, stalled = bench.run(frames), bench.run(frames, gap=20, stall=60)
-    expected = unrolled.zones(frames, connectivity)
+    expected = zone_oracles.zones(frames, connectivity)
     for one in (got, stalled):
-        assert np.array_equal(unrolled.of_records(one.frame, one.moments, columns), expected)
+        assert np.array_equal(zone_oracles.of_records(one.frame, one.moments, columns), expected)
     busy, end = row_clocks(frames, connectivity, labeller, True)
     handed = handed_over(got, busy)
     assert np.array_equal(got.end, handed[:, -1] + end[:, -1])
@@ -114,7 +114,7 @@ def test_shapes_that_go_around(record_property, size, connectivity, labeller):
     for first in range(0, len(frames), part):
         seen.append(check_compiled(frames[first : first + part], connectivity, labeller)[1][:, 2])
     places = np.concatenate(seen)
-    assert min((places == unrolled.RING).sum(), (places == unrolled.WOUND).sum()) > 5
+    assert min((places == zone_oracles.RING).sum(), (places == zone_oracles.WOUND).sum()) > 5
     record_property("cases", len(frames))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from sample import sample
-from shadows import moments, zones_by_image_tools
+from zone_oracles import moments, zones_by_image_tools
 
 from contactfpga.skin import Skin
 from contactfpga_sim.model.golden.label import labelling

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cobs import cobs
-from shadows import zones_by_image_tools
+from zone_oracles import zones_by_image_tools
 
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from sample import sample
 from scipy import ndimage
-from shadows import zones_by_image_tools
 from study_pages import section
+from zone_oracles import zones_by_image_tools
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli

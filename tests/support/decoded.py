@@ -1,4 +1,4 @@
-"""What the product reads in bytes that a board sent."""
+"""What the product reads in bytes that a board sent: whole streams, and packets without delimiter and check bytes."""
 
 from contactfpga.skin.derived import Widths
 from contactfpga.wire import framing, protocol
@@ -18,3 +18,13 @@ def decoded(data, skin):
         else:
             frames.append(protocol.decode_frame(plain, widths))
     return frames, hellos
+
+
+def frame_in(packet, skin):
+    assert packet.endswith(b"\0")
+    assert packet.count(b"\0") == 1
+    return protocol.decode_frame(unsealed(packet, skin), Widths(skin.sheet))
+
+
+def unsealed(packet, skin):
+    return protocol.unseal(packet.strip(b"\0"), protocol.check_prefix(skin))

@@ -1,5 +1,6 @@
 """Recorded frames through the compiled gateware and back, as `contactfpga replay` does it."""
 
+import functools
 import itertools
 import json
 from pathlib import Path
@@ -121,14 +122,9 @@ def test_a_lost_frame_is_an_error(monkeypatch):
 
 
 @pytest.fixture
-def run(capsys):
+def run(run):
     """Runs `contactfpga replay`; returns status, output and errors."""
-
-    def run(*arguments):
-        status = cli.main(["replay", *map(str, arguments)])
-        return status, *capsys.readouterr()
-
-    return run
+    return functools.partial(run, "replay")
 
 
 @pytest.mark.slow

@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 from cobs import cobs
+from decoded import frame_in, unsealed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from unsealed import decoded, unsealed
 from wire import (
     HELLO,
     NAME,
@@ -77,7 +77,7 @@ def test_zones_arrive_exactly(data, skin, trailer):
     rows = data.draw(moments(skin))
     if sum(row[0] for row in rows) > skin.rows * skin.columns:
         rows = rows[:1]
-    frame = decoded(Wire(skin).zones(rows, **trailer), skin)
+    frame = frame_in(Wire(skin).zones(rows, **trailer), skin)
     assert frame.moments.tolist() == [list(row) for row in rows]
     assert fields(frame) == trailer
     assert (frame.zones, frame.cells) == (len(rows), sum(row[0] for row in rows))
@@ -94,7 +94,7 @@ def test_barycenters_arrive_exactly(data, skin, fraction_bits, trailer):
     rows = data.draw(st.lists(st.tuples(area, x, y), max_size=most))
     if sum(row[0] for row in rows) > skin.rows * skin.columns:
         rows = [(skin.rows * skin.columns, *rows[0][1:])]
-    frame = decoded(Wire(skin).zones(rows, **trailer), skin)
+    frame = frame_in(Wire(skin).zones(rows, **trailer), skin)
     assert frame.barycenters.tolist() == [list(row) for row in rows]
     assert fields(frame) == trailer
     assert (frame.zones, frame.cells) == (len(rows), sum(row[0] for row in rows))
@@ -106,7 +106,7 @@ def test_barycenters_arrive_exactly(data, skin, fraction_bits, trailer):
 def test_bitmaps_arrive_exactly(data, skin, trailer):
     seed = data.draw(st.integers(0, 1 << 32))
     bitmap = np.random.default_rng(seed).random((skin.rows, skin.columns)) < 0.3
-    frame = decoded(Wire(skin).cells(bitmap.tolist(), **trailer), skin)
+    frame = frame_in(Wire(skin).cells(bitmap.tolist(), **trailer), skin)
     assert np.array_equal(frame.bitmap, bitmap)
     assert fields(frame) == trailer
     assert (frame.zones, frame.cells) == (0, int(bitmap.sum()))

@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from unsealed import decoded
+from decoded import frame_in
 from wire import (
     FINGERPRINT,
     HELLO,
@@ -101,7 +101,7 @@ def test_frames_that_contradict_themselves_are_refused(plain, skin, reason):
 
 
 def test_a_mismatch_on_the_board_is_passed_on():
-    frame = decoded(WIRE.zones(ONE, cells=7, flags=["mismatch"]), REFERENCE)
+    frame = frame_in(WIRE.zones(ONE, cells=7, flags=["mismatch"]), REFERENCE)
     assert (frame.cells, frame.moments.tolist()) == (7, [[4, 10, 6]])
 
 
@@ -111,7 +111,7 @@ def test_all_cells_of_a_sheet_are_sent_as_0_where_that_saves_a_bit():
         area = rows * columns
         plain = Wire(skin).plain_zones([(area, columns - 1, 0)])
         assert plain[0] & (1 << Widths(skin.sheet).record_bits[0]) - 1 == record
-        assert decoded(Wire(skin).seal(plain), skin).barycenters.tolist() == [[area, columns - 1, 0]]
+        assert frame_in(Wire(skin).seal(plain), skin).barycenters.tolist() == [[area, columns - 1, 0]]
 
 
 @pytest.mark.parametrize(("packet", "hello"), [(old_hello(), True), (old_frame(), False)])

@@ -1,4 +1,4 @@
-"""Zones of closed sheets by scipy, on many turns of the sheet side by side; labellers to try."""
+"""Zones by scipy, of closed sheets on many turns of the sheet side by side and of labellers that are not exact."""
 
 from pathlib import Path
 
@@ -93,3 +93,21 @@ def recorded(name):
         pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
     with np.load(path, allow_pickle=False) as file:
         return file["pressed"]
+
+
+def moments(cells):
+    y, x = np.nonzero(cells)
+    return len(x), int(x.sum()), int(y.sum())
+
+
+def zones_by_image_tools(cells, labeller):
+    """The same zones by scipy's runs: of the row shadow, and of the column shadow of each."""
+    if labeller == "single":
+        return [moments(cells)] if cells.any() else []
+    bands, count = ndimage.label(cells.any(axis=1))
+    found = []
+    for band in range(1, count + 1):
+        inside = cells & (bands == band)[:, None]
+        runs, number = ndimage.label(inside.any(axis=0))
+        found += [moments(inside & (runs == run)) for run in range(1, number + 1)]
+    return found
