@@ -42,7 +42,7 @@ def random_words(rng, cycles, bits, spacing):
 
 def predicted(skin, frames, changes, asked, cycles):
     """The golden model's bytes."""
-    told = faults.Told()
+    told = faults.FaultHistory()
     for cycle, word in changes[1:]:
         told.change(cycle, word)
     link = Link(facts(skin), State(facts(skin), [], Reception([], [])), told)
