@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import SELF_TEST, Derived
+from contactfpga.skin.derived import SELF_TEST
 from contactfpga.skin.units import NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
 from contactfpga_sim.model.golden import uart
 from contactfpga_sim.model.golden.facts import facts
@@ -200,7 +200,7 @@ def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
         pieces = [(start, cells, _with_guard(skin, stuck, rng)) for start, cells, stuck in pieces]
         cuts = [(start, _cuts(skin, rng)) for start in _starts(rng, cycles, 6 * facts(skin).scan_clocks)]
     if skin.units:
-        most = 2 ** skin.derived.units.converter.bits - 1
+        most = 2**skin.derived.units.converter.bits - 1
         sweep = skin.derived.units.sweep_clocks
         units = [(start, _readings(skin.units, most, rng)) for start in _starts(rng, cycles, sweep)]
     return Timeline(pieces, timeline.received, cuts, units)
