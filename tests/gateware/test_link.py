@@ -264,7 +264,7 @@ def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng
     sim.drive(dut.time, lambda cycle: turns[cycle] << KEEP_ALIVE_BIT)
     due, send = sim.watch(dut.due), sim.watch(dut.frames.verdict.send)
     sim.run(cycles - 1)
-    most = skin.derived.keep_alive_turns
+    most = skin.derived.keep_alive_toggles
     passed = most
     for cycle in range(cycles - 1):
         is_due = passed >= most

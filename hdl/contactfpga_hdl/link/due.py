@@ -23,7 +23,7 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
     """``link.due``: a frame is to be sent though nothing has changed."""
     decide, sends = link.frames.decide, link.frames.verdict.send
     if link.derived.scan.waits:
-        most = link.derived.keep_alive_turns
+        most = link.derived.keep_alive_toggles
         turns = Signal(range(most + 1), init=most)  # of the clock's bit, since the last frame sent
         m.d.comb += link.due.eq(turns == most)
         with m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due):

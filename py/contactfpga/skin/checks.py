@@ -266,7 +266,7 @@ def check_timing(skin: Skin) -> None:
 def _check_keep_alive(skin: Skin, derived: Derived) -> None:
     if skin.send != "on_change":
         return
-    if derived.scan.waits and derived.keep_alive_turns < 1:
+    if derived.scan.waits and derived.keep_alive_toggles < 1:
         raise SkinError(
             f"keep_alive_ms is {skin.keep_alive_ms}; scan = {skin.scan!r} needs at least "
             f"{derived.min_keep_alive_ms:g} ms for this sheet"

@@ -30,9 +30,9 @@ HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can wait for a frame and still come every second."""
 
 HELLO_BIT = 19
-"""Of the clock in us: a scan that waits makes a hello due when it turns, every 0.52 s."""
+"""Of the clock in us: a scan that waits makes a hello due when it toggles, every 0.52 s."""
 KEEP_ALIVE_BIT = 10
-"""Likewise: a keep-alive is counted in its turns, of 1.024 ms."""
+"""Likewise: a keep-alive is counted in its toggles, every 1.024 ms."""
 
 EPOCH_BITS = 22
 """The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
@@ -89,8 +89,8 @@ class Widths:
         sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
         """
         if not self.report.divided:
-            turned = (self.area_bits,) if self.sheet.closed else ()
-            return self.area_bits, self.sum_x_bits, self.sum_y_bits, *turned
+            past = (self.area_bits,) if self.sheet.closed else ()
+            return self.area_bits, self.sum_x_bits, self.sum_y_bits, *past
         x_bits, y_bits = (
             max(1, (lines - 1 << self.sheet.barycenter_bits).bit_length())
             for lines in (self.sheet.columns, self.sheet.rows)
@@ -358,18 +358,18 @@ class Derived(Widths):
         return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
 
     @property
-    def keep_alive_turns(self) -> int:
-        """Turns of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame; the rest of the time
-        is for that frame."""
-        return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_turns
+    def keep_alive_toggles(self) -> int:
+        """Toggles of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame; the rest of the
+        time is for that frame."""
+        return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_toggles
 
     @property
     def min_keep_alive_ms(self) -> float:
         """Of a scan that waits."""
-        return (self._spare_turns + 1) * (1 << KEEP_ALIVE_BIT) / 1000
+        return (self._spare_toggles + 1) * (1 << KEEP_ALIVE_BIT) / 1000
 
     @property
-    def _spare_turns(self) -> int:
+    def _spare_toggles(self) -> int:
         return 1 + math.ceil(2 * self.frame_clocks / ((1 << KEEP_ALIVE_BIT) * self.clocks_per_us))
 
     @property

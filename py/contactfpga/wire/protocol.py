@@ -205,10 +205,10 @@ def _check_sums(frame: Frame, widths: Widths) -> None:
     else:
         most_x, most_y = sheet.columns - 1, sheet.rows - 1
         if frame.barycenters is None:
-            area, x, y, *turned = frame.moments.T.tolist()
+            area, x, y, *past = frame.moments.T.tolist()
             inside = all(x <= a * most_x and y <= a * most_y for a, x, y in zip(area, x, y))
             whole = (1 << widths.area_bits) - 1
-            inside &= all(t <= a or t == whole for past in turned for a, t in zip(area, past))
+            inside &= all(t <= a or t == whole for cells in past for a, t in zip(area, cells))
         else:
             area, x, y = frame.barycenters.T.tolist()
             bits = sheet.barycenter_bits
