@@ -190,7 +190,6 @@ CASES = [
     ["fit", "bumper", "--pitch-mm", "0"],
     ["fit", "bumper", "--jobs", "0"],
     ["study", "failures", "--study", "elbow"],
-    ["study", "failures", "--page", "x.md", "--study", "ghost"],
     *(["study", "arm", "--case", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     ["study", "arm", "--case", "elbow"],
     ["study", "arm", "--latency", "-1"],

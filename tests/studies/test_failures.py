@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from sample import sample
 from scipy import ndimage
-from study_pages import section
+from study_pages import outdated, section
 from zone_oracles import zones_by_image_tools
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.failures import electric, knob_pictures, line, shapes, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
@@ -199,9 +198,7 @@ def test_what_passes_unnoticed_has_its_reason_on_the_page():
 
 @pytest.mark.campaign
 def test_the_page_and_its_pictures_are_up_to_date(turned):
-    assert {name: table() for name, table in tables.tables(turned).items()} == {
-        name: section("failures.md", name) for name in registry.load("failures").sections
-    }
+    assert not outdated("failures", computed=turned)
     for name, methods in turned.items():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
         assert knob_pictures.svg(KNOBS[name], methods) == drawn
@@ -475,7 +472,6 @@ def test_the_command_writes_a_study(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["--study", "elbow"], "--study 'elbow' is not known; take one of: winding; crossing"),
-        (["--study", "ghost", "--page", "x.md"], "--page takes all studies; leave --study out"),
     ],
 )
 def test_what_the_command_does_not_take(arguments, message, capsys):

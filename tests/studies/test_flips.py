@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import section
+from study_pages import outdated
 
 from contactfpga import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept, registry
-from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, touches
-from contactfpga_sim.lab.flips import tables as flips_tables
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, tables, touches
 from contactfpga_sim.lab.flips.campaign import Row
 from contactfpga_sim.lab.flips.designs import DESIGNS
 from contactfpga_sim.lab.flips.flip import Flip, Found
@@ -313,17 +312,12 @@ def test_a_block_after_one_that_is_missing_does_not_count():
 def test_bad_choices_are_refused_in_a_sentence(capsys):
     assert cli.main(["study", "flips", "--design", "triple"]) == 1
     assert "--design 'triple' is not known; take one of: run;" in capsys.readouterr().err
-    assert cli.main(["study", "flips", "--page", "x.md", "--design", "run"]) == 1
-    assert "--page takes all designs; leave --design out" in capsys.readouterr().err
 
 
 def test_the_page_says_what_the_numbers_beside_it_say():
     rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
     assert [design.name for design in sizes] == list(DESIGNS)
-    tables = flips_tables.tables(rows, sizes)
-    assert {name: table() for name, table in tables.items()} == {
-        name: section("flips.md", name) for name in registry.load("flips").sections
-    }
+    assert not outdated("flips", computed=tables.FlipResults(rows, sizes))
 
 
 def test_tables_count_what_came_out():
@@ -333,7 +327,7 @@ def test_tables_count_what_came_out():
         *3 * [Row("run", found._replace(outcome="masked", kind=""))],
         Row("run", found._replace(memory=True, outcome="told", kind="lost", name="link.store")),
     ]
-    tables = flips_tables.tables(rows, [Design("run", 1700, 1000, 14000)])
+    found = tables.FlipResults(rows, [Design("run", 1700, 1000, 14000)])
     worst = [
         "- Flips of registers with one copy: one of `scan.time` in `run` was silently wrong for 250.0 ms (time).",
         "1 of 4 were silently wrong (4.6 to 69.9 %), 1 of them for more than 5 ms (4.6 to 69.9 %).",
@@ -341,14 +335,14 @@ def test_tables_count_what_came_out():
         "0 of 1 were silently wrong (0.0 to 79.3 %), 0 of them for more than 5 ms (0.0 to 79.3 %).",
         "A flip that was not drawn may be worse than all of these.",
     ]
-    assert tables["worst"]().split() == " ".join(worst).split()
-    registers, memory = tables["flipped"]().splitlines()[2:]
+    assert tables.worst_text(found).split() == " ".join(worst).split()
+    registers, memory = tables.designs_table(found).splitlines()[2:]
     assert registers.startswith(
         "| `run` | 1,700 | 1,000 of registers | 4 | **25.0 %**, 4.6 to 69.9 % | 250.0 / 250.0 |"
     )
     assert memory == "|  |  | 14,000 of memory | 1 | **0.0 %**, 0.0 to 79.3 % |  | 100.0 % |"
-    assert tables["modules"]().splitlines()[2:] == ["| scan | 4 | 1 | 0 | 3 | `scan.time` 1 |"]
-    assert tables["ways"]().splitlines()[2:] == [
+    assert tables.modules_table(found).splitlines()[2:] == ["| scan | 4 | 1 | 0 | 3 | `scan.time` 1 |"]
+    assert tables.ways_table(found).splitlines()[2:] == [
         "| `run` | silently wrong | time | 1 |",
         "| `run` | reported | lost | 1 |",
     ]

@@ -12,8 +12,10 @@ def section(page, name):
     return writer.sections((DOCS / page).read_text(encoding="utf-8"))[name].text
 
 
-def outdated(study, *names, without=()):
-    """Sections of a study, of these names or all, that it would make otherwise now."""
+def outdated(study, *names, without=(), computed=None):
+    """Sections of a study, of these names or all, that it would make otherwise now; ``computed``: what they share."""
     run = registry.StudyRun(registry.load(study))
+    if computed is not None:
+        run.computed = computed
     named = names or [name for name in run.study.sections if name not in without]
     return [name for name in named if run.text(name) != section(run.study.page_of(name), name)]

@@ -13,5 +13,5 @@ STUDY = Study(
         "pictures": Section("tables:pictures", sample="tables:pictures"),
     },
     compute="tables:compute",
-    pictures="tables:draw",
+    pictures="tables:draw_for_page",
 )

@@ -70,11 +70,6 @@ def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
     return writer.table(UNNOTICED, lines)
 
 
-def tables(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Tables:
-    """All sections of the page, by name."""
-    return {"failures": lambda: table(sweeps), "unnoticed": lambda: unnoticed(sweeps), "pictures": pictures}
-
-
 def pictures() -> str:
     """A heading and a picture for each knob."""
     return "\n".join(f"({knob.name})=\n\n![{knob.title}](images/failures/{knob.name}.svg)\n" for knob in KNOBS.values())
@@ -96,10 +91,15 @@ def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None
 
 
 def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """A picture for each knob, in a folder of their own."""
-    (folder / "failures").mkdir(exist_ok=True)
+    """A picture for each knob."""
     drawn = []
     for name, methods in sweeps.items():
-        drawn.append(folder / "failures" / f"{name}.svg")
+        drawn.append(folder / f"{name}.svg")
         write_text(drawn[-1], knob_pictures.svg(KNOBS[name], methods))
     return drawn
+
+
+def draw_for_page(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
+    """The same in a folder of their own among the pictures of the pages."""
+    (folder / "failures").mkdir(exist_ok=True)
+    return draw(folder / "failures", sweeps)

@@ -58,17 +58,6 @@ def draw(folder: Path, found: FlipResults) -> list[Path]:
     return [numbers / "flips.csv", numbers / "designs.csv", drawn]
 
 
-def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
-    """All sections of the page, by name."""
-    found = FlipResults(rows, designs)
-    return {
-        "worst": lambda: worst_text(found),
-        "flipped": lambda: designs_table(found),
-        "modules": lambda: modules_table(found),
-        "ways": lambda: ways_table(found),
-    }
-
-
 def worst_text(found: FlipResults) -> str:
     """What the flips of registers and of memories did at worst, with one copy and with two, and how rare that is."""
     rows = found.rows

@@ -20,34 +20,24 @@ EXTRA = "sim"
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
     parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
-    page = "Rewrite the table in this page, and its pictures in images/failures beside it."
-    parser.add_argument("--page", metavar="FILE", help=page)
     flags.output(parser, "build/failures")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
-    from contactfpga_sim.lab import writer
     from contactfpga_sim.lab.failures import tables as failures_tables
     from contactfpga_sim.lab.failures.catalogue import KNOBS
 
     names = flags.known("--study", args.study, list(KNOBS))
-    if args.page and args.study:
-        raise ValueError("--page takes all studies; leave --study out")
     folder = outputs.folder(args.output)
-    path = writer.page(args.page, "--page") if args.page else None
-    pictures = outputs.folder(path.parent / "images" / "failures", "--page") if path else folder
     turned: dict[str, dict[str, Sweep]] = {}
     try:
         failures_tables.sweep_all(names, turned)
     except KeyboardInterrupt:
         raise Interrupted(_kept(turned, folder)) from None
-    if path:
-        writer.write(path, failures_tables.tables(turned))
-    else:
-        path = _write(turned, folder / "failures.md")
-    print(path, flush=True)
-    _draw(turned, pictures)
+    print(_write(turned, folder / "failures.md"), flush=True)
+    for path in failures_tables.draw(folder, turned):
+        print(path)
     return 0
 
 
@@ -66,12 +56,3 @@ def _kept(turned: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
         return "interrupted before the first knob was turned"
     path = _write(turned, folder / "failures-so-far.md")
     return f"interrupted; {done} row{'' if done == 1 else 's'} of the table, all that was finished, in {path}"
-
-
-def _draw(turned: Mapping[str, Mapping[str, Sweep]], folder: Path) -> None:
-    from contactfpga_sim.lab.failures import knob_pictures
-    from contactfpga_sim.lab.failures.catalogue import KNOBS
-
-    for name, methods in turned.items():
-        write_text(folder / f"{name}.svg", knob_pictures.svg(KNOBS[name], methods))
-        print(folder / f"{name}.svg")

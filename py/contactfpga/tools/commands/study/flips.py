@@ -24,23 +24,17 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     only = "Run nothing: use the results kept from earlier runs, as many as there are for each design."
     parser.add_argument("--kept", action="store_true", help=only)
     flags.workers(parser)
-    page = "Rewrite the tables in this page, with the picture in images and all numbers in flips beside it."
-    parser.add_argument("--page", metavar="FILE", help=page)
     flags.output(parser, "build/flips")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
-    from contactfpga_sim.lab import pool, writer
-    from contactfpga_sim.lab.flips import campaign, picture, summary
-    from contactfpga_sim.lab.flips import tables as flips_tables
+    from contactfpga_sim.lab import pool
+    from contactfpga_sim.lab.flips import campaign, summary
     from contactfpga_sim.lab.flips.designs import DESIGNS
 
     names = flags.known("--design", args.design, list(DESIGNS))
-    if args.page and args.design:
-        raise ValueError("--page takes all designs; leave --design out")
-    page = writer.page(args.page, "--page") if args.page else None
-    folder = outputs.folder(page.parent / "flips" if page else args.output, "--page" if page else "--output")
+    folder = outputs.folder(args.output)
     if args.kept:
         rows = campaign.finished(names)
     else:
@@ -61,10 +55,4 @@ def run(args: argparse.Namespace) -> int:
                 print(f"{name}: {what}: none was followed")
                 continue
             print(f"{name}: {what}: {summary.share(some)} silently wrong, {summary.share(some, 'told')} reported")
-    if page:
-        found = summary.measured(names)
-        summary.write(found, folder / "designs.csv")
-        writer.write(page, flips_tables.tables(rows, found))
-        print(page)
-        print(picture.draw(rows, found, outputs.folder(page.parent / "images", "--page") / "flips.svg"))
     return 0
