@@ -8,6 +8,7 @@ from zone_oracles import zones_by_image_tools
 
 import contactfpga
 from contactfpga import Skin, SkinError
+from contactfpga.choices import labellers
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
@@ -23,7 +24,7 @@ def random_skin(rng):
             "rows": rows,
             "columns": columns,
             "connectivity": rng.choice([4, 8]),
-            "labeller": rng.choice(["run", "serial", "projection", "single"]),
+            "labeller": rng.choice(list(labellers.LABELLERS)),
             "report": rng.choice(["moments", "moments", "barycenter", "cells"]),
             "scan": rng.choice(["raster", "adaptive"]),
             "send": rng.choice(["always", "on_change"]),
@@ -44,7 +45,8 @@ def random_skin(rng):
 
 def expected(skin, cells):
     """Zones as (area, x, y) with x and y in mm, sorted; and by how much each may be rounded."""
-    exact = skin.labeller in ("run", "serial") or skin.report == "cells"  # cells are labelled exactly on the host
+    # Cells are labelled exactly on the host.
+    exact = labellers.find(skin.labeller).exact or skin.report == "cells"
     zones = golden.zones(cells, skin.connectivity) if exact else zones_by_image_tools(cells, skin.labeller)
     step = 2.0**-skin.barycenter_bits / 2 if skin.report == "barycenter" else 0.0
     places = [(area, x / area * skin.pitch_x_mm, y / area * skin.pitch_y_mm) for area, x, y in zones]

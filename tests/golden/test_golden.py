@@ -12,6 +12,7 @@ import pytest
 from cobs import cobs
 from zone_oracles import zones_by_image_tools
 
+from contactfpga.choices import labellers
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
 from contactfpga_sim.model import golden
@@ -262,7 +263,7 @@ def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
     """Whether a frame tells of these cells what it should."""
     if skin.report == "cells":
         return np.array_equal(frame.bitmap, cells)
-    exact = skin.labeller in ("run", "serial")
+    exact = labellers.find(skin.labeller).exact
     zones = golden.zones(cells, skin.connectivity) if exact else sorted(zones_by_image_tools(cells, skin.labeller))
     records = frame.moments
     if skin.report == "barycenter":

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from reversal import small, zones
 
+from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin.derived import Widths
 from contactfpga_sim.model.golden import Timeline, predict
 
 
-@pytest.mark.parametrize("labeller", ["run", "serial", "projection", "single"])
+@pytest.mark.parametrize("labeller", LABELLERS)
 @pytest.mark.parametrize("rows", [(0,), (3,), (0, 3), (1, 5), (0, 1, 4, 5)])
 def test_moments_of_zones_in_rows_that_were_driven_count_the_rows_between(labeller, rows):
     skin = small(rows=6, columns=3, labeller=labeller)

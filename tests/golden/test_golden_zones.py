@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.golden.label import labelling
 
@@ -116,7 +117,7 @@ def test_every_4x4_frame_agrees_with_scipy(connectivity):
 
 
 @pytest.mark.parametrize("connectivity", CONNECTIVITIES)
-@pytest.mark.parametrize("labeller", ["run", "serial"])
+@pytest.mark.parametrize("labeller", [name for name, labeller in LABELLERS.items() if labeller.exact])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_many_frames_at_once_agree_with_flood_fill_and_the_labellers_rule(shape, connectivity, labeller):
     rng = np.random.default_rng([*shape, connectivity, 1])

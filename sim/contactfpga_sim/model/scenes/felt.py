@@ -50,12 +50,12 @@ class UnitReadings:
         if load is None:
             return total
         drag = [at(value, seconds) for value in contact.drag_n]
-        turn = at(contact.torsion_nm, seconds)
+        torsion = at(contact.torsion_nm, seconds)
         for part, push in load.shares():
             point, normal, along, across = self._at(part.x_m, part.y_m)
             share = push / load.force_n
             force = -push * normal + share * (drag[0] * along + drag[1] * across)
-            total += np.concatenate([force, np.cross(point, force) + share * turn * normal])
+            total += np.concatenate([force, np.cross(point, force) + share * torsion * normal])
         return total
 
     def _at(self, x_m: float, y_m: float) -> tuple[Floats, Floats, Floats, Floats]:

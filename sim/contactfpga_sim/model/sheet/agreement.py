@@ -59,10 +59,10 @@ class SpiceComparison:
 def cases() -> Iterator[SpiceCase]:
     """Some 40 circuits, the same ones each time."""
     rng = np.random.default_rng(PATTERN_SEED)
-    for turn in range(ROUNDS):
+    for again in range(ROUNDS):
         for number, (make, names) in enumerate(PHASES.values()):
-            size = (16, 16) if turn == 0 else SIZES[(turn + number) % len(SIZES)]
-            yield _case(make, [*names, "random"][turn % (len(names) + 1)], size, rng, nominal=turn == 0)
+            size = (16, 16) if again == 0 else SIZES[(again + number) % len(SIZES)]
+            yield _case(make, [*names, "random"][again % (len(names) + 1)], size, rng, nominal=again == 0)
 
 
 def _case(

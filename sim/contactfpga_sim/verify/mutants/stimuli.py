@@ -187,7 +187,7 @@ def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
 
 
 def least_cycles(skin: Skin) -> int:
-    """In which the options have had their turn: sweeps of the units, slots of a few self-tests."""
+    """Cycles in which each option has been at work: sweeps of the units, slots of a few self-tests."""
     sweeps = 40 * skin.derived.units.sweep_clocks if skin.units else 0
     return max(sweeps, 5 * test_clocks(skin) if skin.self_test else 0)
 
