@@ -90,6 +90,7 @@ class ReversalCycle(wiring.Component):
             self.selected.eq(0),
             self.guard.eq(0),
         ]
+        sample_clock = self._sample_clock(m)
         with m.FSM(name="cycle"):
             with m.State("LISTEN"):
                 self._listen(m)
@@ -105,7 +106,7 @@ class ReversalCycle(wiring.Component):
                     m.d.sync += self.y.eq(self.following)
                 m.next = "SELECT"
             with m.State("SELECT"):
-                self._select(m)
+                self._select(m, sample_clock)
             if self.skin.guard:
                 self._answer(m)
             if self.skin.self_test:
@@ -137,10 +138,10 @@ class ReversalCycle(wiring.Component):
                     m.d.sync += self._clock.eq(self._charged)
                     m.next = "CHARGE"
 
-    def _select(self, m: Module) -> None:
+    def _select(self, m: Module, sample_clock: Value | int) -> None:
         row = Const(1, self.skin.rows) << self.y
         m.d.sync += [self.selected.eq(Mux(self._selects, 0, row)), self.guard.eq(self._selects)]
-        with m.If(self._clock == self._sample_clock(m)):
+        with m.If(self._clock == sample_clock):
             m.d.sync += self._due[0].eq(~self._selects)
         with m.If(self._clock == self._settle):
             m.d.sync += [self.selected.eq(0), self.guard.eq(0), self._clock.eq(0)]
@@ -155,6 +156,7 @@ class ReversalCycle(wiring.Component):
                         self._check(m, columns_from="CHARGE")
 
     def _sample_clock(self, m: Module) -> Value | int:
+        """The clock of a row in which its columns are sampled."""
         if not moves_sample(self.derived):
             return self._settle
         return SampleAt(m, self.derived, self.moves, self.clocks, self.begins).clock

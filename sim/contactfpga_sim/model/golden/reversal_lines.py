@@ -9,8 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactfpga_sim.model.golden import guard
 from contactfpga_sim.model.golden.facts import Facts
-from contactfpga_sim.model.golden.guard import RETRY_US, FaultyLines, closed, stuck
+from contactfpga_sim.model.golden.guard import FaultyLines, closed, stuck
 from contactfpga_sim.model.golden.request import Request
 from contactfpga_sim.model.golden.scan import Stages
 from contactfpga_sim.model.golden.trace import Timeline
@@ -47,7 +48,7 @@ class StuckColumns:
         self._facts = facts
         self._timeline = timeline
         self._changes = sorted({*(piece[0] for piece in timeline.pieces), *(cut[0] for cut in timeline.cuts)})
-        self._retry = RETRY_US * facts.clocks_per_us
+        self._retry = guard.RETRY_US * facts.clocks_per_us
         self._apart = 2 ** max(4, max(facts.precharge, facts.project).bit_length())
         self._present = ~facts.mask.all(axis=0)
         everything = np.ones(facts.columns, bool)
@@ -171,7 +172,7 @@ class GuardChecks:
         self._facts = facts
         self._timeline = timeline
         self._held = held
-        self._retry = RETRY_US * facts.clocks_per_us
+        self._retry = guard.RETRY_US * facts.clocks_per_us
         self._retries = 0  # up to the last check of rows
         self._renews = False
         self._told = FaultyLines(facts)
