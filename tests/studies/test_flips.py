@@ -132,7 +132,7 @@ def test_the_reference_is_right_all_the_time(plain):
 
 @pytest.mark.campaign  # which has a board of its own to compile
 @pytest.mark.parametrize("copy", ["first", "second"])
-@pytest.mark.parametrize("place", ["scan.time", "transmitter.shift", "scan.driver.selected"])
+@pytest.mark.parametrize("place", ["scan.frame_clock.time", "transmitter.shift", "scan.driver.selected"])
 def test_what_is_wrong_in_either_copy_ends_with_a_restart(dual, copy, place):
     bit = Bit(place_of(dual.board, f"dual.{copy}.{place}"), 0, 2)
     found = [flip.follow(dual, Flip(bit, dual.step_clocks * 24 + clock)) for clock in (17, 4321)]
@@ -142,7 +142,7 @@ def test_what_is_wrong_in_either_copy_ends_with_a_restart(dual, copy, place):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("place", "bits"), [("scan.time", (0, 13, 23)), ("scan.pattern", (0, 3)), ("scan.driver.selected", (1, 2))]
+    ("place", "bits"), [("scan.frame_clock.time", (0, 13, 23)), ("scan.pattern", (0, 3)), ("scan.driver.selected", (1, 2))]
 )
 def test_a_register_of_the_scan_that_turned_starts_the_board_again(plain, place, bits):
     """In the middle of a microsecond and of a slot."""
@@ -178,7 +178,7 @@ def test_contact_is_high_from_a_restart_until_a_frame_after_it():
     board.press(np.zeros((4, 4), bool))
     board.run(10_003)
     assert board.take("contact")["data"].tolist() in ([], [0])
-    board.flip(Bit(place_of(board, "scan.time"), 0, 20))
+    board.flip(Bit(place_of(board, "scan.frame_clock.time"), 0, 20))
     board.run(10_000)
     rises, falls = board.take("contact")
     assert (rises["data"], falls["data"]) == (1, 0)

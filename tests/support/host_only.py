@@ -12,7 +12,8 @@ FIXTURES = {"bench", "board"}  # of conftest.py, which import some of them
 class _Absent:
     @staticmethod
     def find_spec(name, path=None, target=None):
-        simulation = name.startswith(f"{SIMULATION}.") and not f"{name}.".startswith(f"{PRESENT}.")
+        present = f"{name}.".startswith(f"{PRESENT}.") or PRESENT.startswith(f"{name}.")
+        simulation = name.startswith(f"{SIMULATION}.") and not present
         if simulation or name.partition(".")[0] in ABSENT:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
