@@ -142,7 +142,8 @@ def test_what_is_wrong_in_either_copy_ends_with_a_restart(dual, copy, place):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("place", "bits"), [("scan.frame_clock.time", (0, 13, 23)), ("scan.pattern", (0, 3)), ("scan.driver.selected", (1, 2))]
+    ("place", "bits"),
+    [("scan.frame_clock.time", (0, 13, 23)), ("scan.pattern", (0, 3)), ("scan.driver.selected", (1, 2))],
 )
 def test_a_register_of_the_scan_that_turned_starts_the_board_again(plain, place, bits):
     """In the middle of a microsecond and of a slot."""
