@@ -116,7 +116,7 @@ class Link(wiring.Component):
         return self.frames.decide & due
 
     def _optional_ports(self) -> dict[str, wiring.Member]:
-        """Of what only some Skins send besides frames."""
+        """Ports of what only some Skins send besides frames."""
         ports: dict[str, wiring.Member] = {}
         if (faults := faults_layout(self.derived)).size:
             ports["faults"] = In(faults)

@@ -163,7 +163,7 @@ class ReversalCycle(wiring.Component):
 
     @property
     def _check_clocks(self) -> int:
-        """Of a check of the rows after a frame."""
+        """Clocks that a check of the rows after a frame takes."""
         return max(self.derived.project_clocks, self._settle)
 
     def _check(self, m: Module, columns_from: str) -> None:

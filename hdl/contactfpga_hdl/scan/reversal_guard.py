@@ -13,7 +13,7 @@ from contactfpga_hdl.payloads import faults_layout
 from contactfpga_hdl.scan.guard import LineFaults
 
 CHECK_BIT = 8
-"""Of the clock in us: when this bit toggles, a sheet at rest is checked."""
+"""Bit of the clock in us: each time it toggles, a sheet at rest is checked."""
 
 
 class Checks(wiring.Component):
