@@ -233,7 +233,7 @@ class Walk(wiring.Component):
             self._next_cluster(m, left, row_ends)
 
     def _next_cluster(self, m: Module, left: _Left, ends: Value) -> None:
-        """Of the clusters that end there, the first one is next."""
+        """The first of the clusters that end there is next."""
         upto, others = Signal.like(left.ends), Signal.like(left.ends)
         m.d.comb += [others.eq(ends & (ends - 1)), upto.eq(Mux(ends.any(), ends ^ (ends - 1), 0))]
         m.d.sync += [left.ends.eq(others), left.inside.eq(upto)]

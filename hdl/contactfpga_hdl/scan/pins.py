@@ -190,7 +190,7 @@ def moves_sample(derived: Derived) -> bool:
 
 
 def sample_at_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Of a scan that obeys the command "sample at".
+    """Ports of a scan that obeys the command "sample at".
 
     moves (in): high for a clock when the command comes, with the request.
     clocks (in): its value, in that clock.

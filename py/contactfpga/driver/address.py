@@ -102,9 +102,9 @@ class Replay:
     pace: float | None = None
     """How many times as fast as it was recorded; None: as fast as it is read."""
     start_s: float = 0.0
-    """Of an MCAP file: from the hello on that came last before this time since its beginning."""
+    """Where an MCAP file starts to play: at the last hello before this many seconds from its beginning."""
     link: str | None = None
-    """Of an MCAP file with several."""
+    """Name of the link to play, of an MCAP file with several."""
 
     @classmethod
     def parse(cls, name: str) -> Replay:

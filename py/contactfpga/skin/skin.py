@@ -273,7 +273,7 @@ class Skin:
         return Derived(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: what follows from them is worked out anew in another process."""
+        """The fields alone. Another process computes again what follows from them."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def max_zones(self) -> int:

@@ -1,4 +1,4 @@
-// The shift registers between a board and its sheet, a cycle at a time; see contactfpga_sim/sheet/shift.py.
+// The shift registers between a board and its sheet, a cycle at a time; see contactfpga_sim/model/sheet/shift.py.
 #pragma once
 
 #include <cstdint>
