@@ -9,7 +9,7 @@ from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 
-_INSIDE = ("bits", "bytes", "turn", "holds", "contact")
+_INSIDE = ("bits", "bytes", "grant", "holds", "contact")
 """Ports of a sheet's :class:`Top` that do not lead outside."""
 
 
@@ -18,7 +18,7 @@ class SeveralTop(wiring.Component):
     ``row_data_0``; ``tx``, ``rx`` and ``contact`` are shared. ``contact`` is high in the clock after one in
     which any sheet's is.
 
-    Sheets know nothing of each other but whose turn it is to send. Each keeps its newest frame until then.
+    Sheets know nothing of each other but which of them may send. Each keeps its newest frame until then.
     """
 
     def __init__(self, several: Several, probes: bool = False):
@@ -33,21 +33,21 @@ class SeveralTop(wiring.Component):
         derived = self.several.skins[0].derived  # its rates are those of all
         m.submodules.transmitter = transmitter = Transmitter(derived.bit_clocks)
         m.submodules.receiver = receiver = receiver_of(derived)
-        m.submodules.turns = turns = RoundRobin(len(self.sheets))
+        m.submodules.grants = grants = RoundRobin(len(self.sheets))
         m.d.comb += [
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
-            turns.holds.eq(Cat(sheet.holds for sheet in self.sheets)),
+            grants.holds.eq(Cat(sheet.holds for sheet in self.sheets)),
         ]
         # One may be let go as another is touched: a register keeps that from the pin.
         m.d.sync += self.contact.eq(Cat(sheet.contact for sheet in self.sheets).any())
         for number, sheet in enumerate(self.sheets):
             m.submodules[f"sheet_{number}"] = sheet
-            m.d.comb += [sheet.turn.eq(turns.turn[number]), sheet.bytes.ready.eq(transmitter.bytes.ready)]
+            m.d.comb += [sheet.grant.eq(grants.grant[number]), sheet.bytes.ready.eq(transmitter.bytes.ready)]
             m.d.comb += [
                 getattr(sheet.bits, name).eq(getattr(receiver.bits, name)) for name in receiver.bits.signature.members
             ]
-            with m.If(turns.turn[number]):
+            with m.If(grants.grant[number]):
                 m.d.comb += [
                     transmitter.bytes.valid.eq(sheet.bytes.valid),
                     transmitter.bytes.payload.eq(sheet.bytes.payload),
@@ -66,22 +66,22 @@ class SeveralTop(wiring.Component):
 
 
 class RoundRobin(wiring.Component):
-    """Whose turn it is to send a packet: it goes round from sheet to sheet. Who has it may begin a packet, and keeps it
-    to its end; who has nothing to send passes it on in the same clock. So a sheet waits for one packet of each other
+    """Grants the line to one sheet after the other. The sheet with the grant may begin a packet, and keeps it
+    to its end; one with nothing to send passes it on in the same clock. So a sheet waits for one packet of each other
     sheet at most.
 
-    holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at in the sheet's turn.
-    turn (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
+    holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at while the sheet has the grant.
+    grant (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
     """
 
     def __init__(self, sheets: int):
         self.sheets = sheets
-        super().__init__({"holds": In(sheets), "turn": Out(sheets)})
+        super().__init__({"holds": In(sheets), "grant": Out(sheets)})
 
     def elaborate(self, platform):
         m = Module()
-        others = Signal(self.sheets - 1)  # by sheet after the first one; none: it is the first one's turn
-        m.d.comb += self.turn.eq(Cat(~others.any(), others))
-        with m.If(~(self.turn & self.holds).any()):
-            m.d.sync += others.eq(self.turn)
+        others = Signal(self.sheets - 1)  # by sheet after the first one; none: the first one has the grant
+        m.d.comb += self.grant.eq(Cat(~others.any(), others))
+        with m.If(~(self.grant & self.holds).any()):
+            m.d.sync += others.eq(self.grant)
         return m

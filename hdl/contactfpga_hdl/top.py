@@ -22,7 +22,7 @@ from contactfpga_hdl.scan.pins import column_pins, connect_pins, moves_sample, r
 _Stage = TypeVar("_Stage", bound=wiring.Component)
 
 _UART = {"tx": Out(1, init=1), "rx": In(1, init=1)}
-_SHARED = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "turn": In(1), "holds": Out(1)}
+_SHARED = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "grant": In(1), "holds": Out(1)}
 """In its place where several sheets share it."""
 
 
@@ -41,7 +41,7 @@ class Top(wiring.Component):
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
     the records, and bytes.
 
-    Where the scan or the link finds that a register of it turned by itself, all begins again within two clocks but for
+    Where the scan or the link finds that a register of it flipped by itself, all begins again within two clocks but for
     what sends bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin
     ``contact`` is high until a frame after that is packed.
 
@@ -49,7 +49,7 @@ class Top(wiring.Component):
     is not from a register with ``fail_safe``.
 
     With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the
-    UART it has ``bits`` (in), ``bytes`` (out), and ``turn`` (in) and ``holds`` (out) of its link.
+    UART it has ``bits`` (in), ``bytes`` (out), and ``grant`` (in) and ``holds`` (out) of its link.
     """
 
     def __init__(self, skin: Skin, probes: bool = False, copy: bool = False, place: SheetPlace | None = None):
@@ -151,7 +151,7 @@ class Top(wiring.Component):
         self._put(m, "request", request)
         wiring.connect(m, link.bytes, wiring.flipped(self.bytes))
         wiring.connect(m, wiring.flipped(self.bits), request.bits)
-        m.d.comb += [link.turn.eq(self.turn), self.holds.eq(link.holds)]
+        m.d.comb += [link.grant.eq(self.grant), self.holds.eq(link.holds)]
 
     def _put(self, m: Module, name: str, stage: _Stage) -> _Stage:
         """Add a stage that begins again when a register is found wrong. The transmitter is none of them, so that the

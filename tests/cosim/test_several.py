@@ -100,12 +100,12 @@ def test_gateware_and_model_agree_with_requests_as_pulses():
     assert one.stats.overwritten + other.stats.overwritten > 0
 
 
-def test_a_fault_of_the_turns_is_seen(monkeypatch):
+def test_a_fault_of_the_grants_is_seen(monkeypatch):
     right = RoundRobin.elaborate
 
-    def wrong(turns, platform):
-        m = right(turns, platform)
-        m.d.comb += turns.turn.eq(2)  # always the second sheet's
+    def wrong(grants, platform):
+        m = right(grants, platform)
+        m.d.comb += grants.grant.eq(2)  # always the second sheet's
         return m
 
     monkeypatch.setattr(RoundRobin, "elaborate", wrong)

@@ -138,7 +138,7 @@ def test_what_is_told_of_lines_is_the_golden_models_in_every_clock(bench, soon, 
     assert any(ended), "nothing was told no more"
 
 
-TURN_BIT = 7
+RETRY_BIT = 7
 BREAKS = Skin(rows=3, columns=4, report="cells", settle_us=10, release_us=2, **TINY)
 
 
@@ -157,11 +157,11 @@ def breaks() -> list[tuple[Cuts, int]]:
 
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
 def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_else(bench, monkeypatch, diodes):
-    """Whatever is pressed. Cut in any clock of a frame; mended, and told no more after the clock's next turn."""
-    monkeypatch.setattr(raster, "RETRY_BIT", TURN_BIT)
+    """Whatever is pressed. Cut in any clock of a frame; mended, and told no more after the clock toggles next."""
+    monkeypatch.setattr(raster, "RETRY_BIT", RETRY_BIT)
     skin, rng = BREAKS.replace(diodes=diodes), np.random.default_rng(7)
-    frame, turn = facts(skin).scan_clocks, 1 << TURN_BIT
-    spacing = 5 * frame + 2 * turn
+    frame, retry = facts(skin).scan_clocks, 1 << RETRY_BIT
+    spacing = 5 * frame + 2 * retry
     at = [number * spacing + int(rng.integers(frame)) for number in range(len(breaks()))]
     cuts = [(start, cut) for start, (cut, _) in zip(at, breaks(), strict=True)]
     cuts += [(start + 2 * frame, Cuts()) for start in at]
@@ -172,7 +172,7 @@ def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_e
         meanwhile = words[start : start + spacing - frame]
         assert {word | wanted for word in meanwhile} == {wanted}, cut
         assert words[start + 2 * frame + 3] == wanted, cut
-        assert words[start + 4 * frame + turn + 3] == 0, cut
+        assert words[start + 4 * frame + retry + 3] == 0, cut
 
 
 def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, rng):
@@ -190,7 +190,7 @@ def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
     skin, cycles = SKINS["masked"], 6_000
     rows, columns = skin.rows, skin.columns
     ports = {"rows": rows, "columns": columns, "stuck": columns + 1, "checks_rows": rows, "checks_columns": 1,
-             "checks_stuck": 1, "round": 1, "turn": 1}  # fmt: skip
+             "checks_stuck": 1, "round": 1, "retry": 1}  # fmt: skip
     often = {"checks_rows": 0.3, "checks_columns": 0.1, "checks_stuck": 0.1, "round": 0.1}
     given = {
         name: [rng.getrandbits(bits) & rng.getrandbits(bits) for _ in range(cycles)] for name, bits in ports.items()
@@ -198,8 +198,8 @@ def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
     for name, share in often.items():
         given[name] = [word if rng.random() < share else 0 for word in given[name]]
     given["round"] = [int(rng.random() < 0.1) for _ in range(cycles)]
-    turned = [int(rng.random() < 0.04 or (ends and rng.random() < 0.2)) for ends in given["round"]]
-    given["turn"] = [count % 2 for count in itertools.accumulate(turned)]
+    toggled = [int(rng.random() < 0.04 or (ends and rng.random() < 0.2)) for ends in given["round"]]
+    given["retry"] = [count % 2 for count in itertools.accumulate(toggled)]
     dut = LineFaults(skin)
     sim = bench(dut)
     for name in ports:
@@ -208,7 +208,7 @@ def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
     sim.run(cycles - 1)
 
     round_of = [0, *itertools.accumulate(given["round"])]
-    renewing = {round_of[cycle] + 1 for cycle in range(cycles) if turned[cycle]}
+    renewing = {round_of[cycle] + 1 for cycle in range(cycles) if toggled[cycle]}
     lines = [("rows", row, lambda cycle, row=row: given["checks_rows"][cycle] >> row & 1) for row in range(rows)]
     lines += [("columns", column, given["checks_columns"].__getitem__) for column in range(columns)]
     lines += [("stuck", column, given["checks_stuck"].__getitem__) for column in range(columns + 1)]

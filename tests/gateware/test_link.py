@@ -254,14 +254,14 @@ def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng
     skin, cycles = Skin(scan="reversal", precharge_us=1.0, send="on_change", keep_alive_ms=6.0), 6_000
     decide = [int(rng.random() < 0.2) for _ in range(cycles)]
     wanted = {name: [int(rng.random() < 0.03) for _ in range(cycles)] for name in ("changed", "requested")}
-    turned = [int(rng.random() < (0.2 if decided else 0.02)) for decided in decide]
-    turns = [count % 2 for count in itertools.accumulate(turned)]
+    toggled = [int(rng.random() < (0.2 if decided else 0.02)) for decided in decide]
+    toggles = [count % 2 for count in itertools.accumulate(toggled)]
     dut = link_module.Link(skin)
     sim = bench(dut)
     sim.drive(dut.frames.decide, decide.__getitem__)
     sim.drive(dut.summary.changed, wanted["changed"].__getitem__)
     sim.drive(dut.tag.requested, wanted["requested"].__getitem__)
-    sim.drive(dut.time, lambda cycle: turns[cycle] << KEEP_ALIVE_BIT)
+    sim.drive(dut.time, lambda cycle: toggles[cycle] << KEEP_ALIVE_BIT)
     due, send = sim.watch(dut.due), sim.watch(dut.frames.verdict.send)
     sim.run(cycles - 1)
     most = skin.derived.keep_alive_toggles
@@ -270,6 +270,6 @@ def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng
         is_due = passed >= most
         sends = is_due or wanted["changed"][cycle] or wanted["requested"][cycle]
         assert (due[cycle], send[cycle]) == (is_due, sends), cycle
-        passed = 0 if decide[cycle] and sends else passed + turned[cycle]
+        passed = 0 if decide[cycle] and sends else passed + toggled[cycle]
     assert most > 2
     assert 100 < sum(due.values) < cycles - 100

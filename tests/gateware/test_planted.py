@@ -20,8 +20,8 @@ FORMAL = "tests/proofs/test_formal.py::test_the_claim_holds"
 FAULTS = {
     "readings go out with a report": Fault(
         "link/link.py",
-        "hello_due | wire.take_report | regions.waits & ~turn",
-        "hello_due | regions.waits & ~turn",
+        "hello_due | wire.take_report | regions.waits & ~units_next",
+        "hello_due | regions.waits & ~units_next",
         (f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says",),
     ),
     "a sweep's region is written as it goes out": Fault(
@@ -57,7 +57,7 @@ FAULTS = {
     "a try ends too soon": Fault(
         "scan/precharge.py",
         "count.eq(count + (self.looks | ~count[: self.apart_bits].all()))",
-        "count.eq(Mux(turns, 60, count + (self.looks | ~count[: self.apart_bits].all())))",
+        "count.eq(Mux(toggles, 60, count + (self.looks | ~count[: self.apart_bits].all())))",
         (f"{GATEWARE}/test_wrong_readings.py::test_random_histories_are_the_golden_models_in_every_clock",),
     ),
     "contact of several sheets is a gate": Fault(
@@ -109,22 +109,22 @@ FAULTS = {
         "            m.d.sync += self.motion.eq(self.motion)\n",
         (f"{GATEWARE}/test_reversal_scanner.py",),
     ),
-    "a turn in a check asks for another one": Fault(
+    "a toggle in a check asks for another one": Fault(
         "scan/reversal_guard.py",
         "self.asked.eq((self.asked | self.due) & ~self.starts)",
         "self.asked.eq(self.asked & ~self.starts | self.due)",
         (f"{GATEWARE}/test_reversal_guard.py::test_checks_at_rest_wait_for_a_turn_after_the_check_of_a_frame",),
     ),
-    "a turn in a round's last clock is lost": Fault(
+    "a toggle in a round's last clock is lost": Fault(
         "scan/guard.py",
-        "renewing.eq(turned | turns)",
-        "renewing.eq(turned)",
+        "renewing.eq(toggled | toggles)",
+        "renewing.eq(toggled)",
         (f"{GATEWARE}/test_guard.py::test_what_is_told_is_kept_until_a_renewing_round_finds_it_well",),
     ),
-    "a turn in a round's last clock counts twice": Fault(
+    "a toggle in a round's last clock counts twice": Fault(
         "scan/guard.py",
-        "renewing.eq(turned | turns), turned.eq(0)]",
-        "renewing.eq(turned | turns), turned.eq(turns)]",
+        "renewing.eq(toggled | toggles), toggled.eq(0)]",
+        "renewing.eq(toggled | toggles), toggled.eq(toggles)]",
         (f"{GATEWARE}/test_guard.py::test_what_is_told_is_kept_until_a_renewing_round_finds_it_well",),
     ),
     "a clock early is not early": Fault(
@@ -133,10 +133,10 @@ FAULTS = {
         "self.early.eq(asked < settle - 1)",
         (f"{GATEWARE}/test_sample_at.py::test_a_frame_takes_the_last_clock_that_was_asked_for_before_it_begins",),
     ),
-    "a turn in a decision is lost": Fault(
+    "a toggle in a decision is lost": Fault(
         "link/due.py",
-        "m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due)",
-        "m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due & ~decide)",
+        "m.If(_toggles(m, link, KEEP_ALIVE_BIT) & ~link.due)",
+        "m.If(_toggles(m, link, KEEP_ALIVE_BIT) & ~link.due & ~decide)",
         (f"{GATEWARE}/test_link.py::test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them",),
     ),
     "what was well in a fault counts": Fault(

@@ -39,7 +39,7 @@ LONG = {
     "times of a line reversal, 3x2, long release",
     "contact in three clocks, 3x2, shortest times, row2col",
     "differences stop the line, two copies",
-    "turns go round, 16 sheets",
+    "grants go round, 16 sheets",
     "packets of several sheets are whole, 1x2",
 }
 """Quick for `make formal`, but not the case of their claim that each run of the tests holds."""

@@ -63,7 +63,7 @@ def test_every_stage_of_the_design_has_mutants(sample):
         (r"-cell $auto$ff.cc:337:slice$2260 -port D -src /hdl/contactfpga_hdl/scan/self_test.py:43", "self-test"),
         (r"-cell $auto$opt_expr.cc:277$1863 -port Y -wire audit$7.counts -wirebit 3", "report"),
         (r"-cell $flatten\sheet_1.\request$99.$182 -port A -wire bits", "serial"),
-        (r"-cell $flatten\turns.$4 -port A -src /hdl/contactfpga_hdl/several.py:80", "several"),
+        (r"-cell $flatten\grants.$4 -port A -src /hdl/contactfpga_hdl/several.py:80", "several"),
         (r"-cell $auto$simple.cc:194:make_patterns_logic$2090 -port B", None),
         (r"-cell $auto$ff.cc:337:slice$2260 -port CLK -src /hdl/contactfpga_hdl/scan/self_test.py:43", None),
     ],

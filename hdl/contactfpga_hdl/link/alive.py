@@ -1,4 +1,4 @@
-"""A pin that a watchdog or a safety relay watches: it turns as long as whole frames without a fault come."""
+"""A pin that a watchdog or a safety relay watches: it toggles as long as whole frames without a fault come."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,7 +8,7 @@ TICK_US = 1000
 
 
 class Alive(wiring.Component):
-    """Turns every :data:`TICK_US` if the sheet was well since it could turn last.
+    """Toggles every :data:`TICK_US` if the sheet was well since it could toggle last.
 
     well (in): high for a clock when a whole frame is packed, or an untouched sheet was looked at.
     fault (in): high while a fault is told. What was well before it no longer counts.

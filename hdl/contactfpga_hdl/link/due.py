@@ -10,7 +10,7 @@ from contactfpga.skin.derived import HELLO_BIT, KEEP_ALIVE_BIT
 def hello_period(m: Module, link: wiring.Component) -> Value:
     """High for a clock when another half second is over."""
     if link.derived.scan.waits:
-        return _turns(m, link, HELLO_BIT)
+        return _toggles(m, link, HELLO_BIT)
     period = link.derived.hello_frames
     since = Signal(range(max(2, period)))
     waited, due = _wait(link, since, period)
@@ -24,12 +24,12 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
     decide, sends = link.frames.decide, link.frames.verdict.send
     if link.derived.scan.waits:
         most = link.derived.keep_alive_toggles
-        turns = Signal(range(most + 1), init=most)  # of the clock's bit, since the last frame sent
-        m.d.comb += link.due.eq(turns == most)
-        with m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due):
-            m.d.sync += turns.eq(turns + 1)
+        toggles = Signal(range(most + 1), init=most)  # of the clock's bit, since the last frame sent
+        m.d.comb += link.due.eq(toggles == most)
+        with m.If(_toggles(m, link, KEEP_ALIVE_BIT) & ~link.due):
+            m.d.sync += toggles.eq(toggles + 1)
         with m.If(decide & sends):
-            m.d.sync += turns.eq(0)
+            m.d.sync += toggles.eq(0)
         return
     limit = link.derived.keep_alive_frames
     pause = Signal(range(limit), init=limit - 1)  # since the last frame sent
@@ -39,7 +39,7 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
         m.d.sync += pause.eq(Mux(sends, 0, waited))
 
 
-def _turns(m: Module, link: wiring.Component, bit: int) -> Value:
+def _toggles(m: Module, link: wiring.Component, bit: int) -> Value:
     """High for a clock when another 2^bit us are over."""
     before = Signal(name=f"time_{bit}")
     m.d.sync += before.eq(link.time[bit])

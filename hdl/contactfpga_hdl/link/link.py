@@ -73,9 +73,9 @@ class Link(wiring.Component):
     faults, slots (in): of a Skin with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
     units (in): of a Skin with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
-    upset (out): high while two frames share a region, as after a bit of its number turned by itself: one would be sent
+    upset (out): high while two frames share a region, as after a bit of its number flipped by itself: one would be sent
     while another is written over it. Never with ``dual``, which finds more.
-    turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
+    grant (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
     packets then say the sheet's number.
     """
 
@@ -96,7 +96,7 @@ class Link(wiring.Component):
                 "due": Out(1),
                 "number": In(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
                 **self._optional_ports(),
-                **({} if place is None else {"turn": In(1), "holds": Out(1)}),
+                **({} if place is None else {"grant": In(1), "holds": Out(1)}),
                 "upset": Out(1),
                 "bytes": Out(stream.Signature(8)),
             }
@@ -178,13 +178,13 @@ class Link(wiring.Component):
             m.next = "FETCH"
 
     def _take_units(self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value) -> None:
-        """When nothing else waits, or only a frame and it is their turn."""
+        """Units are sent when nothing else waits, or only a frame after FRAMES_BEFORE_UNITS others."""
         frames = Signal(range(FRAMES_BEFORE_UNITS + 1))  # since the last ones
-        turn = frames == FRAMES_BEFORE_UNITS
-        others = hello_due | wire.take_report | regions.waits & ~turn
+        units_next = frames == FRAMES_BEFORE_UNITS
+        others = hello_due | wire.take_report | regions.waits & ~units_next
         m.d.comb += wire.take_units.eq(self.units.due & ~others)
         m.d.sync += wire.is_units.eq(wire.take_units)
-        with m.If(wire.take_frame & ~turn):
+        with m.If(wire.take_frame & ~units_next):
             m.d.sync += frames.eq(frames + 1)
         with m.If(wire.take_units):
             m.d.comb += wire.take_frame.eq(0)
@@ -263,7 +263,7 @@ class Link(wiring.Component):
         ends = Signal()  # the packet, with this byte
         goes = hello, frame, either = hello_due, regions.waits & ~hello_due, hello_due | regions.waits
         if self.place is not None:
-            hello, frame, either = (one & self.turn for one in goes)
+            hello, frame, either = (one & self.grant for one in goes)
         m.d.sync += seeds.eq(seeded)
         m.d.comb += [check.data.eq(byte), check.start.eq(wire.take_hello | seeded)]
         with m.If(seeded):

@@ -19,14 +19,14 @@ def checked_rows(skin: Skin) -> int:
 
 class LineFaults(wiring.Component):
     """A line that is found faulty is told from the next clock on. It is told no more once a check in a *renewing* round
-    finds it well; that is the first whole round of checks after ``turn`` turns, so faults that come and go change what
-    is told twice per turn at most. Lines that are masked whole are not told.
+    finds it well; that is the first whole round of checks after ``retry`` toggles, so faults that come and go change what
+    is told twice per toggle at most. Lines that are masked whole are not told.
 
     rows, columns, stuck (in): lines that a check of this clock finds faulty.
     checks_rows, checks_columns, checks_stuck (in): of which lines there is a check in this clock; of columns it is of
     all or none.
     round (in): high for a clock in which a round of checks ends, with its last check or after it.
-    turn (in): bit ``RETRY_BIT`` of a clock in us.
+    retry (in): bit ``RETRY_BIT`` of a clock in us.
     faults (out): what is told.
     """
 
@@ -42,7 +42,7 @@ class LineFaults(wiring.Component):
                 "checks_columns": In(1),
                 "checks_stuck": In(1),
                 "round": In(1),
-                "turn": In(1),
+                "retry": In(1),
                 "faults": Out(self._layout),
             }
         )
@@ -50,13 +50,13 @@ class LineFaults(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin, faults = self.skin, self.faults
-        before, turned, renewing = Signal(), Signal(), Signal()
-        turns = self.turn ^ before
-        m.d.sync += before.eq(self.turn)
+        before, toggled, renewing = Signal(), Signal(), Signal()
+        toggles = self.retry ^ before
+        m.d.sync += before.eq(self.retry)
         with m.If(self.round):
-            m.d.sync += [renewing.eq(turned | turns), turned.eq(0)]
-        with m.Elif(turns):
-            m.d.sync += turned.eq(1)
+            m.d.sync += [renewing.eq(toggled | toggles), toggled.eq(0)]
+        with m.Elif(toggles):
+            m.d.sync += toggled.eq(1)
         kept = ~Mux(renewing, self.checks_rows, 0)
         found = self.rows & self.checks_rows & checked_rows(skin)
         m.d.sync += faults.rows.eq(faults.rows & kept | found)

@@ -164,7 +164,7 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
     heard (in): taken over into that tag.
     epoch (out): high for a clock when another 2^22 us are over.
     faults (out): with ``guard`` or ``self_test``, what it knows of faulty lines.
-    upset (out): high for a clock when a register was found to have turned by itself, see
+    upset (out): high for a clock when a register was found to have flipped by itself, see
     :func:`~contactfpga_hdl.util.upset.upset`; never with ``dual``, which finds more.
     contact (out): high while any switch reads pressed; when it rises and falls is the scan's rule.
     """

@@ -19,15 +19,15 @@ class Precharge(wiring.Component):
     the :data:`LOOKS` are ``2 ** apart_bits`` clocks apart: longer than it takes to drive a column to its level, and
     longer than a projection.
 
-    A stuck column is *tried* in the first window that begins after ``turn`` turns: it is driven, and is still stuck
+    A stuck column is *tried* in the first window that begins after ``retry`` toggles: it is driven, and is still stuck
     after that, or well, by the same rule.
 
     drive (in): in the next clock the columns are driven.
     columns (in): those that read pressed.
     looks (in): high for a clock in which these are a sample, taken when all that are not stuck had been driven.
-    turn (in): bit ``RETRY_BIT`` of a clock in us.
+    retry (in): bit ``RETRY_BIT`` of a clock in us.
     guard_pressed (in): of a scan that reads the rows: high for a clock in which the guard column is stuck; it is until
-    ``turn`` turns. The other scans take it for a column like all others.
+    ``retry`` toggles. The other scans take it for a column like all others.
     others (in): with a self-test, columns that are driven in the next clock whatever they read.
     held (out): columns that are stuck, from the clock after a window on.
     pins (out): columns that are driven, from registers.
@@ -44,7 +44,7 @@ class Precharge(wiring.Component):
                 "drive": In(1),
                 "columns": In(skin.column_lines - self.alone),
                 "looks": In(1),
-                "turn": In(1),
+                "retry": In(1),
                 **({"guard_pressed": In(1)} if self.alone else {}),
                 **({"others": In(skin.column_lines)} if skin.self_test else {}),
                 "held": Out(skin.column_lines),
@@ -61,19 +61,19 @@ class Precharge(wiring.Component):
         asked = Signal()  # in the next window columns that are stuck are driven
         tries = Signal()  # they are in this one
         before = Signal()
-        turns = Signal()
+        toggles = Signal()
         free = Signal(self.skin.column_lines)
         lines = watched(self.skin)
         m.d.comb += [
-            turns.eq(self.turn ^ before),
+            toggles.eq(self.retry ^ before),
             ends.eq(self.looks & count.all()),
             self.held[: len(stuck)].eq(stuck),
             free.eq(Cat(~stuck | tries.replicate(len(stuck)), ~self.held[len(stuck) :]) & lines),
         ]
         m.d.sync += [
-            before.eq(self.turn),
+            before.eq(self.retry),
             self.pins.eq(Mux(self.drive, free, 0) | (self.others if self.skin.self_test else 0)),
-            asked.eq(turns | asked & ~ends),
+            asked.eq(toggles | asked & ~ends),
             count.eq(count + (self.looks | ~count[: self.apart_bits].all())),
         ]
         with m.If(ends):
@@ -83,6 +83,6 @@ class Precharge(wiring.Component):
             m.d.sync += low.eq(low & self.columns)
         if self.alone:
             guard_stuck = Signal()
-            m.d.sync += guard_stuck.eq(~turns & (guard_stuck | self.guard_pressed))
+            m.d.sync += guard_stuck.eq(~toggles & (guard_stuck | self.guard_pressed))
             m.d.comb += self.held[-1].eq(guard_stuck)
         return m

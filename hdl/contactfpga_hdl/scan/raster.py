@@ -197,7 +197,7 @@ class Scanner(wiring.Component):
             ),
             precharge.columns.eq(sample.read),
             precharge.looks.eq(sample.of_released),
-            precharge.turn.eq(time[RETRY_BIT]),
+            precharge.retry.eq(time[RETRY_BIT]),
             self.pins.columns_drive.eq(precharge.pins),
         ]
 
@@ -218,7 +218,7 @@ class Scanner(wiring.Component):
             told.checks_columns.eq(sample.of_driven & sample.is_guard),
             told.checks_stuck.eq(stuck.take),
             told.round.eq(stuck.take),
-            told.turn.eq(time[RETRY_BIT]),
+            told.retry.eq(time[RETRY_BIT]),
             self.faults.eq(told.faults),
         ]
         m.d.sync += ended.eq(stuck.take)

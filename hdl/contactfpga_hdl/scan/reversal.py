@@ -192,7 +192,7 @@ class ReversalScanner(wiring.Component):
             precharge.drive.eq(cycle.charges),
             precharge.columns.eq(pressed),
             precharge.looks.eq(cycle.begins | cycle.rests & cycle.settled),
-            precharge.turn.eq(self.time[RETRY_BIT]),
+            precharge.retry.eq(self.time[RETRY_BIT]),
         ]
         self._let_go(m, cycle, precharge, test)
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)

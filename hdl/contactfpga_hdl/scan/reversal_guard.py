@@ -58,7 +58,7 @@ class Checks(wiring.Component):
             told.stuck.eq(self.held | Cat(Const(0, skin.columns), guard_reads)),
             told.checks_stuck.eq(self.of_guard),
             told.round.eq(self.of_guard),
-            told.turn.eq(self.retry),
+            told.retry.eq(self.retry),
             self.faults.eq(told.faults),
         ]
         return m

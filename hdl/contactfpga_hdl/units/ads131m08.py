@@ -70,8 +70,8 @@ class Ads131m08(wiring.Component):
     def _pace(self, m: Module) -> None:
         """The converter's own clock."""
         count = Signal(range(self.pace_clocks))
-        turns = count == self.pace_clocks - 1
-        m.d.sync += [count.eq(Mux(turns, 0, count + 1)), self.pins.spi_pace.eq(self.pins.spi_pace ^ turns)]
+        toggles = count == self.pace_clocks - 1
+        m.d.sync += [count.eq(Mux(toggles, 0, count + 1)), self.pins.spi_pace.eq(self.pins.spi_pace ^ toggles)]
 
     def _take(self, m: Module, falls: Value, counts: Value) -> None:
         """The pin's level in the clock in which ``falls`` is high has passed the synchronizer two clocks later."""

@@ -137,7 +137,7 @@ class Sums(wiring.Component):
     taken (in): high for a clock; then ``deviation`` is that of ``unit``, and stays for as many clocks as there are
     sums. ``last``: of the sweep's last unit.
     sum (out): whose ``threshold`` and ``watched`` (in) are wanted in this clock.
-    over (out): a bit for each sum, three clocks after its turn in the last unit's.
+    over (out): a bit for each sum, three clocks after its product in the last unit's.
     """
 
     def __init__(self, skin: Skin):
@@ -161,15 +161,15 @@ class Sums(wiring.Component):
         m = Module()
         rows = self.skin.unit_sums
         count = len(rows)
-        turn, busy = Signal(2), Signal()
+        number, busy = Signal(2), Signal()
         multiplies, adds, compares = Signal(), Signal(), Signal()
-        ongoing = multiplies & (turn != count - 1)
+        ongoing = multiplies & (number != count - 1)
         m.d.comb += multiplies.eq(self.taken | busy)
-        m.d.sync += [busy.eq(ongoing), turn.eq(Mux(ongoing, turn + 1, 0)), adds.eq(multiplies)]
+        m.d.sync += [busy.eq(ongoing), number.eq(Mux(ongoing, number + 1, 0)), adds.eq(multiplies)]
         table = [[Const(rows[index][unit], signed(8)) for unit in range(self.skin.units)] for index in range(count)]
         assert MAX_WEIGHT < 128
         weight = Signal(signed(8))
-        m.d.comb += weight.eq(Array([Array(row)[self.unit] for row in table])[turn])
+        m.d.comb += weight.eq(Array([Array(row)[self.unit] for row in table])[number])
         product = Signal(signed(self._bits + 9))
         first, last = Signal(), Signal()
         m.d.sync += [product.eq(self.deviation * weight), first.eq(self.unit == 0), last.eq(self.last)]

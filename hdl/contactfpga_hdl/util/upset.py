@@ -1,4 +1,4 @@
-"""Registers that turn though nothing wrote them, as radiation makes them."""
+"""Registers that flip though nothing wrote them, as radiation makes them."""
 
 from amaranth.hdl import Module, Signal, Value
 

@@ -28,7 +28,7 @@ STAGES = {
     "link": ("link",),
     "faults": ("link", "alive"),
     "serial": ("transmitter", "receiver", "request"),
-    "several": ("turns",),
+    "several": ("grants",),
     "top": (),
 }
 """Stages, and the modules of the design, as Top names them, that hold their registers."""

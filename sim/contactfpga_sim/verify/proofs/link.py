@@ -253,7 +253,7 @@ def first_is_sent(proof: Proof, **changes: Any) -> None:
     proof.m.d.sync += sent.eq(sent | decide & sends)
     proof.claim(~decide | sends | sent)
     derived = dut.derived
-    due = ("turns", derived.keep_alive_toggles) if derived.scan.waits else ("pause", derived.keep_alive_frames - 1)
+    due = ("toggles", derived.keep_alive_toggles) if derived.scan.waits else ("pause", derived.keep_alive_frames - 1)
     proof.lemma(sent | (inside[due[0]] == due[1]))
 
 

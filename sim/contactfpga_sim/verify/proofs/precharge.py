@@ -72,18 +72,18 @@ def let_go(proof: Proof) -> None:
 
     Claimed: columns are driven a clock after they shall be, but for those that are masked in every row, and those that
     are stuck: they read pressed in each sample of a window, of four that are two clocks apart and all between them. A
-    stuck column is driven throughout the first window that begins after a turn, and then it is stuck if it read pressed
-    throughout that, too. A guard column that reads pressed in a check is not driven until a turn.
+    stuck column is driven throughout the first window that begins after a toggle, and then it is stuck if it read pressed
+    throughout that, too. A guard column that reads pressed in a check is not driven until a toggle.
     """
     m = proof.m
     skin = reversal_of("col2row").replace(columns=3, guard=True)
     dut = Precharge(skin)
     dut.apart_bits = 1  # in place of 4 or more, so that bugs show soon
     inside = proof.put(dut)
-    drive, turn = proof.free(1, "drive"), proof.free(1, "turn")
+    drive, retry = proof.free(1, "drive"), proof.free(1, "retry")
     columns, looks = proof.free(3, "columns"), proof.free(1, "looks")
     pressed, guard = proof.free(1, "guard_pressed"), Signal()
-    m.d.comb += [dut.drive.eq(drive), dut.turn.eq(turn), dut.columns.eq(columns), dut.looks.eq(looks)]
+    m.d.comb += [dut.drive.eq(drive), dut.retry.eq(retry), dut.columns.eq(columns), dut.looks.eq(looks)]
     m.d.comb += dut.guard_pressed.eq(pressed)
     apart, parts = Signal(), Signal(range(LOOKS))  # a clock without a look, or a look, was; parts that are over
     released = Signal(3)  # columns that read so in this window
@@ -92,21 +92,21 @@ def let_go(proof: Proof) -> None:
     tries = Signal()
     ends = Signal()
     m.d.comb += ends.eq(looks & apart & (parts == LOOKS - 1))
-    turns = turn != proof.before(turn)
+    toggles = retry != proof.before(retry)
     now = (released | Mux(looks, ~columns, 0))[:3]
     m.d.sync += [
         apart.eq(~(looks & apart)),
         parts.eq(parts + (looks & apart)),
         released.eq(Mux(ends, 0, now)),
-        asked.eq(turns | asked & ~ends),
-        guard.eq(~turns & (guard | pressed)),
+        asked.eq(toggles | asked & ~ends),
+        guard.eq(~toggles & (guard | pressed)),
     ]
     with m.If(ends):
         m.d.sync += [tries.eq(asked), stuck.eq(~now | Mux(tries, 0, stuck))]
     proof.claim(dut.held == Cat(stuck & 0b101, guard))
     let_go = Cat(stuck & ~tries.replicate(3), guard)
     proof.claim(dut.pins == Mux(proof.before(drive), ~proof.before(let_go) & 0b1101, 0))
-    proof.lemma(inside["before"] == proof.before(turn))
+    proof.lemma(inside["before"] == proof.before(retry))
     proof.lemma(inside["count"] == Cat(apart, parts))
     proof.lemma((inside["low"] == ~released) & (inside["stuck"] == stuck & 0b101))
     proof.lemma(inside["guard_stuck"] == guard)
@@ -125,9 +125,9 @@ def kept(proof: Proof) -> None:
     m = proof.m
     dut = Precharge(Skin(rows=2, columns=3, precharge_us=1, settle_us=20))
     inside = proof.put(dut)
-    drive, turn = proof.free(1, "drive"), proof.free(1, "turn")
+    drive, retry = proof.free(1, "drive"), proof.free(1, "retry")
     columns, looks = proof.free(3, "columns"), proof.free(1, "looks")
-    m.d.comb += [dut.drive.eq(drive), dut.turn.eq(turn), dut.columns.eq(columns), dut.looks.eq(looks)]
+    m.d.comb += [dut.drive.eq(drive), dut.retry.eq(retry), dut.columns.eq(columns), dut.looks.eq(looks)]
     count, ends = inside["count"], inside["ends"]
     lasted, over = Signal(range(MISREAD + 1)), Signal()  # clocks that it has read pressed; no more in this window
     m.d.sync += [lasted.eq(Mux(columns[0], lasted + 1, 0)), over.eq((over | (lasted != 0) & ~columns[0]) & ~ends)]
@@ -142,7 +142,7 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
     Claimed: the columns that are driven are those that the rule above leaves; a sample is what they read two clocks
-    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16 turns
+    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16 toggles
     at least every 2^16 us. Column 1 is never driven.
     """
     m, skin = proof.m, dut.skin
@@ -160,22 +160,22 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
         _raster_lemmas(proof, inside, dut, late)
     released = released_levels(skin, skin.columns)
     at_pins = proof.before(proof.before(columns, init=released), init=released)
-    turns = proof.before(time[RETRY_BIT]) != time[RETRY_BIT]
+    toggles = proof.before(time[RETRY_BIT]) != time[RETRY_BIT]
     part = inside.part("precharge")
     proof.claim(part.looks == sampled)
     proof.claim(~sampled | (part.columns == at_pins ^ released))
-    proof.claim((dut.pins.columns_drive == part.pins) & (part.turn == time[RETRY_BIT]))
+    proof.claim((dut.pins.columns_drive == part.pins) & (part.retry == time[RETRY_BIT]))
     proof.claim(~dut.pins.columns_drive[1])
-    age = Signal(RETRY_BIT + 1)  # us since the last turn
-    with m.If(turns):
+    age = Signal(RETRY_BIT + 1)  # us since the last toggle
+    with m.If(toggles):
         m.d.sync += age.eq(0)
     with m.Elif(runs):
         m.d.sync += age.eq(age + 1)
     proof.claim(age <= _RETRY)
-    since = Signal(RETRY_BIT + 1)  # us since bit 16 turned
-    m.d.comb += since.eq(Mux(turns & (time[:RETRY_BIT] == 0), _RETRY, time[:RETRY_BIT]))
+    since = Signal(RETRY_BIT + 1)  # us since bit 16 toggled
+    m.d.comb += since.eq(Mux(toggles & (time[:RETRY_BIT] == 0), _RETRY, time[:RETRY_BIT]))
     proof.lemma(age <= since)
-    proof.lemma(~turns | (time[:RETRY_BIT] == 0))
+    proof.lemma(~toggles | (time[:RETRY_BIT] == 0))
     proof.lemma(inside["precharge.before"] == proof.before(time[RETRY_BIT]))
     level_lemmas(proof, inside, columns, released)
 
@@ -219,7 +219,7 @@ _LET_GO_BUGS = (
     Bug("a stuck column is driven", Precharge, "free", lambda free, inside: free | inside["stuck"]),
     Bug("never tried", Precharge, "tries", lambda *_: 0),
     Bug("tried at once, for what is left of a window", Precharge, "tries",
-        lambda tries, inside: tries | inside["turns"]),
+        lambda tries, inside: tries | inside["toggles"]),
     Bug("well after a try", Precharge, "stuck",
         lambda stuck, inside: Mux(inside["ends"] & inside["tries"], 0, stuck)),
     Bug("stuck for good", Precharge, "stuck", lambda stuck, inside: stuck | inside["stuck"]),

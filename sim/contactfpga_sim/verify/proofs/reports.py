@@ -1,4 +1,4 @@
-"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and frames get their turn."""
+"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and each report lets a waiting frame pass."""
 
 from functools import partial
 from unittest import mock
@@ -62,7 +62,7 @@ def reports_are_true(proof: Proof, skin: Skin) -> None:
         proof.claim(dut.bytes.payload == protocol.DELIMITER)
     proof.claim(~(reports & taken))
     _untold(proof, dut, inside, reports, take, last, right[place])
-    _turns(proof, inside, take)
+    _order(proof, inside, take)
     _lemmas(proof, inside, reports, index, place, expected, last, empty)
 
 
@@ -99,7 +99,7 @@ def _untold(proof: Proof, dut: Link, inside: Inside, reports, take, last, right)
         proof.claim(due)
 
 
-def _turns(proof: Proof, inside: Inside, take) -> None:
+def _order(proof: Proof, inside: Inside, take) -> None:
     waits = inside["waits"]
     held = Signal(name="held")  # by the last report, a frame that has waited since
     proof.m.d.sync += held.eq(Mux(take["report"], waits, held & waits & ~take["frame"] & ~take["hello"]))

@@ -1,4 +1,4 @@
-"""Several sheets share a line: packets come one after the other, whole, and each sheet in its turn."""
+"""Several sheets share a line: packets come one after the other, whole, and only the sheet with the grant sends."""
 
 from functools import partial
 from unittest import mock
@@ -18,12 +18,12 @@ _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
 _PLACE = SheetPlace(1, 2)
 
 
-def turns_go_round(proof: Proof, sheets: int) -> None:
-    """Free: which sheets hold their turn in each clock.
+def grants_go_round(proof: Proof, sheets: int) -> None:
+    """Free: which sheets hold the grant in each clock.
 
-    Claimed: in each clock it is the turn of one sheet, at first of the first one. It stays while that sheet holds it,
-    and then is the next one's, after the last sheet the first one's. So between two turns of a sheet each other one
-    has one, and who does not hold it keeps nobody waiting.
+    Claimed: in each clock one sheet has the grant, at first the first one. It keeps the grant while it holds it; then
+    the next sheet has it, after the last sheet the first one. So between two grants of a sheet each other sheet has
+    one, and a sheet that does not hold the grant delays no other.
     """
     m = proof.m
     dut = RoundRobin(sheets)
@@ -33,17 +33,17 @@ def turns_go_round(proof: Proof, sheets: int) -> None:
     whose = Signal(range(sheets))
     with m.If(~holds.bit_select(whose, 1)):
         m.d.sync += whose.eq(Mux(whose == sheets - 1, 0, whose + 1))
-    proof.claim(dut.turn == (Const(1, sheets) << whose)[:sheets])
+    proof.claim(dut.grant == (Const(1, sheets) << whose)[:sheets])
     proof.lemma(whose < sheets)
 
 
 def packets_are_whole(proof: Proof, hello: bytes) -> None:
-    """Free: all that reaches the link of a sheet in each clock, and how long it waits for a turn. Assumed: its turn
-    stays while it is held, as ``turns_go_round`` shows.
+    """Free: all that reaches the link of a sheet in each clock, and how long it waits for the grant. Assumed: the
+    grant stays while it is held, as ``grants_go_round`` shows.
 
-    Claimed: it offers bytes in its turn alone, and gives it up only when the last byte that it sent, if any, was a
-    delimiter. Without a turn it takes nothing. When it gives the turn up after a byte it has nothing in hand, so it
-    sends one packet in a turn.
+    Claimed: it offers bytes only with the grant, and gives it up only when the last byte that it sent, if any, was a
+    delimiter. Without the grant it takes nothing. When it gives the grant up after a byte it has nothing in hand, so
+    it sends one packet with each grant.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
@@ -58,39 +58,39 @@ def packets_are_whole(proof: Proof, hello: bytes) -> None:
     for port, name in ((frames.decide, "decide"), (frames.commit, "commit"), (frames.end, "end")):
         m.d.comb += port.eq(proof.free(port.shape(), name))
     m.d.comb += dut.bytes.ready.eq(proof.free(1, "ready"))
-    turn = Signal()
-    m.d.comb += dut.turn.eq(turn)
-    m.d.sync += turn.eq(Mux(turn & dut.holds, 1, proof.free(1, "turn")))
+    grant = Signal()
+    m.d.comb += dut.grant.eq(grant)
+    m.d.sync += grant.eq(Mux(grant & dut.holds, 1, proof.free(1, "grant")))
     moves = dut.bytes.valid & dut.bytes.ready
     last = Signal(8)  # byte sent; at first as after a delimiter
-    sent = Signal()  # a byte in this turn
+    sent = Signal()  # a byte with this grant
     with m.If(moves):
         m.d.sync += last.eq(dut.bytes.payload)
-    m.d.sync += sent.eq(turn & dut.holds & (sent | moves))
+    m.d.sync += sent.eq(grant & dut.holds & (sent | moves))
     takes = inside["take_frame"] | inside["take_hello"]
-    proof.claim(turn | ~dut.bytes.valid)
-    proof.claim(turn | ~takes)
+    proof.claim(grant | ~dut.bytes.valid)
+    proof.claim(grant | ~takes)
     proof.claim(~(sent & takes))
-    with m.If(turn & ~dut.holds):
+    with m.If(grant & ~dut.holds):
         proof.claim(Mux(moves, dut.bytes.payload, last) == 0)
-    proof.lemma(inside["idle"] | turn)
+    proof.lemma(inside["idle"] | grant)
     with m.If(inside["idle"]):
         proof.lemma((last == 0) & ~sent)
 
 
-_TURN_BUGS = (
-    Bug("a turn is given up in a packet", RoundRobin, "others", lambda others, inside: inside["turn"]),
-    Bug("the first sheet always has a turn", RoundRobin, "turn", lambda turn, inside: turn | 1),
+_GRANT_BUGS = (
+    Bug("a grant is given up in a packet", RoundRobin, "others", lambda others, inside: inside["grant"]),
+    Bug("the first sheet always has a grant", RoundRobin, "grant", lambda grant, inside: grant | 1),
 )
 _PACKET_BUGS = (
-    Bug("taken without a turn", Link, "take_frame",
+    Bug("taken without a grant", Link, "take_frame",
         lambda take, inside: take | inside["idle"] & inside["waits"] & ~inside["take_hello"]),
     Bug("given up before the delimiter", Link, "holds", lambda holds, inside: holds & (inside["tail"] < 4)),
     Bug("kept for the next packet", Link, "holds", lambda holds, inside: holds | ~inside["idle"]),
 )  # fmt: skip
 CASES = (
-    Case("turns go round", "2 sheets", partial(turns_go_round, sheets=2), 2, _TURN_BUGS),
-    Case("turns go round", "16 sheets", partial(turns_go_round, sheets=16), 2),
+    Case("grants go round", "2 sheets", partial(grants_go_round, sheets=2), 2, _GRANT_BUGS),
+    Case("grants go round", "16 sheets", partial(grants_go_round, sheets=16), 2),
     Case(
         "packets of several sheets are whole",
         "1x2, hello of 3 bytes",

@@ -1,4 +1,4 @@
-"""What looks for registers that turned by themselves finds none while none does."""
+"""What looks for registers that flipped by themselves finds none while none does."""
 
 from functools import partial
 
@@ -31,7 +31,7 @@ def none_is_found(proof: Proof, scan: str) -> None:
         proof.lemma((following != 0) & (following & (following - 1) == 0))
 
 
-_ROW = Bug("a row turns", DirectRows, "selected",
+_ROW = Bug("a row flips", DirectRows, "selected",
     lambda rows, inside: rows ^ ~(inside.component.drive | inside.component.release))  # fmt: skip
 
 
