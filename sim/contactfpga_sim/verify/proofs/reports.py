@@ -1,4 +1,4 @@
-"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and each report lets a waiting frame pass."""
+"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and a frame that waits goes between."""
 
 from functools import partial
 from unittest import mock
