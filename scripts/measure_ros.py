@@ -18,8 +18,8 @@ from ros_environment import DISTRIBUTIONS, ROOT, Environment
 import contactfpga
 from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.convert import markers, outline
 from contactfpga.robot.ros.dds import Publisher
-from contactfpga.robot.ros.markers import markers, outline
 from contactfpga.robot.ros.settings import TOPICS
 from contactfpga.robot.ros.types import type_hash
 from contactfpga_sim.lab import writer

@@ -9,7 +9,7 @@ from tracked import SKIN, frame
 import contactfpga
 from contactfpga import Skin, Zones
 from contactfpga.driver.conversation import Conversation
-from contactfpga.robot.ros import convert, feed, markers
+from contactfpga.robot.ros import convert, feed
 from contactfpga.wire.hello import encode_hello
 from contactfpga.wire.protocol import Frame
 
@@ -47,6 +47,6 @@ def samples():
     yield "contactfpga_msgs/Zones", convert.zones(bitmap_frame(rng, Skin(rows=5, columns=11, report="cells")), HEAD)
     yield "contactfpga_msgs/Tracks", convert.tracks(said[-1], events, True, HEAD)
     yield "contactfpga_msgs/Contacts", convert.contacts(said[-1].active, HEAD)
-    yield "visualization_msgs/MarkerArray", markers.markers(markers.outline(SKIN.sheet), said[-1].active, HEAD)
+    yield "visualization_msgs/MarkerArray", convert.markers(convert.outline(SKIN.sheet), said[-1].active, HEAD)
     yield "tf2_msgs/TFMessage", convert.transform(HEAD, "skin", (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
     yield "diagnostic_msgs/DiagnosticArray", feed.lost_board("forearm", "unplugged", HEAD)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from contactfpga.errors import ReadTimeout, ReplayEnded
 from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
-from contactfpga.robot.ros.convert import Message
-from contactfpga.robot.ros.markers import markers, outline
+from contactfpga.robot.ros.convert import Message, markers, outline
 from contactfpga.robot.ros.settings import TOPICS, Settings
 from contactfpga.skin.limits import MAX_KEEP_ALIVE_MS
 from contactfpga.tracking.tracker import Tracker

@@ -10,8 +10,8 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.events import SideEvent
 from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.convert import Place, markers, outline
 from contactfpga.robot.ros.feed import Felt
-from contactfpga.robot.ros.markers import Place, markers, outline
 from contactfpga.surfaces.shapes import Vector
 from contactfpga.tools.recordings import messages
 from contactfpga.tools.recordings.recorder import LinkFile
