@@ -44,7 +44,7 @@ from contactfpga.driver.mcap import (
     Unreadable,
     inside,
 )
-from contactfpga.tools.recordings import Recording, Session, messages
+from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.tools.recordings.recover import recover
 
@@ -213,7 +213,7 @@ def test_bytes_without_an_end_of_a_packet_are_no_packet(tmp_path, kind):
         path.write_bytes(junk)
     else:
         file = McapFile(path)
-        file.write("/a/bytes", messages.BYTES, "a", 5, messages.of_bytes(junk, 5, "a"), 0.0)
+        file.write("/a/bytes", recorder.BYTES, "a", 5, recorder.of_bytes(junk, 5, "a"), 0.0)
         file.close()
     begun_s = time.thread_time()
     with pytest.raises(contactfpga.ContactFPGAError):

@@ -61,12 +61,12 @@ def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
 
 
 def test_a_link_without_a_hello_is_left_out(tmp_path):
-    from contactfpga.tools.recordings import messages
+    from contactfpga.tools.recordings import recorder
     from contactfpga.tools.recordings.mcap_file import McapFile
 
     file = McapFile(tmp_path / "x.mcap")
     for link, data in (("arm", ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()), ("leg", b"\0\0noise\0")):
-        file.write(f"/{link}/bytes", messages.BYTES, link, 5, messages.of_bytes(data, 5, link), 0.0)
+        file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
     file.close()
     recording = Recording(tmp_path / "x.mcap")
     assert list(recording.links) == ["arm"]
@@ -76,7 +76,7 @@ def test_a_link_without_a_hello_is_left_out(tmp_path):
 
 def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
     """And not in that in which their boards spoke."""
-    from contactfpga.tools.recordings import messages
+    from contactfpga.tools.recordings import recorder
     from contactfpga.tools.recordings.mcap_file import McapFile
 
     file = McapFile(tmp_path / "x.mcap")
@@ -84,7 +84,7 @@ def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
         file.metadata("contactfpga", {"link": link})
     data = ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()
     for link in ("chest", "arm", "leg"):
-        file.write(f"/{link}/bytes", messages.BYTES, link, 5, messages.of_bytes(data, 5, link), 0.0)
+        file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
     file.close()
     assert list(Recording(tmp_path / "x.mcap").links) == ["arm", "leg", "chest"]
 

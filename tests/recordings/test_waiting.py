@@ -12,7 +12,7 @@ from recorded_stream import StreamPort, recorded
 import contactfpga
 from contactfpga.driver.conversation import Conversation
 from contactfpga.tools.recordings import link_recorder
-from contactfpga.tools.recordings.link_messages import LinkMessages
+from contactfpga.tools.recordings.link_recorder import LinkMessages
 from contactfpga.tools.recordings.session import Session
 
 

@@ -90,7 +90,7 @@ def _body(args: argparse.Namespace) -> Body | None:
 
 
 def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
-    from contactfpga.tools.recordings.link_messages import Mount
+    from contactfpga.tools.recordings.link_recorder import Mount
 
     if body is None:
 

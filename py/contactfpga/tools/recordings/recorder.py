@@ -13,12 +13,16 @@ from pathlib import Path
 from contactfpga.driver.board import Board
 from contactfpga.driver.mcap import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
-from contactfpga.tools.recordings import messages
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.convert import header
+from contactfpga.robot.ros.types import PACKAGE
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Cutter, Hello
 
 PATIENCE_S = 2.0
 """How long a new file waits for hellos to begin with; boards say one twice per second."""
+BYTES = f"{PACKAGE}/Bytes"
+"""Type of the messages that hold a board's bytes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,7 +180,7 @@ class LinkFile:
         self._last_s = clock_s
         if data:
             time_ns = self.time_ns(clock_s)
-            self.write("bytes", messages.BYTES, messages.of_bytes(data, time_ns, self.name), clock_s)
+            self.write("bytes", BYTES, of_bytes(data, time_ns, self.name), clock_s)
 
 
 def topic_of(link: str) -> str:
@@ -209,3 +213,8 @@ def link_name(hello: Hello) -> str:
 def _epoch_ns(board: Board) -> int:
     """What the board's clock has to be added to."""
     return time.time_ns() - round(board.clock() * 1e9)
+
+
+def of_bytes(data: bytes, time_ns: int, frame: str) -> bytes:
+    """Bytes of which the last one came then."""
+    return encode(BYTES, {"header": header(time_ns, frame), "data": data})

@@ -18,8 +18,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.robot.ros.feed import Felt
 from contactfpga.skin import Skin
-from contactfpga.tools.recordings.link_messages import LinkMessages, Mount
-from contactfpga.tools.recordings.link_recorder import Buffer, LinkRecorder
+from contactfpga.tools.recordings.link_recorder import Buffer, LinkMessages, LinkRecorder, Mount
 from contactfpga.tools.recordings.mcap_file import RecordingFailed
 from contactfpga.tools.recordings.recorder import Recorder, Split, link_name
 
