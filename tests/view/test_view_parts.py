@@ -15,8 +15,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.surfaces import Cone
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.fingers import Hand
-from contactfpga.tools.view.meter import CHART_S, Meter
-from contactfpga.tools.view.sources import MAX_LAG_S, MOMENT_S, SimulatedPace
+from contactfpga.tools.view.sources import CHART_S, MAX_LAG_S, MOMENT_S, Meter, SimulatedPace
 from contactfpga.tools.view.tiles import Tiles
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.batch import Batch

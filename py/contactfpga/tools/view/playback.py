@@ -10,9 +10,8 @@ from typing import Generic, TypeVar
 
 from contactfpga.driver.stats import Stats
 from contactfpga.robot.haptics import LoadCells
-from contactfpga.tools.view.meter import Meter
 from contactfpga.tools.view.replayed import BoardRecording
-from contactfpga.tools.view.sources import STEP_S, Moment
+from contactfpga.tools.view.sources import STEP_S, Meter, Moment
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.batch import Batch
