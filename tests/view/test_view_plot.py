@@ -7,7 +7,7 @@ import pytest
 from tracked import frame, pressed
 
 from contactfpga import Skin
-from contactfpga.tools.view.touches import STEPS, Touches
+from contactfpga.tools.view.plot import STEPS, Touches
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 
@@ -43,7 +43,7 @@ def recorded(count, places):
 
 
 def test_where_and_for_how_long(monkeypatch):
-    monkeypatch.setattr("contactfpga.tools.view.touches.CHUNK", 7)
+    monkeypatch.setattr("contactfpga.tools.view.plot.CHUNK", 7)
     found = Touches.of(Recording(recorded(1001, lambda number: [(3, 4)] if number < 250 else [(9.4, 11), (1, 1)])))
     wanted = np.zeros((16, 16))
     wanted[4, 3], wanted[11, 9], wanted[1, 1] = 0.25, 0.75, 0.75
