@@ -13,7 +13,7 @@ from contactfpga.errors import ReadTimeout, ReplayEnded
 from contactfpga.robot.haptics import LoadCells, Plane, Unit, contacts
 from contactfpga.robot.ros.feed import Feed, Moments
 from contactfpga.robot.ros.settings import TOPICS, Settings
-from contactfpga.zones.host_line import HostLine
+from contactfpga.zones.zone import HostLine
 
 NOW_NS = 1_795_000_000_000_000_000
 

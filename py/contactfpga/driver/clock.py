@@ -17,7 +17,7 @@ from contactfpga.driver.stats import Stats
 from contactfpga.skin.derived import EPOCH_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import Frame, may_number
-from contactfpga.zones.host_line import HostLine
+from contactfpga.zones.zone import HostLine
 
 _WRAP_US = 1 << TIME_BITS
 _EPOCH_US = 1 << EPOCH_BITS

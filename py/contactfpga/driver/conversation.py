@@ -27,10 +27,9 @@ from contactfpga.wire.hello import Hello, describe, difference
 from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.wire.units import KIND_UNITS
-from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.run import Run, frame_of
 from contactfpga.zones.units import UnitSamples
-from contactfpga.zones.zone import Zones
+from contactfpga.zones.zone import HostLine, Zones
 
 _FRAME_KINDS = set(protocol.KINDS.values())
 

@@ -12,9 +12,8 @@ import numpy as np
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
-from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory
-from contactfpga.zones.zone import Zones
+from contactfpga.zones.zone import HostLine, Zones
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

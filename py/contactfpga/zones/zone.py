@@ -7,7 +7,7 @@ import functools
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import overload
+from typing import TypeVar, overload
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import around, ghosts, labels, motion
-from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory, UnitSamples
 
 DTYPE = np.dtype(
@@ -381,3 +380,27 @@ class Zones(Sequence[Zone]):
         if not self.sheet.closed:
             del values["winding"]
         return values
+
+
+Times = TypeVar("Times", int, np.ndarray)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class HostLine:
+    """A straight line from device time to the host's clock, and when the frames arrived that it is used for."""
+
+    arrived_s: float
+    """When their last bytes arrived."""
+    base_us: int
+    """A device time."""
+    base_s: float
+    """The host's clock at that moment."""
+    rate: float
+    """Seconds of the host's clock per second of device time."""
+    sigma_s: float
+    """Standard deviation of what :meth:`at` returns."""
+
+    def at(self, time_us: Times) -> float | Times:
+        """The host's clock in s at a device time in us, of frames that had arrived by :attr:`arrived_s`."""
+        at_s = self.base_s + (time_us - self.base_us) * (self.rate * 1e-6)
+        return np.minimum(at_s, self.arrived_s) if isinstance(at_s, np.ndarray) else min(at_s, self.arrived_s)
