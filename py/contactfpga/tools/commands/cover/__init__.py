@@ -1,10 +1,21 @@
-"""`contactfpga cover`: the soft cover's impact, sensitivity and design; a file per topic."""
+"""`contactfpga cover`: the soft cover's impact, sensitivity and design; a file per topic.
+
+Here is what topics share: the numbers that they read, in SI units, and how they print: tables in mm and kPa, JSON in SI
+units.
+"""
 
 from __future__ import annotations
 
+import argparse
+import dataclasses
+import json
+import math
 from collections.abc import Callable
+from typing import Any
 
-from contactfpga.design.cover.answer import CoverError
+from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, NoSolution
+from contactfpga.errors import UNSOLVED
+from contactfpga.tools.console import numbers
 
 TOPICS = {
     "impact": "Compute compression, time and peak force when an arm runs into something.",
@@ -21,3 +32,63 @@ def run(topic: Callable[[], int]) -> int:
         return topic()
     except OverflowError:
         raise CoverError("a number is too large to compute with; all are in SI units") from None
+
+
+MM, KPA = 1e3, 1e-3
+
+
+def say(known: dict[str, Any]) -> int:
+    """Print an answer as one JSON object."""
+    print(json.dumps(known, default=_plain, allow_nan=False))
+    return 0
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, NoSolution):
+        return {"no_solution": value.reason}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.asdict(value)
+    raise TypeError(f"{value!r} is no JSON")
+
+
+def unsolved(answer: NoSolution, as_json: bool) -> int:
+    """Print why there is no answer."""
+    if as_json:
+        say({"no_solution": answer.reason})
+    else:
+        print(answer)
+    return UNSOLVED
+
+
+def table(*lines: tuple[str, str]) -> None:
+    """Print titles and values as two columns."""
+    wide = max(len(title) for title, _ in lines)
+    for title, value in lines:
+        print(f"{title:{wide}}  {value}")
+
+
+def notes(found: list[str]) -> int:
+    """Print where a model is rough."""
+    for note in found:
+        print(f"note: {note}")
+    return 0
+
+
+LENGTH, LENGTH_FROM_0 = numbers.length(MAX_LENGTH_M), numbers.length(MAX_LENGTH_M, 0.0)
+ALONG = numbers.length(10.0)
+"""Along an arm."""
+KG = numbers.number(1e-6, 1e6, "kg")
+SPEED = numbers.number(0, 1000, "m/s")
+TORQUE = numbers.number(-1e6, 1e6, "Nm")
+BRIEF = numbers.number(1e-6, 1, "s")
+FACE = numbers.number(1e-12, 1e-2, "m2")
+SHARE = numbers.number(0, 10, above=True)
+ANGLE = numbers.number(-2 * math.pi, 2 * math.pi, "rad")
+POISSON = numbers.number(-1, 0.5, above=True)
+PASCAL = numbers.number(1, 1e12, "Pa")
+NEWTON = numbers.number(1e-6, 1e6, "N")
+
+
+def json_flag(parser: argparse.ArgumentParser) -> None:
+    """Of every topic."""
+    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")

@@ -11,8 +11,8 @@ from contactfpga.design.cover.design import Design, FoamDesign, Thin, design, ma
 from contactfpga.design.cover.sense import Sense
 from contactfpga.design.cover.task import Task
 from contactfpga.errors import UNSOLVED
-from contactfpga.tools.commands.cover import units
-from contactfpga.tools.commands.cover.printing import KPA, MM, notes, say, table
+from contactfpga.tools.commands import cover
+from contactfpga.tools.commands.cover import KPA, MM, notes, say, table
 
 EXTRA = "sim"
 
@@ -31,7 +31,7 @@ THIN_HEADS = (
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
     parser.add_argument("file", metavar="FILE.toml", help="Arm, impact, switch and limits; see examples/.")
-    units.json_flag(parser)
+    cover.json_flag(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 from contactfpga.design.cover import line
 from contactfpga.design.cover.task import FIRST_DESIGN, Task
-from contactfpga.tools.commands.cover.printing import MM, say
+from contactfpga.tools.commands.cover import MM, say
 from contactfpga.tools.console import flags, outputs
 
 EXTRA = "sim"

@@ -10,8 +10,8 @@ from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import METHODS, Impact
-from contactfpga.tools.commands.cover import units
-from contactfpga.tools.commands.cover.printing import KPA, MM, notes, say, table, unsolved
+from contactfpga.tools.commands import cover
+from contactfpga.tools.commands.cover import KPA, MM, notes, say, table, unsolved
 
 EXTRA = "sim"
 
@@ -19,36 +19,36 @@ EXTRA = "sim"
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
     arm = parser.add_argument_group("arm")
-    arm.add_argument("--mass", type=units.KG, required=True, metavar="KG", help="Mass of the link.")
-    arm.add_argument("--radius", type=units.LENGTH, required=True, metavar="M", help="Radius of the link, a cylinder.")
+    arm.add_argument("--mass", type=cover.KG, required=True, metavar="KG", help="Mass of the link.")
+    arm.add_argument("--radius", type=cover.LENGTH, required=True, metavar="M", help="Radius of the link, a cylinder.")
     com = "Distance from the joint to the center of mass."
-    arm.add_argument("--com", type=units.ALONG, required=True, metavar="M", help=com)
+    arm.add_argument("--com", type=cover.ALONG, required=True, metavar="M", help=com)
     lever = "Distance from the joint to the contact."
-    arm.add_argument("--lever", type=units.ALONG, required=True, metavar="M", help=lever)
-    arm.add_argument("--length", type=units.ALONG, metavar="M", help="Length of the link (default: the lever).")
+    arm.add_argument("--lever", type=cover.ALONG, required=True, metavar="M", help=lever)
+    arm.add_argument("--length", type=cover.ALONG, metavar="M", help="Length of the link (default: the lever).")
     arm.add_argument("--tube", action="store_true", help="Take the link for a thin tube.")
     speed = "Speed of the contact point at the touch."
-    arm.add_argument("--speed", type=units.SPEED, required=True, metavar="M/S", help=speed)
+    arm.add_argument("--speed", type=cover.SPEED, required=True, metavar="M/S", help=speed)
     torque = "Constant torque of the motor (default: 0)."
-    arm.add_argument("--torque", type=units.TORQUE, default=0.0, metavar="NM", help=torque)
+    arm.add_argument("--torque", type=cover.TORQUE, default=0.0, metavar="NM", help=torque)
     arm.add_argument("--gravity", action="store_true", help="Include gravity, 9.81 m/s2.")
     angle = "Angle of the joint; at 0 the link hangs down (default: 0)."
-    arm.add_argument("--angle", type=units.ANGLE, default=0.0, metavar="RAD", help=angle)
+    arm.add_argument("--angle", type=cover.ANGLE, default=0.0, metavar="RAD", help=angle)
     foam = parser.add_argument_group("foam")
     wanted = foam.add_mutually_exclusive_group(required=True)
-    wanted.add_argument("--modulus", type=units.PASCAL, metavar="PA", help="Young's modulus.")
+    wanted.add_argument("--modulus", type=cover.PASCAL, metavar="PA", help="Young's modulus.")
     time = "Compression time for which the modulus is sought."
-    wanted.add_argument("--time", type=units.BRIEF, metavar="S", help=time)
-    foam.add_argument("--poisson", type=units.POISSON, default=0.5, help="Poisson's ratio (default: 0.5).")
+    wanted.add_argument("--time", type=cover.BRIEF, metavar="S", help=time)
+    foam.add_argument("--poisson", type=cover.POISSON, default=0.5, help="Poisson's ratio (default: 0.5).")
     both = "R* with 1/R* = 1/R + 1/R'."
-    foam.add_argument("--effective-radius", type=units.LENGTH, required=True, metavar="M", help=both)
+    foam.add_argument("--effective-radius", type=cover.LENGTH, required=True, metavar="M", help=both)
     flat = "Thickness; refuse an impact that presses the foam flat."
-    foam.add_argument("--thickness", type=units.LENGTH, metavar="M", help=flat)
+    foam.add_argument("--thickness", type=cover.LENGTH, metavar="M", help=flat)
     strength = "Yield strength; refuse an impact from which the foam does not spring back."
-    foam.add_argument("--yield-strength", type=units.PASCAL, metavar="PA", help=strength)
+    foam.add_argument("--yield-strength", type=cover.PASCAL, metavar="PA", help=strength)
     method = "How the equation of motion is solved (default: auto)."
     parser.add_argument("--method", choices=METHODS, default="auto", help=method)
-    units.json_flag(parser)
+    cover.json_flag(parser)
 
 
 def run(args: argparse.Namespace) -> int:

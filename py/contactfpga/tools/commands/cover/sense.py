@@ -11,8 +11,8 @@ from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model, Sense, Sheet
 from contactfpga.errors import UNSOLVED
-from contactfpga.tools.commands.cover import units
-from contactfpga.tools.commands.cover.printing import MM, notes, say, table
+from contactfpga.tools.commands import cover
+from contactfpga.tools.commands.cover import MM, notes, say, table
 
 EXTRA = "sim"
 
@@ -21,28 +21,28 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
     asked = parser.add_argument_group("what is asked")
     offset = "Distance from the contact to the switch: find the force."
-    asked.add_argument("--offset", type=units.LENGTH_FROM_0, metavar="M", help=offset)
-    asked.add_argument("--force", type=units.NEWTON, metavar="N", help="Force: find its reach and the pitch.")
+    asked.add_argument("--offset", type=cover.LENGTH_FROM_0, metavar="M", help=offset)
+    asked.add_argument("--force", type=cover.NEWTON, metavar="N", help="Force: find its reach and the pitch.")
     pitch = "Pitch of a square sheet: find its smallest force."
-    asked.add_argument("--pitch", type=units.LENGTH, metavar="M", help=pitch)
+    asked.add_argument("--pitch", type=cover.LENGTH, metavar="M", help=pitch)
     thickness = "Thickness of the cover; without it, find the best one."
-    asked.add_argument("--thickness", type=units.LENGTH, metavar="M", help=thickness)
+    asked.add_argument("--thickness", type=cover.LENGTH, metavar="M", help=thickness)
     switch, usual = parser.add_argument_group("switch"), Switch()
     closing = f"Force that closes the switch (default: {usual.force_n:g})."
-    switch.add_argument("--switch-force", type=units.NEWTON, default=usual.force_n, metavar="N", help=closing)
+    switch.add_argument("--switch-force", type=cover.NEWTON, default=usual.force_n, metavar="N", help=closing)
     face = f"Area of its face (default: {usual.area_m2:g})."
-    switch.add_argument("--switch-area", type=units.FACE, default=usual.area_m2, metavar="M2", help=face)
+    switch.add_argument("--switch-area", type=cover.FACE, default=usual.area_m2, metavar="M2", help=face)
     ball = parser.add_argument_group("what touches, if known")
-    ball.add_argument("--modulus", type=units.PASCAL, metavar="PA", help="Young's modulus of the cover.")
-    ball.add_argument("--poisson", type=units.POISSON, default=0.5, help="Poisson's ratio of the cover (default: 0.5).")
-    ball.add_argument("--effective-radius", type=units.LENGTH, metavar="M", help="R* with 1/R* = 1/R + 1/R'.")
+    ball.add_argument("--modulus", type=cover.PASCAL, metavar="PA", help="Young's modulus of the cover.")
+    ball.add_argument("--poisson", type=cover.POISSON, default=0.5, help="Poisson's ratio of the cover (default: 0.5).")
+    ball.add_argument("--effective-radius", type=cover.LENGTH, metavar="M", help="R* with 1/R* = 1/R + 1/R'.")
     model = parser.add_argument_group("model (default: the simplest within the tolerance)")
     within = "What the cover is: a half-space, or a layer on a rigid base."
     model.add_argument("--model", choices=("halfspace", "bonded", "frictionless"), help=within)
     model.add_argument("--contact", choices=("point", "patch"), help="Contact of --model (default: point).")
     share = "Largest share by which the answer may be off (default: 0.05); refuse --model beyond it."
-    model.add_argument("--tolerance", type=units.SHARE, help=share)
-    units.json_flag(parser)
+    model.add_argument("--tolerance", type=cover.SHARE, help=share)
+    cover.json_flag(parser)
 
 
 def run(args: argparse.Namespace) -> int:
