@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from contactfpga.robot.haptics import Cylinder, drawing
+from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.haptics import coverage, felt_tables
@@ -75,4 +75,4 @@ def _percent(share: float) -> str:
 
 def draw(folder: Path) -> list[Path]:
     """The arrangements of units, and what is felt."""
-    return [drawing.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *felt_tables.draw(folder)]
+    return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *felt_tables.draw(folder)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
-from contactfpga.robot.haptics.rate import Layout, Rating, Requirements, compared, rate
+from contactfpga.robot.haptics.rate import Layout, Rating, Requirements, compared, draw, rate
 from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Surface
 from contactfpga.tools.console import numbers, outputs
@@ -66,9 +66,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _show(needs, ratings if args.all else _best(ratings))
     if picture is not None:
-        from contactfpga.robot.haptics import drawing
-
-        drawing.draw(picture, needs, ratings)
+        draw(picture, needs, ratings)
     return 0
 
 
