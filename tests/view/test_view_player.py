@@ -4,10 +4,9 @@ import pytest
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga import Skin
+from contactfpga import Skin, terminal
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.tools import cli
-from contactfpga.tools.console import progress
 from contactfpga.tools.view import opening, replayed
 from contactfpga.tools.view import playback as playing
 from contactfpga.tools.view.playback import Player
@@ -137,8 +136,8 @@ def test_a_long_recording_says_how_far_it_is_read(tmp_path, monkeypatch, capsys)
     data = board.hello() + b"".join(board.frame() for _ in range(3000))
     (tmp_path / "long.rec").write_bytes(data)
     for soon_s, lines in ((60.0, 0), (0.0, 2)):
-        monkeypatch.setattr(progress, "SOON_S", soon_s)
-        monkeypatch.setattr(progress, "LINES_S", 0.0)
+        monkeypatch.setattr(terminal, "SOON_S", soon_s)
+        monkeypatch.setattr(terminal, "LINES_S", 0.0)
         assert cli.main(["plot", "long.rec"]) == 0
         said = capsys.readouterr().err.splitlines()
         assert len(said) >= lines

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from contactfpga import terminal
-from contactfpga.tools.console import outputs, progress
+from contactfpga.tools.console import outputs
 
 EXTRA = "view"
 
@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.tools.view import plot, replayed
 
-    with progress.reading(args.recording) as tell:
+    with terminal.reading(args.recording) as tell:
         recording = replayed.load(args.recording, args.link, reading=tell)
     path = Path(args.output or f"{Path(args.recording).stem}.png")
     if path.suffix.lower() not in ENDINGS:

@@ -8,7 +8,7 @@ import os
 import sys
 
 from contactfpga import terminal
-from contactfpga.tools.console import flags, interrupt, numbers, progress
+from contactfpga.tools.console import flags, interrupt, numbers
 
 EXTRA = "view"
 
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.tools.view.playback import Player
 
     with contextlib.ExitStack() as stack:
-        with progress.reading(args.port or "") as tell:
+        with terminal.reading(args.port or "") as tell:
             named = opening.ViewRequest(args.port, args.skin, args.baud, args.timeout, args.link, args.units, tell)
             shown = stack.enter_context(opening.opened(named, args.host, args.http_port))
         stack.enter_context(interrupt.usual_end())
