@@ -2,15 +2,15 @@
 
 from contactfpga.robot.body.body import Body, OpenBody, SnapshotQueue
 from contactfpga.robot.body.joints import JointHistory
-from contactfpga.robot.body.snapshot import BodyStats, Contact, Snapshot, SnapshotBatch
+from contactfpga.robot.body.snapshot import BodyStats, LinkContact, Snapshot, SnapshotBatch
 from contactfpga.robot.body.state import BodyError, LinkState, NoJoints, NoLinkData
 
 __all__ = [
     "Body",
     "BodyError",
     "BodyStats",
-    "Contact",
     "JointHistory",
+    "LinkContact",
     "LinkState",
     "NoJoints",
     "NoLinkData",

@@ -27,7 +27,7 @@ from contactfpga.zones.zone import Zone, Zones
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Contact:
+class LinkContact:
     """One zone of a link, in a frame of the robot."""
 
     link: str
@@ -71,7 +71,7 @@ class Contact:
         as ``force_n``. With three contacts or more it raises :class:`~contactfpga.MissingExtra` without ``haptics``."""
         return None if self._felt is None else self._felt.interval_n
 
-    def moved(self, pose: Pose, frame: str) -> Contact:
+    def moved(self, pose: Pose, frame: str) -> LinkContact:
         """The same in a frame in which its own one lies at ``pose``."""
         return dataclasses.replace(
             self,
@@ -82,7 +82,7 @@ class Contact:
             force_n=None if self.force_n is None else vector(pose.turn(np.array(self.force_n))),
         )
 
-    def less_certain(self, other: Pose | None, pose: Pose) -> Contact:
+    def less_certain(self, other: Pose | None, pose: Pose) -> LinkContact:
         """The same with the spread of a point that is at ``pose``, or as far from there as ``other`` puts it; None:
         nobody knows how far."""
         if other is None or self.point_m is None or self.covariance_m2 is None:
@@ -100,7 +100,7 @@ class Contact:
         return values | {"zone": dataclasses.asdict(self.zone)}
 
 
-def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[Contact]:
+def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[LinkContact]:
     """The contacts in the link's frame, one per zone; with the joints' angles, they say how much of them is a fold."""
     zones = state.zones
     assert zones is not None
@@ -116,12 +116,12 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
             spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
         when = zones.time_us, state.frame_s, zones.host_sigma_s
         fold = _fold(plan, zones, zone, angles)
-        made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
+        made = LinkContact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
         found.append(dataclasses.replace(made, track=ids.get(id(zone)), fold=fold))
     return _felt(plan, zones, found)
 
 
-def _felt(plan: Plan, zones: Zones, found: list[Contact]) -> list[Contact]:
+def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContact]:
     """The same with forces, where the units' readings have come, and each contact has a place."""
     forces = forces_of(plan, zones) if found else None
     if forces is None:
@@ -211,7 +211,7 @@ class Snapshot:
         """Links that are ok, so that it is known what touches them."""
         return tuple(name for name, state in self.links.items() if state.status == "ok")
 
-    def contacts(self, frame: str = BASE, links: Collection[str] | None = None) -> list[Contact]:
+    def contacts(self, frame: str = BASE, links: Collection[str] | None = None) -> list[LinkContact]:
         """The contacts on all links, or on these.
 
         Raises :class:`NoLinkData` if one of them is not ok, because no data is never no contact;
@@ -230,7 +230,7 @@ class Snapshot:
         missing = {name: self.links[name] for name in asked if self.links[name].status != "ok"}
         if missing:
             raise NoLinkData(missing)
-        found: list[Contact] = []
+        found: list[LinkContact] = []
         for name in asked:
             known = self._angles.get(name)
             angles = None if isinstance(known, ContactFPGAError) else known
@@ -240,7 +240,7 @@ class Snapshot:
             found += mine
         return found
 
-    def _in_base(self, name: str, contacts: list[Contact]) -> list[Contact]:
+    def _in_base(self, name: str, contacts: list[LinkContact]) -> list[LinkContact]:
         frame, beside = self._body.links[name].frame, self._beside.get(name)
         pose = self._kinematics.pose(frame, self._angles_of(name))
         moved = [one.moved(pose, BASE) for one in contacts]
@@ -249,7 +249,7 @@ class Snapshot:
         other = None if isinstance(beside, ContactFPGAError) else self._kinematics.pose(frame, beside)
         return [one.less_certain(other, pose) for one in moved]
 
-    def jacobian(self, one: Contact) -> Floats:
+    def jacobian(self, one: LinkContact) -> Floats:
         """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
         frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)

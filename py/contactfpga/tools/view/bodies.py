@@ -15,7 +15,7 @@ from contactfpga import picture_style
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
 from contactfpga.inputs.values import shown
-from contactfpga.robot.body import Body, BodyError, Contact, LinkState, packed
+from contactfpga.robot.body import Body, BodyError, LinkContact, LinkState, packed
 from contactfpga.robot.body import urdf as urdf_file
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.kinematics import Pose
@@ -157,7 +157,7 @@ class BodyView:
         return None
 
 
-def pushes(plan: Plan, contacts: Iterable[Contact]) -> np.ndarray:
+def pushes(plan: Plan, contacts: Iterable[LinkContact]) -> np.ndarray:
     """(n, 2, 3) arrows in m in the sheet's own frame, one for each contact with a force, from outside to its point."""
     arrows = []
     for one in contacts:

@@ -9,7 +9,7 @@ import time
 
 from contactfpga import terminal
 from contactfpga.inputs.values import number_in
-from contactfpga.robot.body import Body, Contact, Snapshot
+from contactfpga.robot.body import Body, LinkContact, Snapshot
 from contactfpga.robot.body.snapshot import BASE, LINK
 from contactfpga.tools.console import numbers
 
@@ -86,7 +86,7 @@ def _print(snapshot: Snapshot, frame: str, as_json: bool) -> None:
             terminal.say(f"  {_line(one)}", hang=4)
 
 
-def _line(one: Contact) -> str:
+def _line(one: LinkContact) -> str:
     where = "no single place"
     if one.point_m is not None and one.normal is not None:
         x, y, z = (f"{1e3 * value:.1f}" for value in one.point_m)
