@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from contactfpga.robot.body.kinematics import Pose
-from contactfpga.surfaces import Cylinder, Mesh, SurfaceError
+from contactfpga.surfaces import CylinderSurface, Mesh, SurfaceError
 from contactfpga.surfaces.laying import Placement, Triangles
 from contactfpga.tools import cli
 
@@ -44,7 +44,7 @@ def laid(rows, columns, pitch_x_mm, pitch_y_mm, pose=POSE):
 
 def test_sheet_unrolled_on_a_tube_lies_as_on_a_cylinder(tube):
     table = laid(6, 16, 17.0, 10.0).unrolled(Triangles.load(tube))
-    exact = Cylinder(45.0)
+    exact = CylinderSurface(45.0)
     x, y = np.meshgrid(np.linspace(0, 255, 40), np.linspace(0, 50, 11))
     points, normals = table.place(x, y)
     true_points, true_normals = exact.place(x, y)

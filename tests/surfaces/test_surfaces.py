@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from contactfpga import Skin, surfaces
-from contactfpga.surfaces import Cone, Cylinder, Mirrored, Plane, SurfaceError
+from contactfpga.surfaces import Cone, CylinderSurface, MirroredSurface, PlaneSurface, SurfaceError
 
-ALL = [Plane(), Plane(12.5), Cylinder(38.0), Cone(40.0, 0.15), Cone(40.0, -0.15), Cone(5.0, 3.0)]
-MIRRORED = [Mirrored(Plane(), 35.0), Mirrored(Cone(40.0, 0.15), 35.0)]
+ALL = [PlaneSurface(), PlaneSurface(12.5), CylinderSurface(38.0), Cone(40.0, 0.15), Cone(40.0, -0.15), Cone(5.0, 3.0)]
+MIRRORED = [MirroredSurface(PlaneSurface(), 35.0), MirroredSurface(Cone(40.0, 0.15), 35.0)]
 PLACES = [(0.0, 0.0), (10.0, 25.0), (-33.0, 7.0), (55.0, 90.0), (3.0, -2.0)]
 
 
@@ -65,21 +65,21 @@ def test_cone_has_its_radius_and_slope():
 
 
 def test_mirrored_columns_count_from_the_other_end():
-    assert Mirrored(Cylinder(38.0), 35.0).place(10.0, 7.0) == Cylinder(38.0).place(25.0, 7.0)
+    assert MirroredSurface(CylinderSurface(38.0), 35.0).place(10.0, 7.0) == CylinderSurface(38.0).place(25.0, 7.0)
 
 
 def test_surface_of_a_skin():
-    assert surfaces.of(Skin().sheet) == Plane()
-    assert surfaces.of(Skin(surface="cylinder", radius_mm=38.0).sheet) == Cylinder(38.0)
+    assert surfaces.of(Skin().sheet) == PlaneSurface()
+    assert surfaces.of(Skin(surface="cylinder", radius_mm=38.0).sheet) == CylinderSurface(38.0)
 
 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Cylinder(0.0), "radius_mm is 0.0; it must be a number above 0 and at most 1e+06 mm"),
+        (lambda: CylinderSurface(0.0), "radius_mm is 0.0; it must be a number above 0 and at most 1e+06 mm"),
         (lambda: Cone(-1.0, 0.1), "radius_mm is -1.0; it must be a number above 0 and at most 1e+06 mm"),
         (lambda: Cone(10.0, 0.0), "slope is 0; a cone without a slope is a cylinder: use that"),
-        (lambda: Plane(math.inf), "height_mm is inf; it must be a number above -1e+06 and at most 1e+06 mm"),
+        (lambda: PlaneSurface(math.inf), "height_mm is inf; it must be a number above -1e+06 and at most 1e+06 mm"),
         (lambda: Cone(10.0, 1.0).place(0.0, -20.0), "y is -20 mm; the cone's tip is at -14.1421 mm"),
     ],
 )

@@ -8,7 +8,7 @@ import pytest
 from tracked import frame
 
 from contactfpga.robot.haptics import Contacts, LoadCells, Wrench, contacts
-from contactfpga.surfaces import Cylinder, Plane
+from contactfpga.surfaces import CylinderSurface, PlaneSurface
 from contactfpga.tools.view import picture
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -18,7 +18,7 @@ FLAT = EXAMPLES / "units-flat.toml"
 def test_an_arrow_ends_at_its_zone_and_is_as_long_as_its_force():
     cells, zones = LoadCells.load(FLAT), frame(0, [(10, 4)])
     force = SimpleNamespace(force_n=(1.0, 0.5, -5.0))
-    ((tail, tip),) = picture.pushes([force], zones, cells, Plane())
+    ((tail, tip),) = picture.pushes([force], zones, cells, PlaneSurface())
     np.testing.assert_allclose(tip, [0.1, 0.04, 0.0], atol=1e-9)
     np.testing.assert_allclose((tip - tail) * 1000, np.array([1.0, 0.5, -5.0]) * picture.MM_PER_N, atol=1e-6)
 
@@ -26,7 +26,7 @@ def test_an_arrow_ends_at_its_zone_and_is_as_long_as_its_force():
 def test_on_a_cylinder_it_points_at_its_axis():
     """However the units' own frame is turned: a push is a push."""
     cells, zones = LoadCells.load(FLAT), frame(0, [(7, 4)])
-    ((tail, tip),) = picture.pushes([SimpleNamespace(force_n=(0.0, 0.0, -5.0))], zones, cells, Cylinder(40.0))
+    ((tail, tip),) = picture.pushes([SimpleNamespace(force_n=(0.0, 0.0, -5.0))], zones, cells, CylinderSurface(40.0))
     angle = 70 / 40
     outward = np.array([np.cos(angle), np.sin(angle), 0.0])
     np.testing.assert_allclose(tip, 0.04 * outward + [0, 0, 0.04], atol=1e-9)
@@ -36,7 +36,7 @@ def test_on_a_cylinder_it_points_at_its_axis():
 def test_what_is_not_known_has_no_arrow():
     cells, zones = LoadCells.load(FLAT), frame(0, [(6, 4), (12, 12)])
     unknown = [SimpleNamespace(force_n=None), SimpleNamespace(force_n=(0.0, 0.0, -0.001))]
-    assert picture.pushes(unknown, zones, cells, Plane()).shape == (0, 2, 3)
+    assert picture.pushes(unknown, zones, cells, PlaneSurface()).shape == (0, 2, 3)
 
 
 @pytest.mark.campaign  # a board with units takes a while to compile

@@ -5,18 +5,18 @@ import functools
 from contactfpga.skin.sheet import Sheet
 from contactfpga.surfaces.mesh import Mesh
 from contactfpga.surfaces.shapes import SurfaceError
-from contactfpga.surfaces.surface import Cone, Cylinder, Mirrored, Plane
+from contactfpga.surfaces.surface import Cone, CylinderSurface, MirroredSurface, PlaneSurface
 
-Surface = Plane | Cylinder | Cone | Mesh | Mirrored
+Surface = PlaneSurface | CylinderSurface | Cone | Mesh | MirroredSurface
 
-__all__ = ["Cone", "Cylinder", "Mesh", "Mirrored", "Plane", "Surface", "SurfaceError", "of"]
+__all__ = ["Cone", "CylinderSurface", "Mesh", "MirroredSurface", "PlaneSurface", "Surface", "SurfaceError", "of"]
 
 
-def of(sheet: Sheet) -> Plane | Cylinder:
+def of(sheet: Sheet) -> PlaneSurface | CylinderSurface:
     """The surface that a Skin, or a board's hello, tells of."""
     return _of(sheet.radius_mm)
 
 
 @functools.lru_cache(maxsize=256)  # each frame asks, and all frames of a sheet have the same one
-def _of(radius_mm: float | None) -> Plane | Cylinder:
-    return Plane() if radius_mm is None else Cylinder(radius_mm)
+def _of(radius_mm: float | None) -> PlaneSurface | CylinderSurface:
+    return PlaneSurface() if radius_mm is None else CylinderSurface(radius_mm)

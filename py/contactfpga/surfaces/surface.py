@@ -19,7 +19,7 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, le
 
 
 @dataclasses.dataclass(frozen=True)
-class Plane:
+class PlaneSurface:
     """The plane z = ``height_mm``, outside where z is larger; x and y are those of the sheet."""
 
     height_mm: float = 0.0
@@ -48,7 +48,7 @@ class Plane:
 
 
 @dataclasses.dataclass(frozen=True)
-class Cylinder:
+class CylinderSurface:
     """A cylinder about z: x runs around it, from the x axis toward the y axis, y along it."""
 
     radius_mm: float
@@ -137,10 +137,10 @@ class Cone:
 
 
 @dataclasses.dataclass(frozen=True)
-class Mirrored:
+class MirroredSurface:
     """A surface on which x counts from the last column."""
 
-    surface: Plane | Cylinder | Cone | Mesh
+    surface: PlaneSurface | CylinderSurface | Cone | Mesh
     width_mm: float
     """From the first to the last column."""
 

@@ -23,7 +23,7 @@ from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.state import BodyError
 from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin import Skin
-from contactfpga.surfaces import Cone, Cylinder, Mesh, Mirrored, Plane, Surface
+from contactfpga.surfaces import Cone, CylinderSurface, Mesh, MirroredSurface, PlaneSurface, Surface
 from contactfpga.surfaces.shapes import Vector, vector
 
 KEYS = (
@@ -49,7 +49,7 @@ class Plan:
     """Of the surface's frame in the link's."""
     mirrored: bool
     """Columns run the other way: x counts from the last one."""
-    surface: Plane | Cylinder | Cone | Mesh
+    surface: PlaneSurface | CylinderSurface | Cone | Mesh
     units: LoadCells | None
     friction: float
     late_s: float
@@ -65,7 +65,7 @@ class Plan:
     def laid(self) -> Surface:
         """The surface as the sheet lies on it: mirrored or not."""
         width_mm = (self.skin.columns - 1) * self.skin.pitch_x_mm
-        return Mirrored(self.surface, width_mm) if self.mirrored else self.surface
+        return MirroredSurface(self.surface, width_mm) if self.mirrored else self.surface
 
     def place(self, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
         """Point in m and outward normal, in the link's frame, of a place of its sheet."""
@@ -151,7 +151,7 @@ def _port(values: dict[str, Any], skin_path: Path) -> str | None:
     return port
 
 
-def _surface(values: Any, skin: Skin, folder: Path) -> Plane | Cylinder | Cone | Mesh:
+def _surface(values: Any, skin: Skin, folder: Path) -> PlaneSurface | CylinderSurface | Cone | Mesh:
     if values is None:
         return surfaces.of(skin.sheet)
     if isinstance(values, dict):
