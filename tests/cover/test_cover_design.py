@@ -10,7 +10,7 @@ from scipy import integrate
 from contactfpga import Skin
 from contactfpga.design.cover import elastic
 from contactfpga.design.cover.design import FREE, design
-from contactfpga.design.cover.sense import Model, Sheet
+from contactfpga.design.cover.sense import Model, PaddedSheet
 from contactfpga.design.cover.task import Foam, Task, find
 from contactfpga.skin.latency import latency_s
 
@@ -111,7 +111,7 @@ def test_without_a_named_model_the_simplest_that_holds_is_taken():
         if one.sure is not None and isinstance(one.sure.value, float):
             assert abs(one.sure.error) <= task.tolerance
             reach = one.pitch_m / math.sqrt(2)
-            bonded = Sheet(task.switch, one.thickness_m).force_n(Model("bonded", "point"), reach)
+            bonded = PaddedSheet(task.switch, one.thickness_m).force_n(Model("bonded", "point"), reach)
             assert one.sure.value == pytest.approx(bonded, rel=0.06)
     patch = design(_changed(task, contact="patch"))
     on_axis = [one for one in patch.candidates if one.least and isinstance(one.least.value, float)]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import integrate, special
 
 from contactfpga.design.cover import Ball, CoverError, NoSolution, Switch, hertz, hertz_layer, medium, point, sense
-from contactfpga.design.cover.sense import Model, Sheet
+from contactfpga.design.cover.sense import Model, PaddedSheet
 
 SWITCH = Switch(1.0, 12.6e-6)
 PAPERS = Ball(0.038, 4.6e5)
@@ -27,7 +27,7 @@ WORST = 5e-3 * math.sqrt(2)
     [(0, 5, 4.15555, 5), (5 * math.sqrt(2), 5, 64.7785, 4), (5 * math.sqrt(2), 10, 45.8054, 4), (0, 10, 16.622, 3)],
 )
 def test_half_space_by_name(offset_mm, thickness_mm, newtons, digits):
-    found = Sheet(SWITCH, thickness_mm * 1e-3).detects(offset_mm * 1e-3, HALFSPACE)
+    found = PaddedSheet(SWITCH, thickness_mm * 1e-3).detects(offset_mm * 1e-3, HALFSPACE)
     assert round(found.value, digits) == newtons
     assert (found.model, found.dropped) == (HALFSPACE, ("the rigid base",))
 
@@ -36,29 +36,29 @@ def test_half_space_by_name(offset_mm, thickness_mm, newtons, digits):
     ("newtons", "millimeters"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783)]
 )
 def test_reach_by_name(newtons, millimeters):
-    assert round(1e3 * Sheet(SWITCH, 5e-3).reaches(newtons, HALFSPACE).value, 4) == millimeters
+    assert round(1e3 * PaddedSheet(SWITCH, 5e-3).reaches(newtons, HALFSPACE).value, 4) == millimeters
 
 
 def test_the_papers_definition():
-    reach = Sheet(SWITCH, 5e-3).reaches(15, HALFSPACE).value
+    reach = PaddedSheet(SWITCH, 5e-3).reaches(15, HALFSPACE).value
     assert round(1e3 * sense.pitch_m(reach), 3) == 5.792
     assert sense.worst_offset_m(0.01) == pytest.approx(WORST)
     assert sense.worst_offset_m(0.006, 0.008) == pytest.approx(0.005)
 
 
 def test_on_axis_forces():
-    assert round(Sheet(SWITCH, 5e-3, Ball(0.019, 4.6e5)).force_n(PATCHES[0], 0.0), 2) == 13.41
-    assert round(Sheet(SWITCH, 5e-3, PAPERS).force_n(PATCHES[0], 0.0), 2) == 28.36
+    assert round(PaddedSheet(SWITCH, 5e-3, Ball(0.019, 4.6e5)).force_n(PATCHES[0], 0.0), 2) == 13.41
+    assert round(PaddedSheet(SWITCH, 5e-3, PAPERS).force_n(PATCHES[0], 0.0), 2) == 28.36
 
 
 # ---- the model that is taken
 
 
 def test_the_half_space_is_left_for_the_layer_where_it_fails():
-    found = Sheet(SWITCH, 5e-3).detects(WORST)
+    found = PaddedSheet(SWITCH, 5e-3).detects(WORST)
     assert found.model == BONDED
     assert (round(found.value), found.error, found.dropped) == (341, 0, ())
-    named = Sheet(SWITCH, 5e-3).detects(WORST, HALFSPACE)
+    named = PaddedSheet(SWITCH, 5e-3).detects(WORST, HALFSPACE)
     assert found.value / named.value == pytest.approx(5.26, abs=0.01)
     assert named.reference == found.value
     assert named.error == pytest.approx(-0.81, abs=0.001)
@@ -66,7 +66,7 @@ def test_the_half_space_is_left_for_the_layer_where_it_fails():
 
 
 def test_a_named_model_is_refused_beyond_a_tolerance_that_is_asked_for():
-    sheet = Sheet(SWITCH, 5e-3)
+    sheet = PaddedSheet(SWITCH, 5e-3)
     assert sheet.detects(WORST, HALFSPACE, 0.05).value == NoSolution(
         "'halfspace, point' is off by -81 %, 5 % are asked for; take 'bonded, point'"
     )
@@ -78,13 +78,13 @@ def test_a_named_model_is_refused_beyond_a_tolerance_that_is_asked_for():
 
 def test_no_model_is_larger_than_needed():
     # where the layer's and the half-space's stress happen to be alike, the closed form will do
-    found = Sheet(SWITCH, 5e-3).detects(0.83 * 5e-3)
+    found = PaddedSheet(SWITCH, 5e-3).detects(0.83 * 5e-3)
     assert (found.model, found.dropped) == (HALFSPACE, ("the rigid base",))
     assert 0 < abs(found.error) <= sense.TOLERANCE
-    assert Sheet(SWITCH, 5e-3).detects(0.83 * 5e-3, tolerance=1e-3).model == BONDED
-    needle = Sheet(SWITCH, 5e-3, Ball(1e-5, 1e8)).detects(0.001)
+    assert PaddedSheet(SWITCH, 5e-3).detects(0.83 * 5e-3, tolerance=1e-3).model == BONDED
+    needle = PaddedSheet(SWITCH, 5e-3, Ball(1e-5, 1e8)).detects(0.001)
     assert (needle.model, needle.dropped) == (BONDED, ("the width of the contact",))
-    ball = Sheet(SWITCH, 5e-3, SMALL)
+    ball = PaddedSheet(SWITCH, 5e-3, SMALL)
     assert ball.detects(0.002).model == PATCHES[1]
     between = ball.detects(4.5e-3)
     assert (between.model, between.dropped) == (PATCHES[0], ("the rigid base",))
@@ -95,7 +95,7 @@ def test_no_model_is_larger_than_needed():
 
 @pytest.mark.parametrize("ball", [None, SMALL, Ball(0.01, 3e5)])
 def test_the_answer_is_within_the_tolerance_whatever_model_gives_it(ball):
-    sheet = Sheet(SWITCH, 5e-3, ball)
+    sheet = PaddedSheet(SWITCH, 5e-3, ball)
     taken = set()
     for ratio in np.linspace(0, 1.6, 17):
         for tolerance in (0.01, 0.1, 0.5):
@@ -107,7 +107,7 @@ def test_the_answer_is_within_the_tolerance_whatever_model_gives_it(ball):
 
 
 def test_reach_takes_the_simplest_model_too():
-    sheet = Sheet(SWITCH, 5e-3)
+    sheet = PaddedSheet(SWITCH, 5e-3)
     found = sheet.reaches(15.0)
     assert (found.model, abs(found.error) < 0.05) == (HALFSPACE, True)
     assert sheet.reaches(300.0).model == BONDED
@@ -115,25 +115,25 @@ def test_reach_takes_the_simplest_model_too():
 
 def test_past_the_zero_no_force_closes_the_switch():
     for ball in (None, PAPERS):
-        found = Sheet(SWITCH, 5e-3, ball).detects(1.68 * 5e-3)
+        found = PaddedSheet(SWITCH, 5e-3, ball).detects(1.68 * 5e-3)
         assert isinstance(found.value, NoSolution)
         assert (
             "1.68 thicknesses away" in found.value.reason
             or "is 1.68 thicknesses of the cover away" in found.value.reason
         )
         assert "from 1.671 on a point force on a bonded layer does not press it" in found.value.reason
-    named = Sheet(SWITCH, 5e-3).detects(1.68 * 5e-3, HALFSPACE)
+    named = PaddedSheet(SWITCH, 5e-3).detects(1.68 * 5e-3, HALFSPACE)
     assert named.value < 200
     assert any("has no solution" in note for note in named.notes)
 
 
 def test_hertz_stops_holding_where_the_patch_is_wider_than_the_foam():
-    found = Sheet(SWITCH, 5e-3, PAPERS).detects(0.0)
+    found = PaddedSheet(SWITCH, 5e-3, PAPERS).detects(0.0)
     assert found.notes == (
         "Hertz stops holding: at 26.24 N the patch has a radius of 11.76 mm, the foam is 5 mm thick",
     )
-    assert Sheet(SWITCH, 5e-3, SMALL).detects(0.0).notes == ()
-    assert Sheet(SWITCH, 5e-3).detects(0.0).notes == ("what touches is not known: a point force is taken",)
+    assert PaddedSheet(SWITCH, 5e-3, SMALL).detects(0.0).notes == ()
+    assert PaddedSheet(SWITCH, 5e-3).detects(0.0).notes == ("what touches is not known: a point force is taken",)
 
 
 # ---- patches on layers
@@ -160,7 +160,7 @@ def test_patch_on_a_half_space_is_hubers():
 @pytest.mark.parametrize("model", PATCHES)
 @pytest.mark.parametrize("offset", [0.0, 2e-3, 6e-3])
 def test_the_switch_just_closes_under_the_force_that_is_found(model, offset):
-    force = Sheet(SWITCH, 5e-3, PAPERS).force_n(model, offset)
+    force = PaddedSheet(SWITCH, 5e-3, PAPERS).force_n(model, offset)
     for share, closed in ((1 - 1e-9, False), (1 + 1e-9, True)):
         stress = hertz_layer.stress_pa(share * force, PAPERS.patch_m(share * force), offset, 5e-3, model.within)
         assert (stress >= SWITCH.closing_pa) is closed
@@ -168,7 +168,7 @@ def test_the_switch_just_closes_under_the_force_that_is_found(model, offset):
 
 def test_a_small_ball_is_a_point():
     for model in PATCHES:
-        found = Sheet(SWITCH, 5e-3, Ball(1e-7, 1e9)).force_n(model, 3e-3)
+        found = PaddedSheet(SWITCH, 5e-3, Ball(1e-7, 1e9)).force_n(model, 3e-3)
         assert found == pytest.approx(point.force_n(SWITCH, 3e-3, 5e-3, model.within), rel=1e-5)
 
 
@@ -182,7 +182,7 @@ def test_a_small_ball_is_a_point():
     st.floats(-1, 1.3),
 )
 def test_reach_undoes_force(model, radius, modulus, ratio, thickness, newtons):
-    sheet = Sheet(Switch(10**newtons), 10**thickness, Ball(10**radius, 10**modulus))
+    sheet = PaddedSheet(Switch(10**newtons), 10**thickness, Ball(10**radius, 10**modulus))
     force = sheet.force_n(model, ratio * sheet.thickness_m)
     assume(not isinstance(force, NoSolution))
     back = sheet.reach_m(model, force * (1 + 1e-12))
@@ -207,20 +207,20 @@ def test_best_thickness():
 
 
 def test_a_force_too_small_says_what_it_takes():
-    assert Sheet(SWITCH, 5e-3).reaches(2.0).value.reason == (
+    assert PaddedSheet(SWITCH, 5e-3).reaches(2.0).value.reason == (
         "2 N do not even close the switch right below; that takes 2.645 N"
     )
-    assert Sheet(SWITCH, 5e-3, PAPERS).reaches(12.0).value.reason == (
+    assert PaddedSheet(SWITCH, 5e-3, PAPERS).reaches(12.0).value.reason == (
         "12 N do not even close the switch right below; that takes 26.24 N"
     )
 
 
 def test_a_ball_too_soft_for_any_model():
-    soft = Sheet(SWITCH, 5e-3, Ball(0.1, 1e4))
+    soft = PaddedSheet(SWITCH, 5e-3, Ball(0.1, 1e4))
     assert soft.force_n(PATCHES[1], 0.0).reason == (
         "a switch 0 mm from the axis stays open until the patch is 8 times as wide as the foam is thick"
     )
-    softer = Sheet(SWITCH, 5e-3, Ball(0.1, 1e3))
+    softer = PaddedSheet(SWITCH, 5e-3, Ball(0.1, 1e3))
     assert softer.force_n(PATCHES[1], 0.0).reason == (
         "the patch is 42.71 mm in radius long before a switch closes, the foam is 5 mm thick"
     )
@@ -230,23 +230,26 @@ def test_a_ball_too_soft_for_any_model():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Sheet(SWITCH, 0.0), "thickness_m is 0.0; it must be a finite number above 0 m"),
-        (lambda: Sheet(SWITCH, 5e-3).detects(-1e-3), "offset_m is -0.001; it must be a finite number, 0 m or above"),
+        (lambda: PaddedSheet(SWITCH, 0.0), "thickness_m is 0.0; it must be a finite number above 0 m"),
         (
-            lambda: Sheet(SWITCH, 5e-3).detects(0.0, tolerance=0.0),
+            lambda: PaddedSheet(SWITCH, 5e-3).detects(-1e-3),
+            "offset_m is -0.001; it must be a finite number, 0 m or above",
+        ),
+        (
+            lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, tolerance=0.0),
             "tolerance is 0.0; it must be a finite number above 0",
         ),
-        (lambda: Sheet(SWITCH, 5e-3).reaches(math.nan), "force is nan; it must be a finite number above 0 N"),
+        (lambda: PaddedSheet(SWITCH, 5e-3).reaches(math.nan), "force is nan; it must be a finite number above 0 N"),
         (
-            lambda: Sheet(SWITCH, 5e-3).detects(0.0, Model("bonded", "patch")),
+            lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, Model("bonded", "patch")),
             "model is 'bonded, patch'; a patch needs the radius R* and the modulus E* of the contact",
         ),
         (
-            lambda: Sheet(SWITCH, 5e-3).detects(0.0, Model("sand", "point")),
+            lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, Model("sand", "point")),
             "medium is 'sand'; it must be one of halfspace, bonded, frictionless",
         ),
         (
-            lambda: Sheet(SWITCH, 5e-3).detects(0.0, Model("bonded", "foot")),
+            lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, Model("bonded", "foot")),
             "contact is 'foot'; it must be one of point, patch",
         ),
         (lambda: sense.worst_offset_m(0.0), "pitch_x_m is 0.0; it must be a finite number above 0 m"),

@@ -8,7 +8,7 @@ from bumpers import exerted, flat, hexapod, on_cylinder, touch, units, wrench
 
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.sense import Model, Sheet
+from contactfpga.design.cover.sense import Model, PaddedSheet
 from contactfpga.robot.haptics import Closing, Cylinder, LoadCells, Locator, Plane, Reach, contacts, posterior
 from contactfpga.skin import sheet
 
@@ -149,13 +149,13 @@ def test_least_norm_breaks_friction_and_is_not_returned():
 )
 def test_reach_under_5_mm_of_foam(model, millimeters):
     ball = Ball(0.005, 4.6e5)
-    foam = Sheet(Switch(), 0.005, ball)
+    foam = PaddedSheet(Switch(), 0.005, ball)
     assert near(1e3 * foam.reach_m(model, 12.0), millimeters)
     assert 1e3 * Reach(foam, model).reach_m(12.0) == pytest.approx(float(millimeters), abs=1e-4)
 
 
 def test_three_closings_give_the_place_exactly():
-    foam, model = Sheet(Switch(), 0.005), Model("halfspace", "point")
+    foam, model = PaddedSheet(Switch(), 0.005), Model("halfspace", "point")
     cells = [(0, 0), (0, 1), (1, 0)]
     forces = [foam.force_n(model, np.hypot(5e-3 * column - 1.2e-3, 5e-3 * row - 0.7e-3)) for row, column in cells]
     assert all(near(*pair) for pair in zip(forces, ("5.004595", "13.397579", "17.993643")))

@@ -16,7 +16,7 @@ from contactfpga.design.cover import arm, elastic, impact, sense
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
-from contactfpga.design.cover.sense import Sense, Sheet
+from contactfpga.design.cover.sense import PaddedSheet, Sense
 from contactfpga.design.cover.task import Foam, Task
 from contactfpga.skin.latency import latency_s
 
@@ -188,13 +188,13 @@ def _judge(task: Task, foam: Foam, hit: Impact | None) -> FoamDesign:
     if mass is not None and task.mass_kg_m2 is not None:
         checks.append(Check("mass", mass, task.mass_kg_m2, True, f"mass_kg_m2 at least {mass:.4g} kg/m2"))
     notes = ("no plate is as thick as that",) if task.plates_m and thickness not in task.plates_m else ()
-    sheet = Sheet(task.switch, thickness, ball if task.contact == "patch" else None)
+    sheet = PaddedSheet(task.switch, thickness, ball if task.contact == "patch" else None)
     return _sensed(
         task, FoamDesign(foam, found, by_energy, thickness, mass, checks=tuple(checks), notes=notes), sheet, ball
     )
 
 
-def _sensed(task: Task, sofar: FoamDesign, sheet: Sheet, ball: Ball) -> FoamDesign:
+def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> FoamDesign:
     """The force and the pitch, and the limits on them."""
     checks = list(sofar.checks)
     least = sheet.detects(0.0, task.model, _tolerance(task))

@@ -62,7 +62,7 @@ class Sense:
 
 
 @dataclasses.dataclass(frozen=True)
-class Sheet:
+class PaddedSheet:
     """Foam over switches, and what touches it."""
 
     switch: Switch

@@ -38,7 +38,7 @@ class Reach:
         farthest_m: largest distance asked; None: four times the foam's thickness.
     """
 
-    def __init__(self, cover: sense.Sheet, model: sense.Model, farthest_m: float | None = None):
+    def __init__(self, cover: sense.PaddedSheet, model: sense.Model, farthest_m: float | None = None):
         self.model = model
         farthest = 4 * cover.thickness_m if farthest_m is None else farthest_m
         steps = STEPS if model.contact == "point" else PATCH_STEPS

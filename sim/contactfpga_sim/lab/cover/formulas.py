@@ -19,7 +19,7 @@ from contactfpga.design.cover.arm import Arm, slowness, speed2
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.numerics import Floats, gauss, legendre
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.sense import LADDER, Model, Sheet
+from contactfpga.design.cover.sense import LADDER, Model, PaddedSheet
 
 FLOOR = 1e-13
 """Errors below this are those of the reference, and written as less than it."""
@@ -209,7 +209,7 @@ BALLS = {"R* = 2 mm, E* = 1 MPa": Ball(2e-3, 1e6), "R* = 0.1 mm, E* = 10 MPa": B
 
 def sense_errors(model: Model, ball: Ball) -> list[float]:
     """Closing force by a model over that by the reference, minus 1, at each of :data:`PLACES`."""
-    sheet = Sheet(SWITCH, THICKNESS_M, ball)
+    sheet = PaddedSheet(SWITCH, THICKNESS_M, ball)
     found = []
     for ratio in PLACES:
         one, reference = (sheet.force_n(which, ratio * THICKNESS_M) for which in (model, LADDER[-1]))

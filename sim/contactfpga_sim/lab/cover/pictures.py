@@ -93,7 +93,7 @@ def _models(place: Any) -> None:
     colors = dict(zip(measured.LADDER, style.PALETTE))
     for model, color in colors.items():
         for name, ball in measured.BALLS.items():
-            sheet = measured.Sheet(measured.SWITCH, measured.THICKNESS_M, ball)
+            sheet = measured.PaddedSheet(measured.SWITCH, measured.THICKNESS_M, ball)
             takes = 1e6 * measured.seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore
             errors = [abs(one) for one in measured.sense_errors(model, ball) if math.isfinite(one)]
             place.plot([takes] * len(errors), errors, marks[name], ms=6, color=color, clip_on=False, zorder=3)

@@ -43,7 +43,7 @@ def sense_table() -> str:
     rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES), "time"]]
     for model in study.LADDER:
         for name, ball in study.BALLS.items():
-            sheet = study.Sheet(study.SWITCH, study.THICKNESS_M, ball)
+            sheet = study.PaddedSheet(study.SWITCH, study.THICKNESS_M, ball)
             takes = 1e6 * study.seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore[misc]
             errors = ["0" if error == 0 else f"{100 * error:+.1f} %" for error in study.sense_errors(model, ball)]
             rows.append([str(model), name, *errors, f"{takes:,.0f} µs"])

@@ -11,8 +11,7 @@ import numpy as np
 
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.sense import Model
-from contactfpga.design.cover.sense import Sheet as Foam
+from contactfpga.design.cover.sense import Model, PaddedSheet
 from contactfpga.robot.haptics import Closing, LoadCells, Locator, Place, Plane, Reach
 from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.robot.haptics.rate import tripod
@@ -31,7 +30,7 @@ RING_M = 0.075
 @functools.cache
 def reach_of(model: Model, ball: Ball = BALL) -> Reach:
     """Of 5 mm of foam over the prototype's switches."""
-    return Reach(Foam(Switch(), 0.005, ball), model)
+    return Reach(PaddedSheet(Switch(), 0.005, ball), model)
 
 
 @functools.cache

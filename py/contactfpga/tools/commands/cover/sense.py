@@ -9,7 +9,7 @@ from contactfpga.design.cover import elastic, sense
 from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.sense import Model, Sense, Sheet
+from contactfpga.design.cover.sense import Model, PaddedSheet, Sense
 from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands import cover
 from contactfpga.tools.commands.cover import MM, notes, say, table
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     switch = Switch(args.switch_force, args.switch_area)
     if args.thickness is None:
         return _best_thickness(args, switch)
-    sheet = Sheet(switch, args.thickness, _touching(args))
+    sheet = PaddedSheet(switch, args.thickness, _touching(args))
     found: dict[str, Any] = {}
     lines: list[tuple[str, str]] = []
     judged: list[Sense] = []
@@ -120,7 +120,7 @@ def _best_thickness(args: argparse.Namespace, switch: Switch) -> int:
     offset = args.offset if args.offset is not None else sense.worst_offset_m(args.pitch)
     within = args.model or "bonded"
     thickness = sense.best_thickness_m(offset, within)
-    force = Sheet(switch, thickness).force_n(Model(within, "point"), offset)
+    force = PaddedSheet(switch, thickness).force_n(Model(within, "point"), offset)
     known = {"thickness_m": thickness, "force_n": force, "offset_m": offset, "model": within, "contact": "point"}
     if args.json:
         return say(known)
