@@ -220,7 +220,7 @@ def test_the_signal_is_handled_as_before_when_a_command_is_done():
 
 def test_an_interrupt_says_what_was_kept(capsys):
     def body():
-        raise interrupt.Interrupted("interrupted; 3 of 7 are kept")
+        raise interrupt.Interruption("interrupted; 3 of 7 are kept")
 
     assert interrupt.guarded(body) == 130
     assert capsys.readouterr().err == "contactfpga: interrupted; 3 of 7 are kept\n"

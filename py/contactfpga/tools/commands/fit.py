@@ -16,7 +16,7 @@ from contactfpga.errors import UNSOLVED
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs
-from contactfpga.tools.console.interrupt import Interrupted
+from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.fit.candidates import Candidate
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
         with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
             found = fit(task, tried, executor, step, so_far)
     except KeyboardInterrupt:
-        raise Interrupted(_kept(so_far, len(tried), args.json)) from None
+        raise Interruption(_kept(so_far, len(tried), args.json)) from None
     if args.json:
         print(json.dumps(show.plain(found)), flush=True)
     else:

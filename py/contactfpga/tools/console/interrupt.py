@@ -28,7 +28,7 @@ _came: int | None = None
 """The signal that came since the command began, unless it was the usual end of what ran."""
 
 
-class Interrupted(KeyboardInterrupt):
+class Interruption(KeyboardInterrupt):
     """Ctrl-C, once what was found so far is in safety; says where that is."""
 
 

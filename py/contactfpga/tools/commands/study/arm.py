@@ -12,7 +12,7 @@ from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs
-from contactfpga.tools.console.interrupt import Interrupted
+from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.arm.case import Case
@@ -109,7 +109,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
         with executor(args.jobs, args.dask) as workers, progress() as step:
             found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
     except KeyboardInterrupt:
-        raise Interrupted(_kept(so_far, len(tasks.all), folder)) from None
+        raise Interruption(_kept(so_far, len(tasks.all), folder)) from None
     print(latency_charts.write_csv(found, folder / "arm-charts.csv"), flush=True)
     for path in latency_charts.draw(case, tasks, found, folder):
         print(path)

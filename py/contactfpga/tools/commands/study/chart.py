@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from contactfpga.choices import labellers
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs
-from contactfpga.tools.console.interrupt import Interrupted
+from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.chart.compute import Point, Task
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
             points = [host.timed(point) for point in study(tasks, executor, not args.no_size, step, so_far)]
     except KeyboardInterrupt:
-        raise Interrupted(_kept([so_far[task] for task in tasks if task in so_far], len(tasks), folder)) from None
+        raise Interruption(_kept([so_far[task] for task in tasks if task in so_far], len(tasks), folder)) from None
     path = folder / "chart.csv"
     table.write(points, path)
     print(path, flush=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga.inputs.files import write_text
 from contactfpga.tools.console import flags, outputs
-from contactfpga.tools.console.interrupt import Interrupted
+from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.failures.knob import Sweep
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         failures_tables.sweep_all(names, turned)
     except KeyboardInterrupt:
-        raise Interrupted(_kept(turned, folder)) from None
+        raise Interruption(_kept(turned, folder)) from None
     print(_write(turned, folder / "failures.md"), flush=True)
     for path in failures_tables.draw(folder, turned):
         print(path)

@@ -6,7 +6,7 @@ import argparse
 import functools
 
 from contactfpga.tools.console import flags, numbers, outputs
-from contactfpga.tools.console.interrupt import Interrupted
+from contactfpga.tools.console.interrupt import Interruption
 
 EXTRA = "chart"
 
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
                 rows = campaign.run(names, args.registers, args.memories, executor, done, within_s)
         except KeyboardInterrupt:
             what = "interrupted; the blocks that were finished are kept, and the same command goes on"
-            raise Interrupted(what) from None
+            raise Interruption(what) from None
     campaign.write(rows, folder / "flips.csv")
     print(folder / "flips.csv", flush=True)
     for name in names:
