@@ -333,7 +333,7 @@ SLOT_BITS = 5000
 """On the wire from one slot to the next, at most: the slot, a frame and now and then a hello."""
 
 
-class _Slots:
+class _SlotListener:
     """A listener that waits for all slots of one test."""
 
     all_events = True
@@ -377,12 +377,12 @@ def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
             return slots.whole
 
 
-def _listen_for_slots(link: Link) -> _Slots:
+def _listen_for_slots(link: Link) -> _SlotListener:
     with link.changed:
         hello = link.conversation.hello
         if hello is None:
             raise ContactFPGAError(f"{link.transport.name}: no hello has come yet")
-        slots = _Slots(1 + hello.sheet.rows + hello.sheet.columns)
+        slots = _SlotListener(1 + hello.sheet.rows + hello.sheet.columns)
         slots.attempt_s = max(ATTEMPT_S, slots.count * SLOT_BITS / hello.baud)
         link.listeners.add(slots)
     return slots

@@ -27,7 +27,7 @@ TOKEN_BYTES = 16
 
 
 @dataclasses.dataclass(frozen=True)
-class Answer:
+class Response:
     """What is answered in place of the page."""
 
     status: int
@@ -48,15 +48,15 @@ class Guard:
         """The address that is listened on."""
         self.token = token or secrets.token_urlsafe(TOKEN_BYTES)
 
-    def check(self, path: str, headers: Mapping[str, str], port: int, upgrade: bool) -> Answer | None:
+    def check(self, path: str, headers: Mapping[str, str], port: int, upgrade: bool) -> Response | None:
         """What to answer instead; None: the request may pass. ``headers``: by name, the case does not matter;
         ``upgrade``: it asks for a WebSocket, over which all is read and pressed."""
         host = _one(headers, "Host")
         if not self._is_ours(host, port):
-            return Answer(403, f"Host {host!r} is not this server's name; use the address that it printed.\n")
+            return Response(403, f"Host {host!r} is not this server's name; use the address that it printed.\n")
         origin = _one(headers, "Origin")
         if (upgrade or origin) and origin != f"http://{host}":
-            return Answer(403, f"Origin {origin!r} is another page; open the address that the server printed.\n")
+            return Response(403, f"Origin {origin!r} is another page; open the address that the server printed.\n")
         address = urlsplit(path)
         given = parse_qs(address.query).get("token", [""])[0]
         if given and not upgrade:
@@ -104,17 +104,17 @@ class Guard:
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
-    def _welcome(self, port: int) -> Answer:
+    def _welcome(self, port: int) -> Response:
         """Lead the browser to the same page without the token, so that it stays out of the address line. The page does
         it by itself: after a redirect a browser that came by a link of another site would keep its cookie back."""
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         page = f"<!doctype html><title>contactfpga</title><script>location.replace({_PAGE!r})</script>\n"
-        return Answer(200, page, {**_HEADERS, "Content-Type": "text/html; charset=utf-8", "Set-Cookie": cookie})
+        return Response(200, page, {**_HEADERS, "Content-Type": "text/html; charset=utf-8", "Set-Cookie": cookie})
 
 
 _PAGE = "/"
 _HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY"}
-_NO_TOKEN = Answer(403, "The token is missing or is another one; open the whole address that the server printed.\n")
+_NO_TOKEN = Response(403, "The token is missing or is another one; open the whole address that the server printed.\n")
 
 
 def _one(headers: Mapping[str, str], name: str) -> str:
@@ -220,7 +220,7 @@ def _checked(guard: Guard, inner: Any) -> Any:
     return process_request
 
 
-def _response(answer: Answer) -> Any:
+def _response(answer: Response) -> Any:
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
