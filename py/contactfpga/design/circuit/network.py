@@ -22,7 +22,7 @@ OFF = float("nan")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class State:
+class CircuitState:
     """Volts of the lines, columns before rows, and across the junctions of the pressed switches."""
 
     lines: np.ndarray
@@ -79,9 +79,9 @@ class Network:
         """(..., lines) out of each pin that drives, for volts of the same shape."""
         return np.asarray(self.drive_s(drive) * (np.nan_to_num(drive.volts) - lines))
 
-    def unpressed(self) -> State:
+    def unpressed(self) -> CircuitState:
         """All lines and junctions at 0 V, to begin a search with."""
-        return State(np.zeros(self.rows + self.columns), np.zeros(len(self.row_of)))
+        return CircuitState(np.zeros(self.rows + self.columns), np.zeros(len(self.row_of)))
 
 
 def _capacitances(circuit: Circuit, rows: int, columns: int) -> np.ndarray:

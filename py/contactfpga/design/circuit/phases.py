@@ -70,7 +70,7 @@ class PhaseResult:
     """What happened in the last drive of a phase."""
 
     phase: Phase
-    trace: transient.Trace
+    trace: transient.Waveform
 
     @property
     def seconds(self) -> float:

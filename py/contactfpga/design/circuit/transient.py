@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.design.circuit.network import Drive, Network, State, charge, current, held_back
+from contactfpga.design.circuit.network import Drive, Network, CircuitState, charge, current, held_back
 from contactfpga.design.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
@@ -27,12 +27,12 @@ FOREVER_S = 1e6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Trace:
+class Waveform:
     """(n,) seconds from the start and (n, lines) volts then."""
 
     seconds: np.ndarray
     volts: np.ndarray
-    end: State
+    end: CircuitState
 
 
 @dataclasses.dataclass(eq=False)
@@ -67,7 +67,7 @@ class _DriveEquations:
         self.source_a = siemens * np.nan_to_num(drive.volts) + network.pull_s * network.pull_v
         self.count = len(self.source_a)
 
-    def rates(self, state: State) -> _Rates:
+    def rates(self, state: CircuitState) -> _Rates:
         net = self.network
         cell_a = (state.lines[net.column_of] - state.lines[net.row_of] - state.junctions) * net.cell_s
         junction_a, cell_s = current(self.diode, state.junctions)
@@ -93,15 +93,17 @@ class _DriveEquations:
         matrix[range(self.count), range(self.count)] += sums
         return matrix, own
 
-    def correction(self, rates: _Rates, share: float, lines: np.ndarray, cells: np.ndarray) -> State:
+    def correction(self, rates: _Rates, share: float, lines: np.ndarray, cells: np.ndarray) -> CircuitState:
         """What solves the linear equations with these right sides."""
         net = self.network
         matrix, own = self.eliminated(rates, share)
         through = share * net.cell_s
         moved = _solved(matrix, lines + self._gathered(through * cells / own), net.columns)
-        return State(moved, (cells + through * (moved[net.column_of] - moved[net.row_of])) / own)
+        return CircuitState(moved, (cells + through * (moved[net.column_of] - moved[net.row_of])) / own)
 
-    def solved(self, guess: State, share: float, lines: np.ndarray, cells: np.ndarray) -> tuple[State, _Rates] | None:
+    def solved(
+        self, guess: CircuitState, share: float, lines: np.ndarray, cells: np.ndarray
+    ) -> tuple[CircuitState, _Rates] | None:
         """The state whose ``charge + share * current`` is this; None if Newton's method does not find it."""
         for _ in range(ROUNDS):
             rates = self.rates(guess)
@@ -114,7 +116,7 @@ class _DriveEquations:
             wanted = guess.junctions + step.junctions
             junctions = held_back(self.diode, guess.junctions, wanted)
             held = bool(junctions.size) and bool((np.abs(junctions - wanted) > CLOSE_V).any())
-            guess = State(guess.lines + step.lines, junctions)
+            guess = CircuitState(guess.lines + step.lines, junctions)
             far = max(np.abs(step.lines).max(), np.abs(step.junctions).max(initial=0.0))
             if far < CLOSE_V and not held:
                 return guess, self.rates(guess)
@@ -123,7 +125,7 @@ class _DriveEquations:
         return None
 
 
-def at_rest(network: Network, drive: Drive) -> State:
+def at_rest(network: Network, drive: Drive) -> CircuitState:
     """The state that does not change any more."""
     equations = _DriveEquations(network, drive)
     start = network.unpressed()
@@ -137,17 +139,17 @@ def at_rest(network: Network, drive: Drive) -> State:
 def run(
     network: Network,
     drive: Drive,
-    start: State,
+    start: CircuitState,
     seconds: float,
     enough: Callable[[np.ndarray], bool] = lambda volts: False,
-) -> Trace:
+) -> Waveform:
     """What the lines do for this long, or until ``enough`` says so of their volts."""
     equations = _DriveEquations(network, drive)
     state, rates = start, equations.rates(start)
     times, volts, now, step = [0.0], [start.lines], 0.0, FIRST_S
     for _ in range(STEPS):
         if now >= seconds * (1 - 1e-9) or enough(state.lines):
-            return Trace(np.array(times), np.array(volts), state)
+            return Waveform(np.array(times), np.array(volts), state)
         step = min(step, seconds - now)
         middle_end = _step(equations, state, rates, step)
         if middle_end is None:
@@ -164,17 +166,17 @@ def run(
     raise CircuitError(f"these values take more than {STEPS} steps to compute; take less extreme ones")
 
 
-def _ahead(diode: Diode, start: State, middle: State) -> State:
+def _ahead(diode: Diode, start: CircuitState, middle: CircuitState) -> CircuitState:
     """A guess of the end of a step."""
     on = (1 - GAMMA) / GAMMA
     junctions = middle.junctions + on * (middle.junctions - start.junctions)
     lines = middle.lines + on * (middle.lines - start.lines)
-    return State(lines, held_back(diode, middle.junctions, junctions))
+    return CircuitState(lines, held_back(diode, middle.junctions, junctions))
 
 
 def _step(
-    equations: _DriveEquations, state: State, rates: _Rates, step: float
-) -> tuple[tuple[State, _Rates], tuple[State, _Rates], float] | None:
+    equations: _DriveEquations, state: CircuitState, rates: _Rates, step: float
+) -> tuple[tuple[CircuitState, _Rates], tuple[CircuitState, _Rates], float] | None:
     """The middle and the end of a step, and its error in volts."""
     share = GAMMA * step / 2
     middle = equations.solved(state, share, rates.line_c - share * rates.line_a, rates.cell_c - share * rates.cell_a)
