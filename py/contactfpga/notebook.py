@@ -79,10 +79,10 @@ def over_the_seam(circles: Iterable[Circle], around_mm: float, pitch_mm: float) 
     """On a sheet whose ends meet, a circle that leaves it at one end is drawn at the other one, too."""
     left, right = -pitch_mm / 2, around_mm - pitch_mm / 2
     return [
-        (x + turn, y, radius)
+        (x + shift, y, radius)
         for x, y, radius in circles
-        for turn in (-around_mm, 0.0, around_mm)
-        if left - radius < x + turn < right + radius
+        for shift in (-around_mm, 0.0, around_mm)
+        if left - radius < x + shift < right + radius
     ]
 
 

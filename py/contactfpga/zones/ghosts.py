@@ -42,7 +42,7 @@ def cells(frame: Frame, before: Frame | None = None) -> np.ndarray:
     if before is None or before.bitmap is None or not np.array_equal(before.bitmap, frame.bitmap):
         return np.asarray(frame.bitmap & (in_row > 1))
     in_column = pressed.sum(axis=0, keepdims=True)
-    # Ways of three pressed cells from a row to a column, less those that turn back in the cell's own row or column.
+    # Ways of three pressed cells from a row to a column, less those that go back in the cell's own row or column.
     corners = pressed @ pressed.T @ pressed - in_row - in_column + 1
     return np.asarray(frame.bitmap & (corners > 0))
 

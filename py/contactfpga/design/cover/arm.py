@@ -11,7 +11,7 @@ The same as motion over time is the reference for :mod:`contactfpga.design.cover
 
     J/d^2 d^2 delta/dt^2 = (u - M g l sin(theta0 + delta/d))/d - K_s delta^(3/2),
 
-by Dormand and Prince's method of order 5 with step control. The step in which v turns negative is made once more with
+by Dormand and Prince's method of order 5 with step control. The step in which v becomes negative is made once more with
 v as the independent variable (Henon), which ends at v = 0 exactly. Its time course follows by quadrature as well.
 """
 

@@ -78,7 +78,7 @@ def exact_spread(name: str, s: Floats | float) -> Floats:
 
 @functools.cache
 def first_zero(name: str) -> float | None:
-    """Distance over thickness at which the stress under a point force first turns into a pull; None if it never does.
+    """Distance over thickness at which the stress under a point force first becomes a pull; None if it never does.
 
     Beyond 1.9076 a bonded layer presses again, with 0.29 % of the stress on the axis at most.
     """

@@ -349,11 +349,11 @@ class RobotStage:
         if kinematics is None:
             return
         poses = kinematics.poses(angles)
-        turns = quaternions(np.array([pose.rotation for pose in poses.values()]))
+        orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
         for name, plan in self._body.links.items():
             mine = poses[plan.frame] @ plan.pose
             self.stages[name].rotation, self.stages[name].point_m = mine.rotation, mine.point_m
-        for (name, pose), wxyz in zip(poses.items(), turns):
+        for (name, pose), wxyz in zip(poses.items(), orientations):
             self._frames[name].wxyz, self._frames[name].position = wxyz, pose.point_m
         joints = kinematics.robot.joints.values()
         if not joints:

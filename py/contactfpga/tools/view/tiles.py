@@ -81,10 +81,10 @@ class Tiles:
         )
 
 
-def quaternions(turns: np.ndarray) -> np.ndarray:
+def quaternions(rotations: np.ndarray) -> np.ndarray:
     """(n, 4) w, x, y, z of (n, 3, 3) rotations."""
-    found = np.empty((len(turns), 4))
-    for index, m in enumerate(turns):
+    found = np.empty((len(rotations), 4))
+    for index, m in enumerate(rotations):
         # The largest of the four is taken from the diagonal, the others from it: no division by what may be 0.
         squares = np.array([1 + m[0, 0] + m[1, 1] + m[2, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2]])
         squares = np.append(squares, [1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2]])

@@ -1,4 +1,4 @@
-"""`contactfpga study failures`: turns every knob, writes the table and the pictures."""
+"""`contactfpga study failures`: sweeps every knob, writes the table and the pictures."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ def run(args: argparse.Namespace) -> int:
 
     names = flags.known("--study", args.study, list(KNOBS))
     folder = outputs.folder(args.output)
-    turned: dict[str, dict[str, Sweep]] = {}
+    sweeps: dict[str, dict[str, Sweep]] = {}
     try:
-        failures_tables.sweep_all(names, turned)
+        failures_tables.sweep_all(names, sweeps)
     except KeyboardInterrupt:
-        raise Interruption(_kept(turned, folder)) from None
-    print(_write(turned, folder / "failures.md"), flush=True)
-    for path in failures_tables.draw(folder, turned):
+        raise Interruption(_kept(sweeps, folder)) from None
+    print(_write(sweeps, folder / "failures.md"), flush=True)
+    for path in failures_tables.draw(folder, sweeps):
         print(path)
     return 0
 
 
-def _write(turned: Mapping[str, Mapping[str, Sweep]], path: Path) -> Path:
+def _write(sweeps: Mapping[str, Mapping[str, Sweep]], path: Path) -> Path:
     from contactfpga_sim.lab.failures import tables as failures_tables
 
-    both = failures_tables.table(turned), failures_tables.unnoticed(turned)
+    both = failures_tables.table(sweeps), failures_tables.unnoticed(sweeps)
     write_text(path, "\n\n".join(both) + "\n")
     return path
 
 
-def _kept(turned: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
+def _kept(sweeps: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
     """Where what was finished is, in a file of its own: a whole table from before stays."""
-    done = sum(map(len, turned.values()))
+    done = sum(map(len, sweeps.values()))
     if not done:
         return "interrupted before the first knob was turned"
-    path = _write(turned, folder / "failures-so-far.md")
+    path = _write(sweeps, folder / "failures-so-far.md")
     return f"interrupted; {done} row{'' if done == 1 else 's'} of the table, all that was finished, in {path}"
