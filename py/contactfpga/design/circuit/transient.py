@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.design.circuit.network import Drive, Network, CircuitState, charge, current, held_back
+from contactfpga.design.circuit.network import CircuitState, Drive, Network, charge, current, held_back
 from contactfpga.design.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
