@@ -182,7 +182,8 @@ LIVE_S, LINES_S = 0.2, 10.0
 
 @contextlib.contextmanager
 def reading(name: str) -> Iterator[Callable[[int, int], None]]:
-    """To be called now and then with the bytes that have been read of a file, and those in it."""
+    """Shows on standard error how far a long file is read. Yields what is to be called now and then with the bytes that
+    have been read of the file, and those in it."""
     live = of(sys.stderr).live
     due_s, said = time.monotonic() + SOON_S, False
 

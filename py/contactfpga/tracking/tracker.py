@@ -1,4 +1,7 @@
-"""Follows contacts from frame to frame."""
+"""Follows contacts from frame to frame.
+
+Contacts that come together in one zone, and zones that come apart, are told from a lift and a touch by their areas.
+"""
 
 from __future__ import annotations
 

@@ -387,7 +387,8 @@ Times = TypeVar("Times", int, np.ndarray)
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class HostLine:
-    """A straight line from device time to the host's clock, and when the frames arrived that it is used for."""
+    """A straight line from device time to the host's clock, as far as it was known when the frames arrived that it is
+    used for, and when they arrived."""
 
     arrived_s: float
     """When their last bytes arrived."""

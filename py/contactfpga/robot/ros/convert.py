@@ -241,8 +241,8 @@ def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
 
 
 def markers(rim: Sequence[Message], found: Sequence[Track], head: Message, forces: Contacts | None = None) -> Message:
-    """A ``visualization_msgs/MarkerArray``: the rim, and for each contact a ball as large as its zone, its id, and an
-    arrow: the force on the link, or where none is known the inward normal."""
+    """A ``visualization_msgs/MarkerArray``, which RViz and Foxglove draw: the rim, and for each contact a ball as large
+    as its zone, its id, and an arrow: the force on the link, or where none is known the inward normal."""
     shown = [_marker(head, "", 0, ADD, action=DELETE_ALL)]
     shown.append(_marker(head, "sheet", 0, LINE_STRIP, scale=(0.001, 0.0, 0.0), color=_GRAY, points=rim))
     known = forces_of(forces)

@@ -204,7 +204,7 @@ class LinkRecorder:
 
 @dataclasses.dataclass(frozen=True)
 class Mount:
-    """Messages then have places in the robot's own frame, in place of the sheet's."""
+    """Where a board is on a robot: its messages have places in the frame of the robot's link, not the sheet's."""
 
     frame: str
     """Of the robot's link."""
@@ -242,7 +242,8 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 class LinkMessages:
-    """Writes them for one link, in order."""
+    """Writes what one link says as messages, in order, for programs that know nothing of us. Those of a board on a
+    robot have places in the robot's frame."""
 
     def __init__(self, board: Board, link: LinkFile, mount: Mount | None = None, felt: Felt | None = None):
         self._link = link

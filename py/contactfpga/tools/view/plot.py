@@ -107,7 +107,8 @@ LONGEST_S = 0.25
 
 
 class Touches:
-    """Of one sheet, frame after frame."""
+    """What a recording of one sheet holds, gathered for a plot of any length: a fixed number of steps in time, and the
+    sheet's cells."""
 
     def __init__(self, sheet: Sheet, duration_s: float, steps: int = STEPS):
         self.sheet, self.duration_s = sheet, max(duration_s, 1e-6)

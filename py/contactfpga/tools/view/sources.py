@@ -227,7 +227,7 @@ class Strip:
 
 
 class Meter:
-    """What many frames say together. Times are the device's."""
+    """Counts of frames over the last second, and the lines of the strip chart. Times are the device's."""
 
     def __init__(self) -> None:
         self.stats = Stats()
