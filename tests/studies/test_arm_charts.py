@@ -14,11 +14,13 @@ from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept, registry
+from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.arm import latency_charts, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import Task
+from contactfpga_sim.lab.registry import StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
 PAPER = Case.load("paper")
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
@@ -117,7 +119,7 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_the_page_and_its_pictures_are_what_the_study_makes(tmp_path):
-    run = registry.StudyRun(registry.load("arm"))
+    run = StudyRun(STUDIES["arm"])
     assert {name: run.text(name) for name in run.study.sections} == {
         name: section("arm.md", name) for name in run.study.sections
     }

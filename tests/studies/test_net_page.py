@@ -2,8 +2,9 @@
 
 import collections
 
-from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.net import load, tables
+from contactfpga_sim.lab.registry import StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
 
 def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, tmp_path):
@@ -18,7 +19,7 @@ def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, 
     monkeypatch.setattr(load, "measure", measure)
     tables.measured.cache_clear()
     try:
-        run = registry.StudyRun(registry.load("net"))
+        run = StudyRun(STUDIES["net"])
         for name in run.study.sections:
             run.text(name)
         tables.draw(tmp_path)
