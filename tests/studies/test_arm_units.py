@@ -10,7 +10,7 @@ from contactfpga.tools import cli
 from contactfpga_sim.lab.arm import report
 from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.run import WITH_UNITS, run
-from contactfpga_sim.lab.arm.under import THRESHOLD_N, Under
+from contactfpga_sim.lab.arm.world import THRESHOLD_N, Under
 
 PAPER = Case.load("paper").but(run={"duration_s": 0.03})
 HALFWAY = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))
