@@ -16,9 +16,8 @@ from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size
 from contactfpga_sim.lab.fit import cost, search, tables
-from contactfpga_sim.lab.fit.goals import Goals
 from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import Task
+from contactfpga_sim.lab.fit.trial import Goals, Task
 from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.lab.studies import STUDIES
 

@@ -13,8 +13,8 @@ from contactfpga_sim.lab.chart.errors import Interval, interval
 from contactfpga_sim.lab.chart.speed import Speed
 from contactfpga_sim.lab.fit import cost, search
 from contactfpga_sim.lab.fit.candidates import METHODS, candidates, pitches_for, size_for
-from contactfpga_sim.lab.fit.goals import Goals, Measured
 from contactfpga_sim.lab.fit.sources import source
+from contactfpga_sim.lab.fit.trial import Goals, Measured
 
 pytestmark = pytest.mark.usefixtures("alone")
 

@@ -13,9 +13,8 @@ from study_pages import outdated
 from contactfpga import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, tables, touches
-from contactfpga_sim.lab.flips.campaign import Row
-from contactfpga_sim.lab.flips.designs import DESIGNS
+from contactfpga_sim.lab.flips import campaign, flip, reference, summary, tables, touches
+from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
 from contactfpga_sim.lab.flips.flip import Flip, Found
 from contactfpga_sim.lab.flips.reference import Heard, Reference
 from contactfpga_sim.lab.flips.summary import Design
@@ -103,7 +102,7 @@ def test_a_board_returns_to_a_moment(plain):
 
 @pytest.fixture(scope="module")
 def fast():
-    yield from made(designs.skin("run, on_change, reversal"))
+    yield from made(campaign.skin("run, on_change, reversal"))
 
 
 @pytest.mark.slow  # which has a board of its own to compile
@@ -362,7 +361,7 @@ def test_a_raster_scan_finds_its_row_again(plain):
 @pytest.mark.campaign
 @pytest.mark.parametrize("design", [name for name in DESIGNS if name.endswith("dual")])
 def test_no_flip_of_two_copies_is_silently_wrong(design):
-    made = Reference(designs.skin(design))
+    made = Reference(campaign.skin(design))
     found = [flip.follow(made, each) for memory in (False, True) for each in flip.drawn(made, memory, 50, 99)]
     assert [one for one in found if one.outcome == "silent"] == []
     assert {one.outcome for one in found} == {"masked", "told"}

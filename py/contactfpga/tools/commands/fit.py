@@ -111,9 +111,8 @@ def run(args: argparse.Namespace) -> int:
 def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
     """The task, and all candidates; raises ValueError for what cannot be."""
     from contactfpga_sim.lab.fit import candidates
-    from contactfpga_sim.lab.fit.goals import Goals
     from contactfpga_sim.lab.fit.sources import default_count, source
-    from contactfpga_sim.lab.fit.trial import Task
+    from contactfpga_sim.lab.fit.trial import Goals, Task
 
     base = Skin.load(args.skin) if args.skin else None
     cover = load_cover(args.skin) if args.skin else None

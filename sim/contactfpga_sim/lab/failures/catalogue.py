@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.lab.failures import electric, electric_reversal, line, lines, shapes, touch
+from contactfpga_sim.lab.failures import electric, line, lines, touch
 
 KNOBS = {
     knob.name: knob
     for knob in (
-        shapes.WINDING,
-        shapes.CROSSING,
-        shapes.MANY,
+        touch.WINDING,
+        touch.CROSSING,
+        touch.MANY,
         touch.CLOSING,
         touch.MOVING,
         touch.BOUNCE,
         electric.SETTLE,
-        electric_reversal.SETTLE_REVERSAL,
-        electric_reversal.PROJECT_REVERSAL,
+        electric.SETTLE_REVERSAL,
+        electric.PROJECT_REVERSAL,
         electric.DIODES,
-        electric_reversal.DIODES_REVERSAL,
+        electric.DIODES_REVERSAL,
         electric.GHOST,
         electric.GHOSTS,
         lines.BROKEN,

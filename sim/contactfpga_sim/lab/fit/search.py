@@ -11,9 +11,8 @@ from typing import Any
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.fit.candidates import SHEET, Candidate
 from contactfpga_sim.lab.fit.cost import cheapest, second
-from contactfpga_sim.lab.fit.goals import Measured
 from contactfpga_sim.lab.fit.measuring import errors_of, speed_of
-from contactfpga_sim.lab.fit.trial import Fit, SoFar, Step, Task, Trial, gathered
+from contactfpga_sim.lab.fit.trial import Fit, Measured, SoFar, Step, Task, Trial, gathered
 
 CHECKED = 2
 """Of the answer's reported touches, this many go through the compiled gateware as well."""

@@ -11,9 +11,8 @@ from contactfpga.design.cover.press import write_cover
 from contactfpga.tools.console import tables
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
 from contactfpga_sim.lab.fit.cost import DEVICE
-from contactfpga_sim.lab.fit.goals import Measured
 from contactfpga_sim.lab.fit.sources import Recorded
-from contactfpga_sim.lab.fit.trial import Fit, Trial
+from contactfpga_sim.lab.fit.trial import Fit, Measured, Trial
 
 HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
 """Baud is left out where all have the same."""

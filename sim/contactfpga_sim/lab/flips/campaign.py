@@ -10,13 +10,38 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from contactfpga.inputs.files import replaced
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.flips import designs, flip
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim.lab import kept, size
+from contactfpga_sim.lab.flips import flip
 from contactfpga_sim.lab.flips.flip import Found
-from contactfpga_sim.lab.flips.reference import Reference
+from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference
+
+DESIGNS: dict[str, dict[str, Any]] = {
+    "run": {},
+    "run, on_change": {"send": "on_change"},
+    "serial": {"labeller": "serial"},
+    "run, on_change, reversal": {"send": "on_change", "scan": "reversal", "precharge_us": 0.5},
+    "run, dual": {"dual": True},
+    "run, on_change, dual": {"send": "on_change", "dual": True},
+    "serial, dual": {"labeller": "serial", "dual": True},
+}
+"""Fields that differ from the reference Skin's."""
+
+
+def skin(design: str) -> Skin:
+    """The design with the clock and the line of the study."""
+    return Skin(clock_hz=CLOCK_HZ, baud=BAUD, **DESIGNS[design])
+
+
+def luts(design: str) -> int:
+    """LUT4 of the design on a UP5K, with the reference Skin's clock."""
+    return size.luts(lambda: Top(Skin(**DESIGNS[design])), sizes.UP5K)
+
 
 BLOCK = 25
 """Flips that one process follows before it is asked again."""
@@ -84,7 +109,7 @@ def _block(design: str, memory: bool, block: int) -> list[Found]:
 
 
 def _key(design: str, memory: bool, block: int) -> str:
-    return repr((kept.made_by(__name__, designs.skin(design)), memory, block))
+    return repr((kept.made_by(__name__, skin(design)), memory, block))
 
 
 def finished(names: Iterable[str]) -> list[Row]:
@@ -97,9 +122,9 @@ def finished(names: Iterable[str]) -> list[Row]:
     ]
 
 
-@functools.lru_cache(maxsize=len(designs.DESIGNS))
+@functools.lru_cache(maxsize=len(DESIGNS))
 def _reference(design: str) -> Reference:
-    return Reference(designs.skin(design))
+    return Reference(skin(design))
 
 
 def write(rows: Iterable[Row], path: Path) -> None:
