@@ -8,10 +8,9 @@ from study_pages import outdated, section
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
-from contactfpga_sim.lab.safety import compute, start, tables, trial
-from contactfpga_sim.lab.safety.catalogue import FAULTS
+from contactfpga_sim.lab.safety import compute, tables, trial
+from contactfpga_sim.lab.safety.catalogue import FAULTS, Hurt
 from contactfpga_sim.lab.safety.compute import Place
-from contactfpga_sim.lab.safety.hurt import Hurt
 from contactfpga_sim.lab.safety.trial import Told
 from contactfpga_sim.model.sheet import guards
 
@@ -131,7 +130,7 @@ def test_coverage_counts_faults_that_are_told_at_every_place(monkeypatch):
     )
     halves = {"broken row": (tells, tells), "broken column": (tells, says_nothing)}
     monkeypatch.setattr(compute, "found", lambda skin, fault: halves.get(fault, (says_nothing,)))
-    monkeypatch.setattr(start, "found", lambda fault: {})
+    monkeypatch.setattr(compute, "times_at_start", lambda fault: {})
     lines = tables.coverage_table().splitlines()[2:]
     listed, places = len(FAULTS), len(FAULTS) + 2
     assert lines[0] == f"| none | 1 of {listed} | {100 / listed:.0f} % | 3 of {places} |"
@@ -156,8 +155,8 @@ def test_the_page_is_up_to_date():
 @pytest.mark.campaign
 @pytest.mark.parametrize("fault", ["shorted diode", "shorted rows", "shorted columns"])
 def test_a_self_test_at_power_up_tells_joined_lines_and_shorted_diodes(fault):
-    times = list(start.found(fault).values())
+    times = list(compute.times_at_start(fault).values())
     assert len(times) > 10
     assert None not in times
-    assert max(times) < start.clocks(start.TESTED) / start.TESTED.derived.clocks_per_us < 100
-    assert start.told_us(Hurt()) is None
+    assert max(times) < compute.clocks(compute.TESTED) / compute.TESTED.derived.clocks_per_us < 100
+    assert compute.told_us(Hurt()) is None

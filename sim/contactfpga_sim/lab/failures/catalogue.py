@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.lab.failures import electric, line, lines, touch
+from contactfpga_sim.lab.failures import electric, line, touch
 
 KNOBS = {
     knob.name: knob
@@ -20,10 +20,10 @@ KNOBS = {
         electric.DIODES_REVERSAL,
         electric.GHOST,
         electric.GHOSTS,
-        lines.BROKEN,
-        lines.BROKEN_REVERSAL,
-        lines.STUCK,
-        lines.STUCK_REVERSAL,
+        electric.BROKEN,
+        electric.BROKEN_REVERSAL,
+        electric.STUCK,
+        electric.STUCK_REVERSAL,
         line.BAUD,
         line.NOISE,
         line.HOST,

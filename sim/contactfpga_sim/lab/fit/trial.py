@@ -1,4 +1,4 @@
-"""What is asked, what was tried, and what came of it."""
+"""What is asked, what a Skin has to meet, what was tried, and what came of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All flips of all designs, in blocks that are kept, and their table."""
+"""All flips of all designs, in blocks that are kept, and their table; the designs, and what each takes of an FPGA."""
 
 from __future__ import annotations
 

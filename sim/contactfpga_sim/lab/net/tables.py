@@ -8,7 +8,7 @@ from pathlib import Path
 from contactfpga import picture_style as style
 from contactfpga.robot.net.message import HEAD_BYTES
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.net import load, source
+from contactfpga_sim.lab.net import load
 
 BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)
@@ -57,7 +57,7 @@ def thousand_table() -> str:
     """What a thousand links would take, from what was measured and computed."""
     found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
-    frame = len(source.frames(1)[0])
+    frame = len(load.frames(1)[0])
     messages = 1000 / GROWTH_MS
     per_link = load.RATE_HZ * frame + messages * (HEAD_BYTES + LINE_BYTES)
     total = 1000 * per_link

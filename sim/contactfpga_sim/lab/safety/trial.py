@@ -10,7 +10,7 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments, reported
-from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.lab.safety.catalogue import Hurt
 
 LONGEST_US = 5000
 """A fault that is not told until then is not told."""
