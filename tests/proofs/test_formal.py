@@ -7,8 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga_sim.verify.proofs import upset
 from contactfpga_sim.verify.proofs.__main__ import CASES, main
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case, prove, search
+from contactfpga_sim.verify.proofs.case import Bug, Case, prove, search
 
 LONG_S = 7000
 LONG = {

@@ -12,7 +12,7 @@ from contactfpga_sim.lab.safety import compute, tables, trial
 from contactfpga_sim.lab.safety.catalogue import FAULTS, Hurt
 from contactfpga_sim.lab.safety.compute import Place
 from contactfpga_sim.lab.safety.trial import Told
-from contactfpga_sim.model.sheet import guards
+from contactfpga_sim.model.sheet import wiring
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
@@ -97,14 +97,14 @@ def test_every_line_is_cut_at_both_ends():
 
 def test_guard_switches_surround_the_cells_and_their_corner_is_open():
     cells = np.eye(2, 3, dtype=bool)
-    sheet = guards.extended(cells)
+    sheet = wiring.extended(cells)
     assert sheet.tolist() == [
         [True, False, False, True],
         [False, True, False, True],
         [True, True, True, False],
     ]
     sheet[1, 3] = sheet[2, 0] = False
-    assert guards.missed(sheet) == ({1: 3}, {0: 2})
+    assert wiring.missed(sheet) == ({1: 3}, {0: 2})
 
 
 # ---- what is made of it

@@ -25,10 +25,9 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     still,
 )
-from contactfpga_sim.model.sheet import guards
-from contactfpga_sim.model.sheet.levels import at_rest
+from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import lines_of
-from contactfpga_sim.model.sheet.wiring import Wiring
+from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
 
 
 def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:
@@ -95,7 +94,7 @@ def bare(skin: Skin, count: float) -> Outcome:
     for row, column in [(3, 4), (3, 5), (4, 4), (4, 5)][: int(count)]:
         bare[row, column] = True
     if skin.guard:
-        cells_, bare_ = guards.extended(cells), guards.extended(bare, guard=False)
+        cells_, bare_ = wiring.extended(cells), wiring.extended(bare, guard=False)
     else:
         cells_, bare_ = cells, bare
     read, undefined, amperes = at_rest(Circuit(column_pull_ohm=4700.0), cells_, bare_)
@@ -114,7 +113,7 @@ def _still(skin: Skin, read: np.ndarray) -> Zones:
     """The frame of a sheet that reads so, with its guard lines if it has some."""
     if not skin.guard:
         return still(skin, read)
-    return still(skin, read[:-1, :-1], guards.missed(read))
+    return still(skin, read[:-1, :-1], wiring.missed(read))
 
 
 DIODES = Knob(
@@ -298,7 +297,7 @@ def _broken(skin: Skin, line: str, count: float) -> Outcome:
     cells[4:11, 5:12] = True
     lines = tuple(range(7, 7 + int(count)))
     cut = dict.fromkeys(lines, 0)
-    cuts = guards.LineCuts(cut, {}) if line == "row" else guards.LineCuts({}, cut)
+    cuts = wiring.LineCuts(cut, {}) if line == "row" else wiring.LineCuts({}, cut)
     return judged(still(skin, cells, cuts), cells, [cells])
 
 

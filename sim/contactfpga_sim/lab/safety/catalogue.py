@@ -13,7 +13,7 @@ import numpy as np
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.sheet import guards
+from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import ColumnLine
 from contactfpga_sim.model.sheet.wiring import Wiring
 
@@ -68,8 +68,8 @@ class Hurt:
 
     def press(self, board: CompiledBoard, touched: np.ndarray) -> None:
         """The sheet of a running board from the next cycle on, touched so."""
-        read = self._read(guards.extended(touched))
-        cuts = guards.missed(read)
+        read = self._read(wiring.extended(touched))
+        cuts = wiring.missed(read)
         board.cut(cuts.rows | dict(self.rows), cuts.columns | dict(self.columns))
         stuck = np.zeros(board.skin.column_lines, bool)
         stuck[list(self.stuck)] = True

@@ -17,7 +17,7 @@ from contactfpga_sim.lab.safety import trial
 from contactfpga_sim.lab.safety.catalogue import FAULTS, Hurt
 from contactfpga_sim.lab.safety.trial import Told
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.sheet.shorts import Shorts
+from contactfpga_sim.model.sheet.matrix import Shorts
 
 SKINS = {"plain": REFERENCE, "guarded": GUARDED}
 

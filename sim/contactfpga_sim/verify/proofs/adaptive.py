@@ -8,8 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.util.bits import popcount
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

@@ -8,8 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.dual import PAUSE_BITS, Dual
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.proof import Proof
 
 

@@ -9,8 +9,7 @@ from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller, Sum
 from contactfpga_hdl.label.steps import Walk, place_of, waiting
 from contactfpga_hdl.util.stack import Stack
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

@@ -8,8 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of
 from contactfpga_sim.verify.proofs.proof import Proof

@@ -15,8 +15,7 @@ from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
 from contactfpga_hdl.link.link import HELLO_REGION, Link, hello_words, offset_bits, stored_hello
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.streams import drain, feed

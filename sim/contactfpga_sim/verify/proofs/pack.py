@@ -7,8 +7,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.streams import feed

@@ -6,16 +6,28 @@ from typing import Literal
 from amaranth.hdl import Cat, Mux, Signal, Value
 
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.frame_clock import RETRY_BIT
-from contactfpga_hdl.scan.pins import released_levels
+from contactfpga_hdl.scan.pins import moves_sample, released_levels
 from contactfpga_hdl.scan.precharge import LOOKS, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.settled import at_settle_time
+
+
+def at_settle_time(proof: Proof, inside: Inside, derived: Derived, slot: Value | None = None) -> None:
+    """Samples stay at the end of the settle time; ``slot``: the clock within a slot of a raster scan."""
+    if not moves_sample(derived):
+        return
+    settle = derived.settle_clocks
+    part = "cycle." if derived.skin.reads_rows else ""
+    clock, following = inside[f"{part}sample_clock"], inside[f"{part}next_sample_clock"]
+    proof.lemma((clock == settle) & (following == settle) & ~inside[f"{part}early"])
+    if slot is not None:
+        proof.lemma(inside["sample_due"] == ((slot == settle) | (slot == settle + 1)))
+
 
 Diodes = Literal["col2row", "row2col"]
 _RETRY = 1 << RETRY_BIT

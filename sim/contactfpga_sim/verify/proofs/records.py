@@ -9,8 +9,7 @@ from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import Walk, place_of
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import mask_of_first_cluster, rows_into, skin_of
 from contactfpga_sim.verify.proofs.proof import Proof

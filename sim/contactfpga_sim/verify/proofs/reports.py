@@ -10,8 +10,7 @@ from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
 from contactfpga_hdl.link.faults import Reporter, report_of
 from contactfpga_hdl.link.link import Link
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

@@ -11,11 +11,9 @@ from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
-from contactfpga_sim.verify.proofs.precharge import apart
+from contactfpga_sim.verify.proofs.case import Bug, Case
+from contactfpga_sim.verify.proofs.precharge import apart, at_settle_time
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.settled import at_settle_time
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
 SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}

@@ -9,8 +9,7 @@ from amaranth.hdl import Const, Mux, Signal, Value
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_rows import AllRows, DrivenRows
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
 from contactfpga_sim.verify.proofs.streams import offers_stay

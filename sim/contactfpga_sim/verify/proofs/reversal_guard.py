@@ -8,8 +8,7 @@ from amaranth.hdl import Const, Mux, Signal, Value
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_guard import Checks
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.precharge import apart
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas

@@ -7,8 +7,7 @@ from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import CHARGE, LISTEN, SELECT, Sheet, skin_of
 from contactfpga_sim.verify.proofs.reversal_frames import Frames, keep_frames, waits_to_be_taken

@@ -9,8 +9,7 @@ from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_rows import Contact
 from contactfpga_hdl.util.bits import popcount
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import CHARGE, GAP, LISTEN, LONG, SELECT, SHORT, Sheet, skin_of

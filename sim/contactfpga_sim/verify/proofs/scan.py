@@ -8,8 +8,7 @@ from amaranth.hdl import Cat, Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

@@ -10,8 +10,7 @@ from contactfpga.wire import protocol
 from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.several import RoundRobin
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)

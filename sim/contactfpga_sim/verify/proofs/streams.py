@@ -13,8 +13,7 @@ from contactfpga_hdl.report.audit import Audit
 from contactfpga_hdl.report.backlog import Queue
 from contactfpga_hdl.report.bitmap import Bitmap
 from contactfpga_hdl.report.divide import Divider
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

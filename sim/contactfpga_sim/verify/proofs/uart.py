@@ -6,8 +6,7 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal
 
 from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.uart import Transmitter
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

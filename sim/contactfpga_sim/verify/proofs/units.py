@@ -8,8 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.units.ads131m08 import BITS, CLOCKS, LEVELS, Ads131m08
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.watch import Settings, Watch
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _FAST = Skin(units=3, converter_v=5.0)

@@ -7,8 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.frame_clock import FrameClock
 from contactfpga_hdl.scan.pins import DirectRows
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, Case
 from contactfpga_sim.verify.proofs.proof import Proof
 
 SKINS = {
