@@ -67,7 +67,7 @@ def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
     def refused(*_):
         raise OSError(28, "No space left on device")
 
-    point = sweep.Point(1.0, 1.0, 1.0, 1.0, 1.0)
+    point = sweep.SweepPoint(1.0, 1.0, 1.0, 1.0, 1.0)
     monkeypatch.setattr(pictures, "draw", refused)
     monkeypatch.setattr(sweep, "sweep", lambda tasks, *_: [point] * len(tasks))
     assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 1

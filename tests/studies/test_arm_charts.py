@@ -18,7 +18,7 @@ from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.arm import pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.sweep import Task
+from contactfpga_sim.lab.arm.sweep import SweepTask
 from contactfpga_sim.lab.registry import StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -57,7 +57,7 @@ def test_the_bounds_hold_for_what_the_gateware_takes(nothing_kept):
 
 def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
     case = sweep.unlimited(PAPER).but(link={"speed_m_s": 0.4})
-    point = sweep.Point(**sweep.work(Task(case, latency_s=6e-3, thickness=True)))
+    point = sweep.SweepPoint(**sweep.work(SweepTask(case, latency_s=6e-3, thickness=True)))
     for less, flat in ((0.0, False), (2 * sweep.RESOLUTION_M, True)):
         thick = case.but(foam={"thickness_m": point.thickness_m - less}, run={"step_s": 25e-6, "duration_s": 0.05})
         assert run(thick, "latency", latency_s=6e-3).outcome.bottomed == flat

@@ -17,7 +17,7 @@ from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size
 from contactfpga_sim.lab.fit import cost, search, tables
 from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import Goals, Task
+from contactfpga_sim.lab.fit.trial import FitTask, Goals
 from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -179,6 +179,6 @@ def test_real_contacts_need_an_exact_labeller(shortcuts):
 def test_dataclasses_of_a_task_can_be_sent_to_another_process(file):
     import pickle
 
-    task = Task((source(file(HANDS)), source("moving")), ("a", "b"), Skin(), Goals(), 10)
+    task = FitTask((source(file(HANDS)), source("moving")), ("a", "b"), Skin(), Goals(), 10)
     assert pickle.loads(pickle.dumps(task)) == task
     assert dataclasses.replace(task, count=11) != task

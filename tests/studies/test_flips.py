@@ -16,7 +16,7 @@ from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.flips import campaign, flip, reference, summary, tables, touches
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
 from contactfpga_sim.lab.flips.flip import Flip, Found
-from contactfpga_sim.lab.flips.reference import Heard, Reference
+from contactfpga_sim.lab.flips.reference import DeliveredFrame, Reference
 from contactfpga_sim.lab.flips.summary import Design
 from contactfpga_sim.model.board import native, state
 from contactfpga_sim.model.board.state import Bit
@@ -202,7 +202,7 @@ def fake(send="always"):
     sheets = np.zeros((8, 4, 4), bool)
     sheets[2:, 1:3, 1] = True
     sheets[5:, 1:3, 1] = False
-    truth = touches.Truth(skin, sheets)
+    truth = touches.TruthWindow(skin, sheets)
     return types.SimpleNamespace(skin=skin, truth=truth, late_s=(0.4e-3, 0.6e-3), slack_s=0.5e-3)
 
 
@@ -210,7 +210,7 @@ NOTHING, HALF, ALL = (0, 0, ()), (1, 1, ((1, 1, 1),)), (2, 1, ((2, 2, 3),))
 
 
 def heard(time_s, said, late_s=0.5e-3, flagged=False):
-    return Heard(time_s, said, late_s, flagged)
+    return DeliveredFrame(time_s, said, late_s, flagged)
 
 
 @pytest.mark.parametrize(

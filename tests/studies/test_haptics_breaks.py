@@ -45,7 +45,7 @@ def test_each_break_is_where_the_page_says(name, method):
 
 def test_what_nothing_disturbs_is_as_stated():
     """A covariance that is too small or too large by a tenth would show."""
-    trials = breaks._force(breaks.Load())
+    trials = breaks._force(breaks.Disturbance())
     assert 0.91 < np.mean([trial.holds for trial in trials]) < 0.99
 
 

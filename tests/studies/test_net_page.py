@@ -14,7 +14,7 @@ def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, 
         runs[links, batch_s, full] += 1
         cpu = dict.fromkeys(("publishers", "router", "reader", "other reader"), 0.1)
         times = {"latency": (0.01, 0.02), "bare": (0.001, 0.002)}
-        return load.Load(links=links, frames=1000.0, messages=100.0, share=1.0, lost=0, cpu=cpu, **times)
+        return load.NetworkRun(links=links, frames=1000.0, messages=100.0, share=1.0, lost=0, cpu=cpu, **times)
 
     monkeypatch.setattr(load, "measure", measure)
     tables.measured.cache_clear()

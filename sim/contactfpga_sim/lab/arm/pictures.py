@@ -19,8 +19,8 @@ from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm import sweep
 from contactfpga_sim.lab.arm.case import Case, CaseError
-from contactfpga_sim.lab.arm.run import Result
-from contactfpga_sim.lab.arm.sweep import Point, Task
+from contactfpga_sim.lab.arm.run import RunRecord
+from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.BLACK, "linestyle": style.DASHES[0], "linewidth": 1.5},
@@ -38,7 +38,7 @@ FROM_S, TO_S = -5e-3, 40e-3
 """What the enlarged part shows."""
 
 
-def pictures(found: dict[str, Result], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
+def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
     """Both pictures in each format into ``folder``."""
     folder.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(style.SETTINGS):
@@ -48,7 +48,7 @@ def pictures(found: dict[str, Result], folder: Path, suffixes: tuple[str, ...] =
         ]
 
 
-def course(found: dict[str, Result], field: str, label: str) -> Figure:
+def course(found: dict[str, RunRecord], field: str, label: str) -> Figure:
     """A quantity over time, around the contact above and whole below."""
     figure = style.new(6.4)
     near, whole = figure.subplots(2, 1, sharey=True)
@@ -74,7 +74,7 @@ def course(found: dict[str, Result], field: str, label: str) -> Figure:
     return figure
 
 
-def _mark(place: Any, result: Result, field: str, color: str) -> None:
+def _mark(place: Any, result: RunRecord, field: str, color: str) -> None:
     for seconds, mark in ((result.outcome.closes_s, "o"), (result.outcome.reacts_s, "x")):
         if seconds is not None:
             at = int(result.course["time_s"].searchsorted(seconds - 1e-9))
@@ -97,14 +97,14 @@ TICKS_MS = (0.01, 0.1, 1, 10)
 class Plan:
     """Every task by what it is drawn as."""
 
-    force: tuple[Task, ...]
-    limited: tuple[Task, ...]
-    sheet: dict[str, tuple[Task, ...]]
-    speed: dict[str, tuple[Task, ...]]
-    thick: dict[float, tuple[Task, ...]]
+    force: tuple[SweepTask, ...]
+    limited: tuple[SweepTask, ...]
+    sheet: dict[str, tuple[SweepTask, ...]]
+    speed: dict[str, tuple[SweepTask, ...]]
+    thick: dict[float, tuple[SweepTask, ...]]
 
     @property
-    def all(self) -> list[Task]:
+    def all(self) -> list[SweepTask]:
         """All of them."""
         groups = [self.force, self.limited, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
         return [task for group in groups for task in group]
@@ -121,15 +121,15 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
         return alone.but(link={"speed_m_s": speed}, foam={"base_n_m": 1e-3})
 
     return Plan(
-        force=tuple(Task(alone, latency_s=latency) for latency in latencies),
-        limited=tuple(Task(case, latency_s=latency) for latency in latencies),
-        sheet={way: tuple(Task(case.but(run={"lead_s": lead}), way) for lead in leads) for way in ("uart", "pin")},
+        force=tuple(SweepTask(alone, latency_s=latency) for latency in latencies),
+        limited=tuple(SweepTask(case, latency_s=latency) for latency in latencies),
+        sheet={way: tuple(SweepTask(case.but(run={"lead_s": lead}), way) for lead in leads) for way in ("uart", "pin")},
         speed={
-            name: tuple(Task(moving(speed), latency_s=latency) for speed in speeds)
+            name: tuple(SweepTask(moving(speed), latency_s=latency) for speed in speeds)
             for name, latency in by_speed.items()
         },
         thick={
-            speed: tuple(Task(moving(speed), latency_s=latency, thickness=True) for latency in latencies)
+            speed: tuple(SweepTask(moving(speed), latency_s=latency, thickness=True) for latency in latencies)
             for speed in THICK_SPEEDS_M_S
         },
     )
@@ -144,7 +144,7 @@ def check(case: Case) -> None:
 
 
 def draw(
-    case: Case, tasks: Plan, found: dict[Task, Point], folder: Path, suffixes: Sequence[str] = ("png", "svg")
+    case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path, suffixes: Sequence[str] = ("png", "svg")
 ) -> list[Path]:
     """The three charts in each format."""
     with matplotlib.rc_context(style.SETTINGS):
@@ -177,7 +177,7 @@ def _latencies(place: Any, case: Case) -> None:
     place.set_ylim(bottom=0)
 
 
-def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+def _force(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "force, N")
     late = [1e3 * task.latency_s for task in tasks.force]
     free: tuple[dict[str, Any], ...] = ({"color": style.SKY, "lw": 3}, {"color": style.GRAY, "lw": 3})
@@ -199,7 +199,7 @@ def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     return figure
 
 
-def _speed(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+def _speed(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
     figure, place = _axes("force limit, N", "speed, m/s")
     for name, group in tasks.speed.items():
         speeds = np.array([task.case.link.speed_m_s for task in group])
@@ -216,7 +216,7 @@ def _speed(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     return figure
 
 
-def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+def _thickness(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "thinnest foam that is not pressed flat, mm")
     for color, (speed, group) in zip((style.SKY, style.BLACK, style.ORANGE), tasks.thick.items()):
         thick = [1e3 * found[task].thickness_m for task in group]
@@ -227,9 +227,9 @@ def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     return figure
 
 
-def write_csv(found: dict[Task, Point], path: Path) -> Path:
+def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
     """All numbers, a line per run, in SI units."""
-    names = [field.name for field in dataclasses.fields(Point)]
+    names = [field.name for field in dataclasses.fields(SweepPoint)]
     with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])

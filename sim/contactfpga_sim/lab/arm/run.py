@@ -10,7 +10,7 @@ from contactfpga.driver import driver
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case, CaseError
-from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, Faults, Moment, World
+from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, CourseStep, Faults, World
 
 
 class PlantTransport:
@@ -52,7 +52,7 @@ STAY_S = 20e-3
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class ArmResponse:
     """Times in s from the touch, None where it did not happen. The reaction is the controller's sample at which it
     first turns the arm back or stops it."""
 
@@ -87,12 +87,12 @@ class Outcome:
 
 
 @dataclasses.dataclass(frozen=True)
-class Result:
+class RunRecord:
     """A run."""
 
-    outcome: Outcome
+    outcome: ArmResponse
     course: np.ndarray
-    """Structured, a :class:`contactfpga_sim.lab.arm.world.Moment` a step."""
+    """Structured, a :class:`contactfpga_sim.lab.arm.world.CourseStep` a step."""
     events: tuple[tuple[float, str, str], ...]
     """The controller's: (time in s, new state, reason)."""
     heard: tuple[tuple[float, int], ...]
@@ -101,7 +101,7 @@ class Result:
 
 def run(
     case: Case, way: str = "uart", *, latency_s: float = 6e-3, skin: Skin | None = None, faults: Faults | None = None
-) -> Result:
+) -> RunRecord:
     """Let the arm run into what it touches.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
@@ -130,7 +130,7 @@ def run(
             world.step()
     finally:
         world.close()
-    return Result(_outcome(world), _array(world.course), tuple(world.controller.events), tuple(world.heard))
+    return RunRecord(_outcome(world), _array(world.course), tuple(world.controller.events), tuple(world.heard))
 
 
 def _on_sheet(case: Case, skin: Skin) -> None:
@@ -164,16 +164,16 @@ def _over(world: World) -> bool:
     return resting and world.time_s - events[-1][0] > STAY_S and _slow(world, world.course[-1])
 
 
-def _slow(world: World, moment: Moment) -> bool:
+def _slow(world: World, moment: CourseStep) -> bool:
     return abs(moment.speed_rad_s) * world.case.link.lever_m < SLOW_M_S
 
 
-def _array(course: list[Moment]) -> np.ndarray:
-    kinds = [(name, bool if name in ("closed", "contact") else float) for name in Moment._fields]
+def _array(course: list[CourseStep]) -> np.ndarray:
+    kinds = [(name, bool if name in ("closed", "contact") else float) for name in CourseStep._fields]
     return np.array(course, dtype=kinds)
 
 
-def _outcome(world: World) -> Outcome:
+def _outcome(world: World) -> ArmResponse:
     course, events, lever = _array(world.course), world.controller.events, world.case.link.lever_m
     time = course["time_s"]
     turns = [(at, reason) for at, state, reason in events if state in ("reversing", "stopped")]
@@ -184,7 +184,7 @@ def _outcome(world: World) -> Outcome:
     opened = closed[-1] + 1 if len(closed) and closed[-1] + 1 < len(course) else None
     at = None if reacts is None else int(np.searchsorted(time, reacts - 1e-9))
     after = None if reacts is None else int(np.searchsorted(time, reacts + AFTER_S - 1e-9))
-    return Outcome(
+    return ArmResponse(
         closes_s=float(time[closed[0]]) if len(closed) else None,
         detected_s=world.detected_s,
         reacts_s=reacts,

@@ -10,8 +10,8 @@ import numpy as np
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.arm import comply, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.run import Result, run
-from contactfpga_sim.lab.arm.sweep import Point, Task
+from contactfpga_sim.lab.arm.run import RunRecord, run
+from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 from contactfpga_sim.lab.arm.world import Faults
 from contactfpga_sim.lab.pool import executor, progress
 
@@ -27,8 +27,8 @@ class ArmRuns(NamedTuple):
     """The runs that tables and pictures share."""
 
     plan: pictures.Plan
-    points: dict[Task, Point]
-    columns: dict[str, Result]
+    points: dict[SweepTask, SweepPoint]
+    columns: dict[str, RunRecord]
     """The paper's experiment by way to the controller."""
 
 

@@ -174,7 +174,7 @@ class Faults:
     """Every byte whose stop bit ends in this time has its lowest bit turned over."""
 
 
-class Moment(NamedTuple):
+class CourseStep(NamedTuple):
     """A step of the course."""
 
     time_s: float
@@ -199,7 +199,7 @@ class World:
         self.case = case
         self.faults = faults or Faults()
         self.controller = Controller(case)
-        self.course: list[Moment] = []
+        self.course: list[CourseStep] = []
         self.heard: list[tuple[float, int]] = []
         """What the host said: when it came to the controller, and the number of zones."""
         self.detected_s: float | None = None
@@ -268,7 +268,9 @@ class World:
             self._wanted = self.controller.sample(now, sensed)
         total, deepest = sum(forces.contact_n), max(forces.indentation_m)
         self.course.append(
-            Moment(now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), self._closed, self._level)
+            CourseStep(
+                now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), self._closed, self._level
+            )
         )
         self._state = self._plant.step(now, self._state, self._wanted, case.run.step_s, forces)
         if not finite(self._state):

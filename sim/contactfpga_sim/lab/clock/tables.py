@@ -64,7 +64,7 @@ class Moment(NamedTuple):
     """When the request was sent that it answers first."""
 
 
-class Frames(NamedTuple):
+class FrameTimes(NamedTuple):
     """What the fit says of frames, and the truth."""
 
     found_s: np.ndarray
@@ -96,7 +96,7 @@ def moments(path: Path, ppm: float, seed: int, seconds: float = SECONDS) -> Iter
         yield Moment(round(now_s * 1e6), last_s, sampled_s, asked)
 
 
-def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> Frames:
+def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTimes:
     """Have a fit follow frames."""
     fit = fit or ClockFit()
     rows = []
@@ -107,7 +107,7 @@ def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> Frames:
         line = fit.line(moment.arrived_s)
         assert line is not None
         rows.append((line.at(moment.time_us), line.sigma_s, moment.arrived_s, moment.sampled_s))
-    return Frames(*np.array(rows).T)
+    return FrameTimes(*np.array(rows).T)
 
 
 class Accuracy(NamedTuple):
@@ -132,7 +132,7 @@ def accuracy(path: Path, seeds: int = SEEDS, seconds: float = SECONDS) -> Accura
         ppm = -80 + 160 * seed / max(1, seeds - 1)
         frames = followed(moments(path, ppm, seed, seconds))
         runs.append(np.array([part[frames.sampled_s > frames.sampled_s[0] + 1] for part in frames]))
-    found = Frames(*np.concatenate(runs, axis=1))
+    found = FrameTimes(*np.concatenate(runs, axis=1))
     errors = np.abs(found.errors_s)
     late_s = float((found.arrived_s - found.sampled_s).mean())
     middle, worst = float(np.median(errors)), float(np.quantile(errors, 0.99))

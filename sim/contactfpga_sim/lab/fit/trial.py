@@ -17,7 +17,7 @@ from contactfpga_sim.lab.fit.sources import Source
 
 
 @dataclasses.dataclass(frozen=True)
-class Measured:
+class Measurement:
     """Of one Skin on the scenes of one source."""
 
     errors: dict[str, Interval]
@@ -58,7 +58,7 @@ class Goals:
                     f"limit of {name} is {100 * limit:.3g} %; take {need} scenes or more"
                 )
 
-    def misses(self, found: Measured, sure: bool = True) -> Iterator[tuple[float, str]]:
+    def misses(self, found: Measurement, sure: bool = True) -> Iterator[tuple[float, str]]:
         """For each limit that is not met: how many times it is exceeded, and what was measured.
 
         ``sure``: errors are judged by the upper ends of their intervals, else by their means.
@@ -82,7 +82,7 @@ class Goals:
             over = math.inf if math.isnan(worst) else worst / self.latency_us
             yield over, f"{what}, limit {self.latency_us:.0f} us"
 
-    def excess(self, found: Measured) -> float:
+    def excess(self, found: Measurement) -> float:
         """How many times the limit that is missed most is exceeded; 1 where all are met."""
         return max((over for over, _ in self.misses(found)), default=1.0)
 
@@ -110,7 +110,7 @@ TIMED = 48
 
 
 @dataclasses.dataclass(frozen=True)
-class Task:
+class FitTask:
     """What is asked."""
 
     sources: tuple[Source, ...]
@@ -134,7 +134,7 @@ class Trial:
     """A candidate with what was found."""
 
     candidate: Candidate
-    measured: tuple[Measured, ...] = ()
+    measured: tuple[Measurement, ...] = ()
     """One for each source."""
     refusals: tuple[str, ...] = ()
     excess: float = math.inf
@@ -168,7 +168,7 @@ class Trial:
 class Fit:
     """What came of it."""
 
-    task: Task
+    task: FitTask
     answer: Trial | None
     runner_up: Trial | None
     cheaper: tuple[Trial, ...]
@@ -177,7 +177,7 @@ class Fit:
     """Those for which there is no Skin."""
     dearer: int
     """Candidates that cost more than the answer."""
-    reported: tuple[tuple[Measured, ...], ...]
+    reported: tuple[tuple[Measurement, ...], ...]
     """Of the answer and the runner-up, or of the nearest: measured on scenes that were not used to choose."""
     broken: tuple[str, ...]
     """Limits that the answer misses there."""

@@ -17,7 +17,7 @@ from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import knob_pictures, tables
 from contactfpga_sim.lab.failures.knob import Sweep
 from contactfpga_sim.lab.haptics import breaks, coverage, felt, pairs
-from contactfpga_sim.lab.haptics.coverage import Case
+from contactfpga_sim.lab.haptics.coverage import CoverageCase
 from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
@@ -74,7 +74,7 @@ def wrong_table() -> str:
     return writer.table_of(rows)
 
 
-def _named(case: Case) -> str:
+def _named(case: CoverageCase) -> str:
     return f"{case.method}, {case.pitch_mm:g} mm"
 
 

@@ -118,7 +118,7 @@ BARE_BYTES = 100
 LONG_S = 120.0
 
 
-class Load(NamedTuple):
+class NetworkRun(NamedTuple):
     """What a run showed; times in s."""
 
     links: int
@@ -138,7 +138,7 @@ class Load(NamedTuple):
     """The same of the bare pair of Zenoh, from put to callback."""
 
 
-def measure(links: int, batch_s: float, full: bool = False, seconds: float = SECONDS) -> Load:
+def measure(links: int, batch_s: float, full: bool = False, seconds: float = SECONDS) -> NetworkRun:
     """Links of 1 kHz; ``full``: and one of 10 kHz."""
     context: Any = multiprocessing.get_context("spawn")
     with socket.socket() as one:
@@ -168,7 +168,9 @@ def measure(links: int, batch_s: float, full: bool = False, seconds: float = SEC
     cpu = {name: value[0] / seconds for name, value in found.items()}
     frames, lost, messages = (np.array(found["reader"][1]) + found["other reader"][1]).tolist()
     sent = (RATE_HZ * links + FULL_HZ * full) * seconds
-    return Load(links + full, frames / sent, frames / seconds, lost, messages / seconds, cpu, *found["reader"][2:])
+    return NetworkRun(
+        links + full, frames / sent, frames / seconds, lost, messages / seconds, cpu, *found["reader"][2:]
+    )
 
 
 def _answer(pipe: Connection) -> Any:

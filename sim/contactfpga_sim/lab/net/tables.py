@@ -19,7 +19,7 @@ GIGABIT = 1e9 / 8
 
 
 @functools.cache
-def measured(links: int, batch_ms: float, *, full: bool) -> load.Load:
+def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
     """Once per run of this program. ``full`` has no default: the cache takes a call that leaves it out for another."""
     return load.measure(links, batch_ms / 1000, full)
 
@@ -48,7 +48,7 @@ def links_table() -> str:
     return writer.table_of(rows)
 
 
-def _ends(found: load.Load) -> tuple[float, float, float]:
+def _ends(found: load.NetworkRun) -> tuple[float, float, float]:
     cpu = found.cpu
     return cpu["publishers"], cpu["router"], cpu["reader"] + cpu["other reader"]
 
@@ -78,7 +78,7 @@ def thousand_table() -> str:
     return writer.table_of(rows)
 
 
-def _ratio(found: load.Load) -> str:
+def _ratio(found: load.NetworkRun) -> str:
     return " / ".join(f"{one / bare:.1f}" for one, bare in zip(found.latency, found.bare, strict=True))
 
 

@@ -54,14 +54,14 @@ REPORTS = ("moments", "barycenter")
 """Those that report zones."""
 
 
-class Latency(NamedTuple):
+class EventTimes(NamedTuple):
     """Median and worst time in us from a switch closing to an event, over the touch instants."""
 
     median: float
     worst: float
 
     @classmethod
-    def of(cls, cycles: list[int], skin: Skin) -> Latency:
+    def of(cls, cycles: list[int], skin: Skin) -> EventTimes:
         us = np.array(cycles) / (skin.clock_hz / 1e6)
         return cls(float(np.median(us)), float(us.max()))
 
@@ -83,7 +83,7 @@ def dots_in_last_row(skin: Skin) -> np.ndarray:
     return cells
 
 
-def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, Latency]:
+def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, EventTimes]:
     """From switches of one row closing to the pin, and to the first and last byte of their frame; by default that of a
     single one in the first row, which is the worst place: the rest of the scan follows it.
     """
@@ -100,7 +100,7 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
             first, last = _first_frame_with_cells(board, skin)
         found["first byte"].append(first - start)
         found["last byte"].append(last - start)
-    return {name: Latency.of(cycles, skin) for name, cycles in found.items()}
+    return {name: EventTimes.of(cycles, skin) for name, cycles in found.items()}
 
 
 def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
 FRAMES = 8192
 
 
-class Speed(NamedTuple):
+class FrameRates(NamedTuple):
     """Frames per second of processor time."""
 
     decoded: float
@@ -34,14 +34,14 @@ class Speed(NamedTuple):
         return self.decoded / self.tracked
 
 
-def measure(contacts: int, frames: int = FRAMES) -> Speed:
+def measure(contacts: int, frames: int = FRAMES) -> FrameRates:
     """With this many contacts that move; the best of some rounds."""
     chunks = [frame(number, 1, contacts) for number in range(frames)]
     rounds = [_round(chunks) for _ in range(4)]
-    return Speed(*(max(found) for found in zip(*rounds)))
+    return FrameRates(*(max(found) for found in zip(*rounds)))
 
 
-def _round(chunks: list[bytes]) -> Speed:
+def _round(chunks: list[bytes]) -> FrameRates:
     host = Conversation("bytes")
     host.receive(greeting(), 0.0)
     arrived: list[Zones] = []
@@ -57,7 +57,7 @@ def _round(chunks: list[bytes]) -> Speed:
     decoded = _rate(decode, len(chunks))
     tracked = _rate(lambda: [tracker.update(zones) for zones in arrived], len(arrived))
     assert len(arrived) == len(chunks)
-    return Speed(decoded, tracked)
+    return FrameRates(decoded, tracked)
 
 
 def _rate(work: Callable[[], object], count: int) -> float:

@@ -162,7 +162,7 @@ def click_table(found: list[Click]) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class Load:
+class ProcessorLoad:
     """Processor time per second of board time, all in s."""
 
     board: float
@@ -171,7 +171,7 @@ class Load:
     """Driver and view, without a browser."""
 
 
-def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
+def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
     """While these fingers press. Processor time does not depend on what else the computer does."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
@@ -192,7 +192,7 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
     passed_s, used = virtual.clock() - began_s, time.thread_time() - began
     virtual.read = read
     shown.hand.lift()
-    return Load(spent[0] / passed_s, (used - spent[0]) / passed_s)
+    return ProcessorLoad(spent[0] / passed_s, (used - spent[0]) / passed_s)
 
 
 def load_table(shown: ServedView) -> str:

@@ -1,7 +1,8 @@
 """What a faulty sheet reads: which lines pressed switches join, where diodes, wires and switches have faults.
 
 In :class:`Wiring` nothing but the pulls has a resistance; :func:`at_rest` asks :mod:`contactfpga.design.circuit` for
-levels and currents once the columns have settled. Guard lines are one more row and one more column, and what they miss is a cut.
+levels and currents once the columns have settled. Guard lines are one more row and one more column; what they miss is
+a cut.
 """
 
 from __future__ import annotations

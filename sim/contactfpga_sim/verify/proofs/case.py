@@ -175,7 +175,7 @@ def _clocks(said: str) -> int:
 
 
 @dataclasses.dataclass(frozen=True)
-class Case:
+class ProofCase:
     """One proof at one size, and the bugs that it must find."""
 
     claim: str

@@ -7,7 +7,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_sim.verify.proofs.case import Bug, Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.streams import feed
@@ -218,6 +218,6 @@ _BUGS = (
 _ZONES = Skin(rows=2, columns=4, zone_capacity=2, settle_us=40)
 _CELLS = Skin(rows=2, columns=4, report="cells", settle_us=40)
 CASES = (
-    Case("frames are packed", "2x4, 2 zones", partial(frames_are_packed, skin=_ZONES), 2, _BUGS, bug_clocks=20),
-    Case("frames are packed", "2x4, cells", partial(frames_are_packed, skin=_CELLS), 2),
+    ProofCase("frames are packed", "2x4, 2 zones", partial(frames_are_packed, skin=_ZONES), 2, _BUGS, bug_clocks=20),
+    ProofCase("frames are packed", "2x4, cells", partial(frames_are_packed, skin=_CELLS), 2),
 )

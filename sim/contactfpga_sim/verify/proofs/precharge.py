@@ -12,7 +12,7 @@ from contactfpga_hdl.scan.pins import moves_sample, released_levels
 from contactfpga_hdl.scan.precharge import LOOKS, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.verify.proofs.case import Bug, Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -261,12 +261,12 @@ _REVERSAL_BUGS = (
     Bug("driven on", ReversalScanner, "pins__columns_drive", lambda columns, inside: columns | inside["cycle.due"][0]),
 )  # fmt: skip
 CASES = (
-    Case("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2, _RASTER_BUGS, 24),
-    Case("columns and rows apart", "raster, 3 rows, row2col", partial(raster, diodes="row2col"), 2),
-    Case("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS, 30),
-    Case("a column that reads pressed for 8 clocks is driven on", "3 columns", kept, 2, _KEPT_BUGS, 80),
-    Case("a stuck column is let go", "raster, 3x2",
+    ProofCase("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2, _RASTER_BUGS, 24),
+    ProofCase("columns and rows apart", "raster, 3 rows, row2col", partial(raster, diodes="row2col"), 2),
+    ProofCase("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS, 30),
+    ProofCase("a column that reads pressed for 8 clocks is driven on", "3 columns", kept, 2, _KEPT_BUGS, 80),
+    ProofCase("a stuck column is let go", "raster, 3x2",
          lambda proof: column_let_go(proof, Scanner(raster_of("col2row"))), 2, _STUCK_BUGS, 40),
-    Case("a stuck column is let go", "reversal, 2x2",
+    ProofCase("a stuck column is let go", "reversal, 2x2",
          lambda proof: column_let_go(proof, ReversalScanner(reversal_of("row2col"))), 2, _REVERSAL_BUGS),
 )  # fmt: skip

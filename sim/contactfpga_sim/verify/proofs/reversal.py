@@ -11,7 +11,7 @@ from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.verify.proofs.case import Bug, Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.precharge import apart, at_settle_time
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -216,15 +216,15 @@ _LASTS_BUGS = (
         lambda listens, inside: listens & (inside["clock"] != 0)),
 )  # fmt: skip
 CASES = (
-    Case("pins never meet", "3x2, col2row", partial(pins, rows=3, columns=2, diodes="col2row"), 2, _PIN_BUGS, 16),
-    Case("pins never meet", "3x2, row2col", partial(pins, rows=3, columns=2, diodes="row2col"), 2),
-    Case("pins never meet", "2x1, shortest times",
+    ProofCase("pins never meet", "3x2, col2row", partial(pins, rows=3, columns=2, diodes="col2row"), 2, _PIN_BUGS, 16),
+    ProofCase("pins never meet", "3x2, row2col", partial(pins, rows=3, columns=2, diodes="row2col"), 2),
+    ProofCase("pins never meet", "2x1, shortest times",
          partial(pins, rows=2, columns=1, **SHORT), 2),
-    Case("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
-    Case("times of a line reversal", "3x2, shortest times, row2col",
+    ProofCase("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
+    ProofCase("times of a line reversal", "3x2, shortest times, row2col",
          partial(lasts, rows=3, columns=2, diodes="row2col", **SHORT), 2),
-    Case("times of a line reversal", "3x2, long precharge",
+    ProofCase("times of a line reversal", "3x2, long precharge",
          partial(lasts, rows=3, columns=2, precharge_us=12), 2),
-    Case("times of a line reversal", "3x2, long release",
+    ProofCase("times of a line reversal", "3x2, long release",
          partial(lasts, rows=3, columns=2, **(LONG | {"release_us": 20})), 2),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.units.ads131m08 import BITS, CLOCKS, LEVELS, Ads131m08
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.watch import Settings, Watch
-from contactfpga_sim.verify.proofs.case import Bug, Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _FAST = Skin(units=3, converter_v=5.0)
@@ -290,9 +290,9 @@ _PACED_BUGS = (
     Bug("a pace too fast", Ads131m08, "pins__spi_pace", lambda level, inside: level ^ inside["level"][0]),
 )  # fmt: skip
 CASES = (
-    Case("conversions of an MCP3208", "3 units, 12 MHz, 5 V", partial(conversions, skin=_FAST), 4),
-    Case("conversions of an MCP3208", "2 units, 1 MHz", partial(conversions, skin=_SLOWEST), 4, _SPI_BUGS, 50),
-    Case("thresholds of units", "3 units", partial(thresholds, skin=_FAST), 4, _WATCH_BUGS, 8),
-    Case("frames of an ADS131M08", "2 units, 1 MHz", partial(frames, skin=_PACED_SLOW), 6),
-    Case("frames of an ADS131M08", "3 units, 48 MHz", partial(frames, skin=_PACED_FAST), 6, _PACED_BUGS, 20),
+    ProofCase("conversions of an MCP3208", "3 units, 12 MHz, 5 V", partial(conversions, skin=_FAST), 4),
+    ProofCase("conversions of an MCP3208", "2 units, 1 MHz", partial(conversions, skin=_SLOWEST), 4, _SPI_BUGS, 50),
+    ProofCase("thresholds of units", "3 units", partial(thresholds, skin=_FAST), 4, _WATCH_BUGS, 8),
+    ProofCase("frames of an ADS131M08", "2 units, 1 MHz", partial(frames, skin=_PACED_SLOW), 6),
+    ProofCase("frames of an ADS131M08", "3 units, 48 MHz", partial(frames, skin=_PACED_FAST), 6, _PACED_BUGS, 20),
 )

@@ -7,7 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.frame_clock import FrameClock
 from contactfpga_hdl.scan.pins import DirectRows
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.verify.proofs.case import Bug, Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 SKINS = {
@@ -45,6 +45,6 @@ def _bugs(scan: str) -> tuple[Bug, ...]:
 
 
 CASES = tuple(
-    Case("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, _bugs(scan))
+    ProofCase("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, _bugs(scan))
     for scan in SKINS
 )

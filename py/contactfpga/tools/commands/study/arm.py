@@ -16,7 +16,7 @@ from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.arm.case import Case
-    from contactfpga_sim.lab.arm.sweep import Point, Task
+    from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 EXTRA = "sim"
 
@@ -104,7 +104,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
     pictures.check(case)
     folder = outputs.folder(args.output)
     tasks = pictures.plan(case)
-    so_far: dict[Task, Point] = {}
+    so_far: dict[SweepTask, SweepPoint] = {}
     try:
         with executor(args.jobs, args.dask) as workers, progress() as step:
             found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
@@ -116,7 +116,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
     return 0
 
 
-def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
+def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
     """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
     from contactfpga_sim.lab.arm import pictures
 
