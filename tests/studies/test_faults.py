@@ -9,7 +9,7 @@ from study_pages import outdated, section
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
 from contactfpga_sim.lab.safety import compute, tables, trial
-from contactfpga_sim.lab.safety.catalogue import FAULTS, Hurt
+from contactfpga_sim.lab.safety.catalogue import FAULTS, SheetFault
 from contactfpga_sim.lab.safety.compute import Place
 from contactfpga_sim.lab.safety.trial import Told
 from contactfpga_sim.model.sheet import wiring
@@ -58,7 +58,7 @@ def test_what_no_line_can_show_is_not_told(fault):
 
 
 def test_a_whole_sheet_is_right_and_tells_nothing():
-    place = compute.at(GUARDED, Hurt())
+    place = compute.at(GUARDED, SheetFault())
     assert not place.harmful
     assert [place.us(by) for by in ("flags", "deadline", "alive", "contact")] == [None] * 4
     assert place.wrong == 0
@@ -84,7 +84,7 @@ def test_two_pins_that_fight_are_told_where_the_column_reads_released():
 def test_each_fault_has_places_that_differ(fault):
     hurts = FAULTS[fault].places(GUARDED)
     assert hurts
-    assert all(hurt != Hurt() for hurt in hurts.values())
+    assert all(hurt != SheetFault() for hurt in hurts.values())
     assert len({repr(hurt) for hurt in hurts.values()}) == len(hurts)
 
 
@@ -159,4 +159,4 @@ def test_a_self_test_at_power_up_tells_joined_lines_and_shorted_diodes(fault):
     assert len(times) > 10
     assert None not in times
     assert max(times) < compute.clocks(compute.TESTED) / compute.TESTED.derived.clocks_per_us < 100
-    assert compute.told_us(Hurt()) is None
+    assert compute.told_us(SheetFault()) is None

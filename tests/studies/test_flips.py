@@ -15,7 +15,7 @@ from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.flips import campaign, flip, reference, summary, tables, touches
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
-from contactfpga_sim.lab.flips.flip import Flip, Found
+from contactfpga_sim.lab.flips.flip import Flip, FlipOutcome
 from contactfpga_sim.lab.flips.reference import DeliveredFrame, Reference
 from contactfpga_sim.lab.flips.summary import Design
 from contactfpga_sim.model.board import native, state
@@ -257,8 +257,8 @@ def test_names_are_those_of_the_gateware():
 
 def test_numbers_are_read_back_as_they_were_written(tmp_path):
     rows = [
-        Row("run", Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))),
-        Row("run, dual", Found("dual.first.link.store", True, "masked", "", 0, 0.0, 0.005)),
+        Row("run", FlipOutcome("scan.time", False, "silent", "time", 3, 0.25, float("inf"))),
+        Row("run, dual", FlipOutcome("dual.first.link.store", True, "masked", "", 0, 0.0, 0.005)),
     ]
     campaign.write(rows, tmp_path / "flips.csv")
     assert campaign.read(tmp_path / "flips.csv") == rows
@@ -273,7 +273,7 @@ def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_mis
         kept.kept("flips", campaign._key("run", memory, block), lambda: [masked, masked])
     try:
         rows = campaign.finished(["run, dual", "run"])
-        assert rows == 6 * [Row("run", Found(*masked))]
+        assert rows == 6 * [Row("run", FlipOutcome(*masked))]
     finally:
         for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
             kept._path("flips", campaign._key("run", memory, block)).unlink()
@@ -287,7 +287,7 @@ def test_what_is_not_begun_in_time_is_left_out_and_the_first_block_of_each_never
     def block(design, memory, number):
         begun.append((design, memory, number))
         time.sleep(0.05)
-        return [Found(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
+        return [FlipOutcome(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
 
     monkeypatch.setattr(campaign, "_block", block)
     counted = []
@@ -321,7 +321,7 @@ def test_the_page_says_what_the_numbers_beside_it_say():
 
 
 def test_tables_count_what_came_out():
-    found = Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
+    found = FlipOutcome("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
     rows = [
         Row("run", found),
         *3 * [Row("run", found._replace(outcome="masked", kind=""))],

@@ -176,8 +176,8 @@ def _array(course: list[CourseStep]) -> np.ndarray:
 def _outcome(world: World) -> ArmResponse:
     course, events, lever = _array(world.course), world.controller.events, world.case.link.lever_m
     time = course["time_s"]
-    turns = [(at, reason) for at, state, reason in events if state in ("reversing", "stopped")]
-    reacts, reason = turns[0] if turns else (None, "")
+    reactions = [(at, reason) for at, state, reason in events if state in ("reversing", "stopped")]
+    reacts, reason = reactions[0] if reactions else (None, "")
     slow = np.abs(course["speed_rad_s"]) * lever < SLOW_M_S
     last_fast = int(np.flatnonzero(~slow)[-1]) if not slow.all() else -1
     closed = np.flatnonzero(course["closed"])

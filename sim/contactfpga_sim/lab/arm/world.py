@@ -15,7 +15,7 @@ from contactfpga.skin import Skin
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.control import Controller, Sensed
+from contactfpga_sim.lab.arm.control import Controller, SensorReadings
 from contactfpga_sim.lab.arm.parts import Usb
 from contactfpga_sim.lab.arm.plant import Plant, finite
 from contactfpga_sim.model.board.compiled import CompiledBoard
@@ -99,7 +99,7 @@ FIRST_NUMBER = 129 * 128 + 1
 """Of a command; each of its two digits is above 0."""
 
 
-class Under:
+class UnitsUnderSheet:
     """Three units at the corners of a triangle around the sheet's middle; the bumper weighs nothing."""
 
     def __init__(self, case: Case, skin: Skin):
@@ -171,7 +171,7 @@ class Faults:
     host_dies_s: float | None = None
     """The program reads and says nothing from then on."""
     noise_s: tuple[float, float] | None = None
-    """Every byte whose stop bit ends in this time has its lowest bit turned over."""
+    """Every byte whose stop bit ends in this time has its lowest bit inverted."""
 
 
 class CourseStep(NamedTuple):
@@ -208,7 +208,7 @@ class World:
         self._plant = Plant(case)
         self._switches = Switches(case, skin)
         self._board = CompiledBoard(skin, capture=("contact",)) if way in (*PINS, "uart") else None
-        self._under = Under(case, skin) if way in UNITS else None
+        self._under = UnitsUnderSheet(case, skin) if way in UNITS else None
         if self._board is not None and self._under is not None:
             self._board.load(self._under.readings([0.0] * len(case.touch)))
             self._board.send(self._under.commands())
@@ -264,7 +264,7 @@ class World:
         theta, omega, current = self._state[:3]
         if tick:
             torque = max(-case.control.sensor_nm, min(case.control.sensor_nm, forces.sensor_nm))
-            sensed = Sensed(theta, omega, torque, self._level, self._alive(now))
+            sensed = SensorReadings(theta, omega, torque, self._level, self._alive(now))
             self._wanted = self.controller.sample(now, sensed)
         total, deepest = sum(forces.contact_n), max(forces.indentation_m)
         self.course.append(

@@ -36,7 +36,7 @@ SKINS = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Registered:
+class RegistrationErrors:
     """Of many registrations."""
 
     refused: float
@@ -53,7 +53,7 @@ class Registered:
 
 def placement_errors(
     skin: Skin, points: int, folder: Path, *, normals: bool, count: int = 200, seed: int = 1
-) -> Registered:
+) -> RegistrationErrors:
     """Random poses and mountings, random points, a finger that is off by a millimeter or so."""
     (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
@@ -74,7 +74,7 @@ def placement_errors(
             continue
         errors.append(_errors(true, found.pose, found.rms_mm))
     middle, turned, residual = np.sqrt(np.mean(np.square(errors), axis=0)) if errors else (math.nan,) * 3
-    return Registered(refused / count, wrong / max(1, count - refused), middle, turned, residual)
+    return RegistrationErrors(refused / count, wrong / max(1, count - refused), middle, turned, residual)
 
 
 def _pressed(true: Plan, rng: np.random.Generator, normals: bool) -> Press:

@@ -57,7 +57,7 @@ class Line:
             return cls(skin, edges, float(rig.board.cycle), tuple(packets))
 
     def noisy(self, rate_hz: float, seed: int) -> Line:
-        """With this many pulses per second that turn the level around for half a bit to two bits."""
+        """With this many pulses per second that invert the level for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
         bit = self.skin.derived.bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)

@@ -18,7 +18,7 @@ from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import kept, size
 from contactfpga_sim.lab.flips import flip
-from contactfpga_sim.lab.flips.flip import Found
+from contactfpga_sim.lab.flips.flip import FlipOutcome
 from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference
 
 DESIGNS: dict[str, dict[str, Any]] = {
@@ -51,7 +51,7 @@ class Row(NamedTuple):
     """A flip of a design."""
 
     design: str
-    found: Found
+    found: FlipOutcome
 
 
 def run(
@@ -83,7 +83,7 @@ def run(
     finally:
         timer.cancel()
     return [
-        Row(name, Found(*one))
+        Row(name, FlipOutcome(*one))
         for memory, count in counts.items()
         for name in names
         for one in _first(
@@ -93,18 +93,18 @@ def run(
     ]
 
 
-def _first(blocks: Iterable[list[Found] | None]) -> Iterator[Found]:
+def _first(blocks: Iterable[list[FlipOutcome] | None]) -> Iterator[FlipOutcome]:
     """Flips of the blocks up to the first that is not there: which ones are there may depend on what came of them."""
     for found in itertools.takewhile(lambda block: block is not None, blocks):
         yield from found or ()
 
 
-def _block(design: str, memory: bool, block: int) -> list[Found]:
-    def new() -> list[Found]:
+def _block(design: str, memory: bool, block: int) -> list[FlipOutcome]:
+    def new() -> list[FlipOutcome]:
         reference = _reference(design)
         return [flip.follow(reference, each) for each in flip.drawn(reference, memory, BLOCK, block)]
 
-    rows: list[Found] = kept.kept("flips", _key(design, memory, block), new)
+    rows: list[FlipOutcome] = kept.kept("flips", _key(design, memory, block), new)
     return rows
 
 
@@ -115,7 +115,7 @@ def _key(design: str, memory: bool, block: int) -> str:
 def finished(names: Iterable[str]) -> list[Row]:
     """All flips of these designs that were followed before: of each the blocks up to the first one that was not."""
     return [
-        Row(name, Found(*one))
+        Row(name, FlipOutcome(*one))
         for memory in (False, True)
         for name in names
         for one in _first(kept.found("flips", _key(name, memory, block)) for block in itertools.count())
@@ -131,7 +131,7 @@ def write(rows: Iterable[Row], path: Path) -> None:
     """One line per flip."""
     with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(("design", *Found._fields))
+        lines.writerow(("design", *FlipOutcome._fields))
         for row in rows:
             found = row.found._replace(seconds=round(row.found.seconds, 6), gone_s=round(row.found.gone_s, 6))
             lines.writerow((row.design, *found))
@@ -144,7 +144,7 @@ def read(path: Path) -> list[Row]:
 
 
 def _row(line: dict[str, str]) -> Row:
-    found = Found(
+    found = FlipOutcome(
         name=line["name"],
         memory=line["memory"] == "True",
         outcome=line["outcome"],  # type: ignore[arg-type]

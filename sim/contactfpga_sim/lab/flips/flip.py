@@ -30,7 +30,7 @@ class Flip(NamedTuple):
     cycle: int
 
 
-class Found(NamedTuple):
+class FlipOutcome(NamedTuple):
     """What came of it."""
 
     name: str
@@ -68,7 +68,7 @@ def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Fli
     return flips
 
 
-def follow(reference: Reference, flip: Flip) -> Found:
+def follow(reference: Reference, flip: Flip) -> FlipOutcome:
     """Flip it and say what comes of it."""
     listener, heard, gone_s = _run(reference, flip)
     place = reference.board.places[flip.bit.place]
@@ -80,18 +80,18 @@ def follow(reference: Reference, flip: Flip) -> Found:
         return _silent(place, heard, silent, gone_s)
     flags = [kind for one, kind in wrong if one.flagged]
     kind = told or ("flag" if flags or any(one.flagged for one in heard) else "")
-    return Found(place.name, place.memory, "told" if kind else "masked", kind, 0, 0.0, gone_s)
+    return FlipOutcome(place.name, place.memory, "told" if kind else "masked", kind, 0, 0.0, gone_s)
 
 
 def _silent(
     place: Storage, heard: list[DeliveredFrame], silent: list[tuple[DeliveredFrame, str]], gone_s: float
-) -> Found:
+) -> FlipOutcome:
     first, last = silent[0][0].time_s, silent[-1][0].time_s
     after = [one.time_s for one in heard if one.time_s > last]
     until = after[0] if after else last
     kinds = sorted({kind for _, kind in silent})
     frames = sum(kind != "stale" for _, kind in silent)
-    return Found(place.name, place.memory, "silent", ", ".join(kinds), frames, until - first, gone_s)
+    return FlipOutcome(place.name, place.memory, "silent", ", ".join(kinds), frames, until - first, gone_s)
 
 
 def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFrame], float]:

@@ -1,4 +1,4 @@
-"""Where force joined to location fails: one thing that is not as assumed is turned up until what is stated is wrong.
+"""Where force joined to location fails: one thing that is not as assumed is increased until what is stated is wrong.
 
 Each value of a knob is tried with many contacts. It is right while the stated 95 % hold for 90 % of them at least. The
 system says so where it does for more than half of those for which they do not hold.
@@ -191,8 +191,8 @@ def _places(
     *methods: tuple[str, CoverageCase], **knob: Callable[[float], object]
 ) -> dict[str, Callable[[float], Outcome]]:
     def run(case: CoverageCase, value: float) -> Outcome:
-        turned = dataclasses.replace(case, **{name: change(value) for name, change in knob.items()})  # type: ignore[arg-type]
-        return outcome(_located(turned), "mm")
+        changed = dataclasses.replace(case, **{name: change(value) for name, change in knob.items()})  # type: ignore[arg-type]
+        return outcome(_located(changed), "mm")
 
     return {name: functools.partial(run, case) for name, case in methods}
 

@@ -21,7 +21,7 @@ Cell = tuple[int, int]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Hurt:
+class SheetFault:
     """What is wrong. Rows and columns are those of the sheet; cells are (row, column)."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
@@ -99,7 +99,7 @@ class Hurt:
         return cells
 
 
-Places = Callable[[Skin], Mapping[str, Hurt]]
+Places = Callable[[Skin], Mapping[str, SheetFault]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,43 +122,45 @@ def _ends(length: int) -> tuple[int, ...]:
     return 0, length // 2, length - 1
 
 
-def _cut_rows(skin: Skin) -> Mapping[str, Hurt]:
+def _cut_rows(skin: Skin) -> Mapping[str, SheetFault]:
     ends = _ends(skin.columns)
-    return {f"row {row} at column {end}": Hurt(rows={row: end}) for row in range(skin.rows) for end in ends}
+    return {f"row {row} at column {end}": SheetFault(rows={row: end}) for row in range(skin.rows) for end in ends}
 
 
-def _cut_columns(skin: Skin) -> Mapping[str, Hurt]:
+def _cut_columns(skin: Skin) -> Mapping[str, SheetFault]:
     ends = _ends(skin.rows)
-    return {f"column {line} at row {end}": Hurt(columns={line: end}) for line in range(skin.columns) for end in ends}
+    return {
+        f"column {line} at row {end}": SheetFault(columns={line: end}) for line in range(skin.columns) for end in ends
+    }
 
 
-def _row_chips(skin: Skin) -> Mapping[str, Hurt]:
+def _row_chips(skin: Skin) -> Mapping[str, SheetFault]:
     """Of a connector or a 74HC595: its rows, or all rows after it in the chain too."""
     firsts = range(0, skin.rows, 8)
     alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
     return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
 
 
-def _rows(numbers: range) -> Hurt:
-    return Hurt(rows=dict.fromkeys(numbers, 0))
+def _rows(numbers: range) -> SheetFault:
+    return SheetFault(rows=dict.fromkeys(numbers, 0))
 
 
-def _column_chips(skin: Skin) -> Mapping[str, Hurt]:
+def _column_chips(skin: Skin) -> Mapping[str, SheetFault]:
     firsts = range(0, skin.columns, 8)
     alone = {f"columns {first} on, 8": _columns(range(first, min(first + 8, skin.columns))) for first in firsts}
     return alone | {f"columns {first} on, all": _columns(range(first, skin.column_lines)) for first in firsts}
 
 
-def _columns(numbers: range) -> Hurt:
-    return Hurt(columns=dict.fromkeys(numbers, 0))
+def _columns(numbers: range) -> SheetFault:
+    return SheetFault(columns=dict.fromkeys(numbers, 0))
 
 
-def _selected(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"row {row}": Hurt(selected=(row,)) for row in range(skin.rows)}
+def _selected(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"row {row}": SheetFault(selected=(row,)) for row in range(skin.rows)}
 
 
-def _stuck_columns(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"column {column}": Hurt(stuck=(column,)) for column in range(skin.columns)}
+def _stuck_columns(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"column {column}": SheetFault(stuck=(column,)) for column in range(skin.columns)}
 
 
 def _cells(skin: Skin) -> list[tuple[int, int]]:
@@ -168,27 +170,27 @@ def _cells(skin: Skin) -> list[tuple[int, int]]:
     return corners + [(rows * step // 4, columns * step // 4) for step in (1, 2, 3)]
 
 
-def _closed(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"switch {cell}": Hurt(closed=(cell,)) for cell in _cells(skin)}
+def _closed(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"switch {cell}": SheetFault(closed=(cell,)) for cell in _cells(skin)}
 
 
-def _dead(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"switch {cell}": Hurt(dead=(cell,)) for cell in _cells(skin)}
+def _dead(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"switch {cell}": SheetFault(dead=(cell,)) for cell in _cells(skin)}
 
 
-def _bare(skin: Skin) -> Mapping[str, Hurt]:
+def _bare(skin: Skin) -> Mapping[str, SheetFault]:
     """Undefined levels are tried both ways."""
     return {
-        f"switch {cell}, {'released' if released else 'pressed'} wins": Hurt(bare=(cell,), pulls_win=released)
+        f"switch {cell}, {'released' if released else 'pressed'} wins": SheetFault(bare=(cell,), pulls_win=released)
         for cell in _cells(skin)
         for released in (False, True)
     }
 
 
-def _joined_rows(skin: Skin) -> Mapping[str, Hurt]:
+def _joined_rows(skin: Skin) -> Mapping[str, SheetFault]:
     """Two pins drive against each other: which level a column comes to is tried both ways."""
     return {
-        f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": Hurt(
+        f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": SheetFault(
             joined_rows=((row, row + 1),), pulls_win=released
         )
         for row in range(skin.rows - 1)
@@ -196,13 +198,14 @@ def _joined_rows(skin: Skin) -> Mapping[str, Hurt]:
     }
 
 
-def _joined_columns(skin: Skin) -> Mapping[str, Hurt]:
+def _joined_columns(skin: Skin) -> Mapping[str, SheetFault]:
     return {
-        f"columns {line} and {line + 1}": Hurt(joined_columns=((line, line + 1),)) for line in range(skin.columns - 1)
+        f"columns {line} and {line + 1}": SheetFault(joined_columns=((line, line + 1),))
+        for line in range(skin.columns - 1)
     }
 
 
-def _slow(skin: Skin) -> Mapping[str, Hurt]:
+def _slow(skin: Skin) -> Mapping[str, SheetFault]:
     """Lines of ever more capacitance, with pulls that lift them late and with a resistance that lowers them late."""
     found = {}
     for picofarad in (464, 1000, 2154, 4642):
@@ -213,12 +216,12 @@ def _slow(skin: Skin) -> Mapping[str, Hurt]:
             line = ColumnLine.of(
                 circuit.replace(line_pf=float(picofarad)), skin.row_lines, skin.column_lines, skin.diodes, most=4
             )
-            found[f"{picofarad} pF, {name}"] = Hurt(line=line)
+            found[f"{picofarad} pF, {name}"] = SheetFault(line=line)
     return found
 
 
 def _once(**what: bool) -> Places:
-    return lambda skin: {"the board": Hurt(**what)}  # type: ignore[arg-type]
+    return lambda skin: {"the board": SheetFault(**what)}  # type: ignore[arg-type]
 
 
 METER = "check with a meter before the first power-up"

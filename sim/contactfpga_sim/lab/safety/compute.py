@@ -14,7 +14,7 @@ from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
 from contactfpga_sim.lab.safety import trial
-from contactfpga_sim.lab.safety.catalogue import FAULTS, Hurt
+from contactfpga_sim.lab.safety.catalogue import FAULTS, SheetFault
 from contactfpga_sim.lab.safety.trial import Told
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.sheet.matrix import Shorts
@@ -22,7 +22,7 @@ from contactfpga_sim.model.sheet.matrix import Shorts
 SKINS = {"plain": REFERENCE, "guarded": GUARDED}
 
 PHASES = (0.03, 0.37, 0.71)
-"""Shares of a scan after whose beginning faults come, in turn: the longest time counts."""
+"""Shares of a scan after whose beginning faults come, one after the other: the longest time counts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,12 +56,12 @@ class Place:
         return tuple(dict.fromkeys(word for told in self.scenes.values() for word in told.words))
 
 
-def places(skin: Skin, fault: str) -> Iterator[tuple[str, Hurt]]:
+def places(skin: Skin, fault: str) -> Iterator[tuple[str, SheetFault]]:
     """The places of a fault on a sheet."""
     yield from FAULTS[fault].places(skin).items()
 
 
-def at(skin: Skin, hurt: Hurt, name: str = "", phase: float = PHASES[0]) -> Place:
+def at(skin: Skin, hurt: SheetFault, name: str = "", phase: float = PHASES[0]) -> Place:
     """What becomes of a fault at a place."""
     return Place(
         name, {scene: trial.run(skin, hurt, touched, phase) for scene, touched in trial.scenes(skin, hurt).items()}
@@ -94,7 +94,7 @@ def clocks(skin: Skin) -> int:
     return (1 + skin.rows + skin.columns) * slot + 2
 
 
-def told_us(hurt: Hurt, skin: Skin = TESTED) -> float | None:
+def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
     """When the pin says so, in us from power-up, with the switches pressed whose diodes are shorted; None: it does
     not."""
     cells = np.zeros((1, skin.rows, skin.columns), bool)

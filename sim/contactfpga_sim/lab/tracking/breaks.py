@@ -1,4 +1,4 @@
-"""Where ids are lost: one knob at a time, turned until a contact no longer keeps its id."""
+"""Where ids are lost: one knob at a time, moved until a contact no longer keeps its id."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ Place = tuple[float, float]
 
 
 @dataclasses.dataclass(frozen=True)
-class Shown:
+class FrameTruth:
     """A frame and what was there."""
 
     zones: Zones
@@ -159,14 +159,14 @@ def zones_of(cells: np.ndarray, time_us: int, skin: Skin = SKIN) -> tuple[Zones,
     return Zones(frame, skin.sheet, time_us), labels
 
 
-def played(fingers: Played, rate_hz: float, skin: Skin = SKIN, seconds: float = SECONDS) -> Iterator[Shown]:
+def played(fingers: Played, rate_hz: float, skin: Skin = SKIN, seconds: float = SECONDS) -> Iterator[FrameTruth]:
     """All frames of a scene."""
     for number in range(int(seconds * rate_hz)):
         now = number / rate_hz
         yield shown(fingers, now, skin)
 
 
-def shown(fingers: Played, now: float, skin: Skin = SKIN) -> Shown:
+def shown(fingers: Played, now: float, skin: Skin = SKIN) -> FrameTruth:
     """One frame. A contact that bounces is there all the time; one that lies between switches is not."""
     each = {number: finger.cells(now, skin) for number, finger in enumerate(fingers) if finger.there(now)}
     cells = np.any([np.zeros((skin.rows, skin.columns), bool), *each.values()], axis=0)
@@ -180,7 +180,7 @@ def shown(fingers: Played, now: float, skin: Skin = SKIN) -> Shown:
             several |= mine
         elif mine or fingers[number].bounces:
             truth[number] = _place(fingers, number, now)
-    return Shown(zones, truth, tuple(_middle(labels == number, skin) for number in sorted(several)))
+    return FrameTruth(zones, truth, tuple(_middle(labels == number, skin) for number in sorted(several)))
 
 
 def _place(fingers: Played, number: int, now: float) -> Place:

@@ -21,7 +21,7 @@ from contactfpga.skin import Skin
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.tracking import scenes
-from contactfpga_sim.lab.tracking.scenes import Place, Shown, zones_of
+from contactfpga_sim.lab.tracking.scenes import Place, FrameTruth, zones_of
 from contactfpga_sim.model.scenes.recordings import Recording
 
 
@@ -102,7 +102,7 @@ Judged = tuple[dict[int, Place], dict[int, Place]]
 """Truth, and what a tracker said."""
 
 
-def followed(update: Update, frames: Iterable[Shown], rate_hz: float) -> list[Judged]:
+def followed(update: Update, frames: Iterable[FrameTruth], rate_hz: float) -> list[Judged]:
     """What a tracker says of these frames, where it is judged."""
     every = max(1, round(rate_hz / JUDGED_HZ))
     found = []
@@ -148,7 +148,7 @@ def skin_of(recording: Recording) -> Skin:
     return Skin(rows=rows, columns=columns, pitch_x_mm=pitch, pitch_y_mm=pitch, settle_us=100.0)
 
 
-def histories(path: Path, every: int) -> list[list[Shown]]:
+def histories(path: Path, every: int) -> list[list[FrameTruth]]:
     """The frames of each stretch of a recording between which the scene jumps, one of ``every`` frames, with the truth
     of all of them."""
     recording = Recording.load(path)
@@ -161,7 +161,7 @@ def histories(path: Path, every: int) -> list[list[Shown]]:
     return [list(_linked(pressed[start:end], skin, step_us))[::every] for start, end in itertools.pairwise(jumps)]
 
 
-def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[Shown]:
+def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[FrameTruth]:
     """The frames, with a name for each zone."""
     linker = _Linker(frames.shape[1:])
     for number, cells in enumerate(frames):
@@ -170,7 +170,7 @@ def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[Shown]:
         for new, name in linker.take(labels).items():
             y, x = np.nonzero(labels == new)
             truth[name] = float(x.mean() * skin.pitch_x_mm), float(y.mean() * skin.pitch_y_mm)
-        yield Shown(zones, truth, ())
+        yield FrameTruth(zones, truth, ())
 
 
 class _Linker:

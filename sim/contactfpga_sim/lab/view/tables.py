@@ -81,7 +81,7 @@ class Stopwatch:
             (self._virtual, "touch", self._touch),
             (Link, "_take", self._take),
             (source, "frames", self._frames),
-            (source, "turn", self._turn),
+            (source, "poll", self._poll),
             (self._stage, "draw", self._draw),
         ]
         with contextlib.ExitStack() as stack:
@@ -108,9 +108,9 @@ class Stopwatch:
             self.times.setdefault("arrived", float(closed["arrived_s"][0]))
         return batch
 
-    def _turn(self, turn: Any) -> Any:
+    def _poll(self, poll: Any) -> Any:
         self._driver_s = 0.0
-        moment = turn()
+        moment = poll()
         if moment is not None and len(moment.zones) and "arrived" in self.times and "read" not in self.times:
             self.times |= {"read": time.time(), "driver": self._driver_s}
         return moment

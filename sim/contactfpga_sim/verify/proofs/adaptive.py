@@ -200,8 +200,8 @@ def _in_state(inside: Inside, state: int):
 
 def _highest(rows):
     """The highest of the rows, alone."""
-    turned = rows[::-1]
-    return (turned & -turned)[: len(rows)][::-1]
+    mirrored = rows[::-1]
+    return (mirrored & -mirrored)[: len(rows)][::-1]
 
 
 def _wrong_half(suspects, inside: Inside):

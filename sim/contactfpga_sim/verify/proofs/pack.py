@@ -185,10 +185,10 @@ def _in_state(inside: Inside, state: int):
 
 def _last_byte_first(byte, inside: Inside):
     dut = inside.component
-    turned = dut.items.payload.data.word_select(
+    swapped = dut.items.payload.data.word_select(
         (dut.derived.item_bytes - 1 - inside["index"])[: len(inside["index"])], 8
     )
-    return Mux(_in_state(inside, _ITEMS) & dut.items.valid & ~dut.items.payload.end, turned, byte)
+    return Mux(_in_state(inside, _ITEMS) & dut.items.valid & ~dut.items.payload.end, swapped, byte)
 
 
 def _taken_early(ready, inside: Inside):

@@ -92,7 +92,7 @@ def whole(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, but for one row and one column that are whole, see ``Lines``; and what the stages after do.
 
     Claimed: these two are never told as open. After the last row of a frame there is a check before the next frame
-    begins, and checks of columns and rows come in turn.
+    begins, and checks of columns and rows alternate.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     lines, inside, m = Lines(sheet), sheet.inside, proof.m

@@ -120,7 +120,7 @@ def pin_lemmas(tested: Tested) -> None:
 
 def shown(proof: Proof, **changes: Any) -> None:
     """Free as above. Claimed: a slot that goes out is what the pins showed in the last clock in which its line was
-    driven; it stays as it is until it is taken; and numbers come in turn."""
+    driven; it stays as it is until it is taken; and numbers come in order."""
     tested = Tested(proof, **changes)
     m, sheet, skin = proof.m, tested.sheet, tested.sheet.skin
     slots, number = sheet.dut.slots, sheet.inside["test.number"]

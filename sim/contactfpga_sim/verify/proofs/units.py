@@ -18,7 +18,7 @@ _SLOWEST = Skin(units=2, clock_hz=1_000_000, baud=250_000, settle_us=100)
 def conversions(proof: Proof, skin: Skin) -> None:
     """Free: what the converter answers.
 
-    Claimed: one conversion follows the other, of the units in turn, each with 19 clocks while the converter is selected
+    Claimed: one conversion follows the other, of the units in order, each with 19 clocks while the converter is selected
     and none while it is not, which lasts two levels. No level of the clock is shorter than it has to be, nor is the
     pause between selection and clock. Start, single-ended and channel bits are there a level before each rising edge,
     and do not change while the clock is high. A reading is what the pin was in the clock before the last twelve rising
@@ -197,8 +197,8 @@ def frames(proof: Proof, skin: Skin) -> None:
 
     Claimed: the converter's own clock has no level that is shorter than it has to be, nor has the SPI clock, nor the
     pause between selection and clock. The SPI clock runs while the converter is selected, and each selection has 240
-    clocks. A reading is what the pin was in the clocks before the last 24 falling edges, with its highest bit turned
-    over, and is there three clocks after the last one.
+    clocks. A reading is what the pin was in the clocks before the last 24 falling edges, with its highest bit
+    inverted, and is there three clocks after the last one.
     """
     m = proof.m
     dut = Ads131m08(skin)

@@ -36,10 +36,10 @@ _ROW = Bug("a row flips", DirectRows, "selected",
 
 def _bugs(scan: str) -> tuple[Bug, ...]:
     def time(bit: int) -> Bug:
-        return Bug(f"bit {bit} of the time turns", FrameClock, "time",
+        return Bug(f"bit {bit} of the time flips", FrameClock, "time",
             lambda time, inside: time ^ inside.component.request << bit)  # fmt: skip
 
-    slot = Bug("a bit of the slot's row turns", Scanner, "following",
+    slot = Bug("a bit of the slot's row flips", Scanner, "following",
         lambda rows, inside: rows ^ inside.component.request << 1)  # fmt: skip
     return (time(0), time(7), *{"raster": (slot, _ROW), "adaptive": (_ROW,), "reversal": ()}[scan])
 
