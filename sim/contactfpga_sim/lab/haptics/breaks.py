@@ -238,7 +238,8 @@ KNOBS = {
               "units on the board, which has one clock"),
         Knob("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm", SHARE,
               (12, 8, 5, 2, 0, -1, -2, -3),
-              _places(("barycenter, 5 mm", CoverageCase("barycenter", 5.0, RAMP, 0.0, 0.0)), ("set, 5 mm", CoverageCase("set", 5.0)),
+              _places(("barycenter, 5 mm", CoverageCase("barycenter", 5.0, RAMP, 0.0, 0.0)),
+                      ("set, 5 mm", CoverageCase("set", 5.0)),
                       ("closings, 5 mm", CLOSINGS), inside_mm=float),
               "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
     )

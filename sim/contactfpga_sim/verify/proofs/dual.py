@@ -82,6 +82,6 @@ _BUGS = (
 )  # fmt: skip
 CASES = (
     ProofCase("differences stop the line", "two copies, contact fail-safe",
-         partial(differences_stop_the_line, fail_safe=True), 2, _BUGS),
+              partial(differences_stop_the_line, fail_safe=True), 2, _BUGS),
     ProofCase("differences stop the line", "two copies", partial(differences_stop_the_line, fail_safe=False), 2),
 )  # fmt: skip

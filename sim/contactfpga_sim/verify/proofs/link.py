@@ -330,11 +330,11 @@ _ODOMETER_BUGS = (
 CASES = (
     ProofCase("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3, campaign=True),
     ProofCase("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
-         _BUGS, bug_clocks=40),
+              _BUGS, bug_clocks=40),
     ProofCase("the first frame is sent", "raster", partial(first_is_sent, scan="raster"), 2, _FIRST_BUGS),
     ProofCase("the first frame is sent", "adaptive", partial(first_is_sent, scan="adaptive"), 2),
     ProofCase("the first frame is sent", "line reversal", partial(first_is_sent, scan="reversal", precharge_us=1.0), 2),
     ProofCase("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
     ProofCase("digits are the counts", "epoch", partial(digits_are_the_counts, counter="epoch"), 2, _ODOMETER_BUGS,
-         bug_clocks=30),
+              bug_clocks=30),
 )  # fmt: skip

@@ -84,8 +84,8 @@ def let_go(proof: Proof) -> None:
 
     Claimed: columns are driven a clock after they shall be, but for those that are masked in every row, and those that
     are stuck: they read pressed in each sample of a window, of four that are two clocks apart and all between them. A
-    stuck column is driven throughout the first window that begins after a toggle, and then it is stuck if it read pressed
-    throughout that, too. A guard column that reads pressed in a check is not driven until a toggle.
+    stuck column is driven throughout the first window that begins after a toggle, and then it is stuck if it read
+    pressed throughout that, too. A guard column that reads pressed in a check is not driven until a toggle.
     """
     m = proof.m
     skin = reversal_of("col2row").replace(columns=3, guard=True)
@@ -154,8 +154,8 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
     Claimed: the columns that are driven are those that the rule above leaves; a sample is what they read two clocks
-    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16 toggles
-    at least every 2^16 us. Column 1 is never driven.
+    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16
+    toggles at least every 2^16 us. Column 1 is never driven.
     """
     m, skin = proof.m, dut.skin
     inside = proof.put(dut)
@@ -261,12 +261,13 @@ _REVERSAL_BUGS = (
     Bug("driven on", ReversalScanner, "pins__columns_drive", lambda columns, inside: columns | inside["cycle.due"][0]),
 )  # fmt: skip
 CASES = (
-    ProofCase("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2, _RASTER_BUGS, 24),
+    ProofCase("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2,
+              _RASTER_BUGS, 24),
     ProofCase("columns and rows apart", "raster, 3 rows, row2col", partial(raster, diodes="row2col"), 2),
     ProofCase("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS, 30),
     ProofCase("a column that reads pressed for 8 clocks is driven on", "3 columns", kept, 2, _KEPT_BUGS, 80),
     ProofCase("a stuck column is let go", "raster, 3x2",
-         lambda proof: column_let_go(proof, Scanner(raster_of("col2row"))), 2, _STUCK_BUGS, 40),
+              lambda proof: column_let_go(proof, Scanner(raster_of("col2row"))), 2, _STUCK_BUGS, 40),
     ProofCase("a stuck column is let go", "reversal, 2x2",
-         lambda proof: column_let_go(proof, ReversalScanner(reversal_of("row2col"))), 2, _REVERSAL_BUGS),
+              lambda proof: column_let_go(proof, ReversalScanner(reversal_of("row2col"))), 2, _REVERSAL_BUGS),
 )  # fmt: skip

@@ -208,14 +208,14 @@ CASES = (
     _case(3, 4, 9, rows=2, closed=True, campaign=True),
     *(
         ProofCase("rows find the zones", f"3x3, {connectivity}-connected, closed",
-             partial(rows_find_the_zones, rows=3, columns=3, connectivity=connectivity, closed=True), 1,
-             bounded=True, campaign=True)
+                  partial(rows_find_the_zones, rows=3, columns=3, connectivity=connectivity, closed=True), 1,
+                  bounded=True, campaign=True)
         for connectivity in (8, 4)
     ),
     *(
         ProofCase("rows find the zones", f"{rows}x{columns}, {connectivity}-connected",
-             partial(rows_find_the_zones, rows=rows, columns=columns, connectivity=connectivity), 1, bugs,
-             bug_clocks=1, bounded=True, campaign=columns == 4)
+                  partial(rows_find_the_zones, rows=rows, columns=columns, connectivity=connectivity), 1, bugs,
+                  bug_clocks=1, bounded=True, campaign=columns == 4)
         for rows, columns, bugs in ((3, 3, _SPECIFICATION_BUGS), (3, 4, ()))
         for connectivity in (8, 4)
     ),

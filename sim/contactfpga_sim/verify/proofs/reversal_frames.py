@@ -230,10 +230,10 @@ _CELLS_BUGS = (
 )  # fmt: skip
 CASES = (
     ProofCase("frames of a line reversal", "3x2, col2row",
-         partial(frames, rows=3, columns=2, diodes="col2row", mask=((1, 0),)), 2, _FRAME_BUGS, 30),
+              partial(frames, rows=3, columns=2, diodes="col2row", mask=((1, 0),)), 2, _FRAME_BUGS, 30),
     ProofCase("frames of a line reversal", "3x2, row2col, debounced",
-         partial(frames, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
+              partial(frames, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
     ProofCase("frames of a line reversal", "8x2", partial(frames, rows=8, columns=2), 2),
     ProofCase("frames of a line reversal", "3x2, cells",
-         partial(frames, rows=3, columns=2, diodes="row2col", report="cells"), 2, _CELLS_BUGS, 30),
+              partial(frames, rows=3, columns=2, diodes="row2col", report="cells"), 2, _CELLS_BUGS, 30),
 )  # fmt: skip

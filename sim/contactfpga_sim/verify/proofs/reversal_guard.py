@@ -168,7 +168,7 @@ _WHOLE_BUGS = (
 CASES = (
     ProofCase("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
     ProofCase("pins never meet", "2x1, guard lines, row2col, shortest times",
-         partial(pins, rows=2, columns=1, diodes="row2col", **SHORT), 2),
+              partial(pins, rows=2, columns=1, diodes="row2col", **SHORT), 2),
     ProofCase("whole lines are not told", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
     ProofCase("whole lines are not told", "2x1, row2col, shortest times, debounced",
          partial(whole, rows=2, columns=1, diodes="row2col", debounce="sym_defer_pk", **SHORT), 2, _WHOLE_BUGS, 40),

@@ -110,9 +110,9 @@ _CLOSED_BUGS = (
 )  # fmt: skip
 CASES = (
     ProofCase("a closed switch is reported", "3x2, col2row",
-         partial(closed, rows=3, columns=2, diodes="col2row", mask=((1, 0),), project_us=1), 2, _CLOSED_BUGS, 24),
+              partial(closed, rows=3, columns=2, diodes="col2row", mask=((1, 0),), project_us=1), 2, _CLOSED_BUGS, 24),
     ProofCase("a closed switch is reported", "3x2, row2col, debounced",
-         partial(closed, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
+              partial(closed, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
     ProofCase("a closed switch is reported", "2x3, cells", partial(closed, rows=2, columns=3, report="cells"), 2),
     ProofCase("a closed switch is reported", "8x4", partial(closed, rows=8, columns=4), 2),
 )  # fmt: skip

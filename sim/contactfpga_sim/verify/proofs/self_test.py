@@ -183,6 +183,6 @@ _SHOWN_BUGS = (
 CASES = (
     ProofCase("one line is driven alone", "2x2, col2row", partial(one_line, rows=2, columns=2), 2, _BUGS, 30),
     ProofCase("one line is driven alone", "2x1, row2col, shortest times",
-         partial(one_line, rows=2, columns=1, diodes="row2col", **SHORT), 2),
+              partial(one_line, rows=2, columns=1, diodes="row2col", **SHORT), 2),
     ProofCase("slots are what the pins showed", "2x2", partial(shown, rows=2, columns=2, **SHORT), 2, _SHOWN_BUGS, 40),
 )  # fmt: skip

@@ -296,13 +296,13 @@ _DIVIDE_BUGS = (
 )  # fmt: skip
 CASES = (
     ProofCase("debounce hands on each row", "3 columns, sym_defer_pk", partial(debounce, method="sym_defer_pk"), 10,
-         _DEBOUNCE_BUGS, bug_clocks=20),
+              _DEBOUNCE_BUGS, bug_clocks=20),
     ProofCase("audit passes each record", "4 columns, 2 zones", audit, 2, _AUDIT_BUGS),
     ProofCase("bitmap passes each row", "3x4", bitmap, 2, _BITMAP_BUGS),
     ProofCase("backlog keeps each item", "4 items", partial(backlog, depth=4), 3, _BACKLOG_BUGS, bug_clocks=14),
     ProofCase("backlog keeps each item", "16 items", partial(backlog, depth=16), 3),
     *(
     ProofCase("zones are divided", f"{rows}x{columns}, {bits} fraction bit{'s' * (bits != 1)}",
-         partial(zones_are_divided, rows=rows, columns=columns, bits=bits), 2, bugs, bug_clocks=16)
+              partial(zones_are_divided, rows=rows, columns=columns, bits=bits), 2, bugs, bug_clocks=16)
     for rows, columns, bits, bugs in ((3, 4, 2, _DIVIDE_BUGS), (2, 2, 1, ()), (5, 1, 0, ()))),
 )  # fmt: skip

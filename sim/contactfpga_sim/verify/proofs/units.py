@@ -18,7 +18,7 @@ _SLOWEST = Skin(units=2, clock_hz=1_000_000, baud=250_000, settle_us=100)
 def conversions(proof: Proof, skin: Skin) -> None:
     """Free: what the converter answers.
 
-    Claimed: one conversion follows the other, of the units in order, each with 19 clocks while the converter is selected
+    Claimed: one conversion follows the other, of unit after unit, each with 19 clocks while the converter is selected
     and none while it is not, which lasts two levels. No level of the clock is shorter than it has to be, nor is the
     pause between selection and clock. Start, single-ended and channel bits are there a level before each rising edge,
     and do not change while the clock is high. A reading is what the pin was in the clock before the last twelve rising
