@@ -11,8 +11,8 @@ from contactfpga_sim.model.board import native
 from contactfpga_sim.model.board.compiled import model_of
 from contactfpga_sim.model.sheet.matrix import Contention
 from contactfpga_sim.verify.cosim.compare import Mismatch
-from contactfpga_sim.verify.netlist import both_ways, extract
-from contactfpga_sim.verify.netlist.both_ways import WrongPins
+from contactfpga_sim.verify.netlist import extract
+from contactfpga_sim.verify.netlist.extract import WrongPins
 from contactfpga_sim.verify.netlist.replay import RUNS, replay, stimulus
 
 SKIN = Skin(rows=2, columns=1, scan="reversal", precharge_us=0.25)
@@ -62,7 +62,7 @@ def flat(text: str) -> str:
 
 
 def test_lines_of_an_unpacked_bitstream():
-    text = both_ways.of_icebox(ICEBOX, SKIN)
+    text = extract.of_icebox(ICEBOX, SKIN)
     assert "input columns_0__io, output columns_0__o, output columns_0__oe" in text
     assert r"input [1:0] \rows_0__io , output [1:0] rows_0__o, output [1:0] rows_0__oe" in text
     for told in (
@@ -81,14 +81,14 @@ def test_lines_of_an_unpacked_bitstream():
 def test_a_port_of_an_unpacked_bitstream_with_a_line_that_is_never_read():
     chip = ICEBOX.replace(r"inout [1:0] \rows", r"output [1:0] \rows")
     chip = chip.replace(r"tran(\rows_0__io [0], \rows_0__io[0] );", r"assign \rows_0__io [0] = \rows_0__io[0] ;")
-    text = both_ways.of_icebox(chip, SKIN)
+    text = extract.of_icebox(chip, SKIN)
     assert r"input [1:0] \rows_0__io , output [1:0] rows_0__o" in text
     assert r"assign \rows_0__io[0]  = \rows_0__io [0];" in text, "what is read comes from outside"
     assert "assign rows_0__o[0] = n6;" in text
 
 
 def test_lines_of_a_synthesized_netlist():
-    text = flat(both_ways.of_ecp5(ECP5, SKIN))
+    text = flat(extract.of_ecp5(ECP5, SKIN))
     assert (
         "module contactfpga(tx, rows_0__io, rows_0__o, rows_0__oe, columns_0__io, columns_0__o, columns_0__oe);" in text
     )
@@ -99,7 +99,7 @@ def test_lines_of_a_synthesized_netlist():
     assert "TRELLIS_IO" not in text
 
 
-@pytest.mark.parametrize(("part", "text"), [(both_ways.of_icebox, ICEBOX), (both_ways.of_ecp5, ECP5)])
+@pytest.mark.parametrize(("part", "text"), [(extract.of_icebox, ICEBOX), (extract.of_ecp5, ECP5)])
 def test_a_line_without_a_buffer_of_its_own_is_refused(part, text):
     with pytest.raises(WrongPins, match="expected is one"):
         part(text, SKIN.replace(rows=3))
@@ -110,21 +110,21 @@ def test_a_line_without_a_buffer_of_its_own_is_refused(part, text):
 @pytest.mark.parametrize("text", [ICEBOX, ECP5])
 def test_pins_of_other_scans_stay_as_they_are(text):
     skin = Skin(rows=2, columns=1, settle_us=20.0)
-    assert both_ways.of_icebox(text, skin) == both_ways.of_ecp5(text, skin) == text
-    assert both_ways.wrapper(skin) == ({}, "")
+    assert extract.of_icebox(text, skin) == extract.of_ecp5(text, skin) == text
+    assert extract.wrapper(skin) == ({}, "")
 
 
 @pytest.mark.parametrize(("diodes", "driven"), [("col2row", "& columns_o"), ("row2col", "& ~columns_o")])
 def test_a_column_that_is_driven_to_the_wrong_level_is_not_driven_right(diodes, driven):
-    assert f"assign columns_drive = columns_oe {driven};" in both_ways.wrapper(SKIN.replace(diodes=diodes))[1]
+    assert f"assign columns_drive = columns_oe {driven};" in extract.wrapper(SKIN.replace(diodes=diodes))[1]
 
 
 def test_columns_that_are_driven_both_ways_have_the_level_of_the_first_one_and_the_guard_column_the_other():
     skin = SKIN.replace(columns=3, self_test=True)
-    text = both_ways.wrapper(skin)[1]
+    text = extract.wrapper(skin)[1]
     assert "assign columns_level = columns_o[0];" in text
     assert "assign columns_drive = columns_oe & ~(columns_o ^ {3{columns_level}});" in text
-    text = both_ways.wrapper(skin.replace(guard=True))[1]
+    text = extract.wrapper(skin.replace(guard=True))[1]
     assert "assign columns_drive = columns_oe & ~(columns_o ^ {~columns_level, {3{columns_level}}});" in text
 
 

@@ -8,9 +8,9 @@ import pytest
 from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, patterns, phases
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
-from contactfpga_sim.model.sheet import agreement, spice
+from contactfpga_sim.model.sheet import agreement
 
-pytestmark = pytest.mark.skipif(not spice.installed(), reason="ngspice is not installed")
+pytestmark = pytest.mark.skipif(not agreement.installed(), reason="ngspice is not installed")
 
 WITHIN = 0.05
 """Of a time."""
@@ -40,7 +40,7 @@ def test_a_model_without_the_diodes_charge_is_told_apart():
     bald = Circuit(diode=dataclasses.replace(SCHOTTKY, junction_pf=0.0))
     phase = phases.settle(Network(plain, patterns.named(8, 8)["all"]), Levels.of(plain))
     wrong = phases.settle(Network(bald, patterns.named(8, 8)["all"]), Levels.of(bald))
-    seconds, volts = spice.run(phase, 1e-6)
+    seconds, volts = agreement.run(phase, 1e-6)
     assert abs(phases.passed(wrong).seconds / phase.arrived(seconds, volts).max() - 1) > WITHIN
 
 
@@ -49,7 +49,7 @@ def test_a_bare_switch_conducts_both_ways():
     bare = patterns.named(4, 4)["one column but a cell"]
     circuit = Circuit(column_pull_ohm=10_000.0)
     phase = phases.settle(Network(circuit, pressed, bare), Levels.of(circuit))
-    _, volts = spice.run(phase, 20e-6)
+    _, volts = agreement.run(phase, 20e-6)
     assert volts[-1] == pytest.approx(phases.rest_volts(phase), abs=2e-3)
 
 

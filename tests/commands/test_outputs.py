@@ -9,7 +9,7 @@ from every_command import called, leaves, options
 from contactfpga.tools import cli
 from contactfpga.tools.console import outputs
 from contactfpga_sim.lab import pool
-from contactfpga_sim.lab.arm import latency_charts, sweep
+from contactfpga_sim.lab.arm import pictures, sweep
 
 
 @pytest.fixture
@@ -67,8 +67,8 @@ def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
     def refused(*_):
         raise OSError(28, "No space left on device")
 
-    point = sweep.Point(1.0, 1.0, 1.0, 1.0, 1.0)
-    monkeypatch.setattr(latency_charts, "draw", refused)
+    point = sweep.SweepPoint(1.0, 1.0, 1.0, 1.0, 1.0)
+    monkeypatch.setattr(pictures, "draw", refused)
     monkeypatch.setattr(sweep, "sweep", lambda tasks, *_: [point] * len(tasks))
     assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 1
     said = capsys.readouterr()
@@ -78,12 +78,12 @@ def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
 
 
 def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsys):
-    from contactfpga_sim.lab.arm import report, run_pictures
+    from contactfpga_sim.lab.arm import report
 
     def refused(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(run_pictures, "pictures", refused)
+    monkeypatch.setattr(pictures, "pictures", refused)
     monkeypatch.setattr(report, "columns", lambda *_: {})
     monkeypatch.setattr(report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
     assert cli.main(["study", "arm", "--output", str(tmp_path)]) == 1

@@ -13,8 +13,8 @@ from contactfpga.driver.clock import PIECE_S, USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga_sim.lab.clock import compute, tables
-from contactfpga_sim.lab.clock.compute import PATHS, accuracy, followed, moments
+from contactfpga_sim.lab.clock import tables
+from contactfpga_sim.lab.clock.tables import PATHS, accuracy, followed, moments
 
 SKIN = contactfpga.Skin()
 QUIET = dataclasses.replace(PATHS["usb_125us"], rate_hz=200.0)
@@ -199,8 +199,8 @@ def test_the_simulated_board_is_on_its_own_clock():
 
 def test_paths_are_worse_than_none_by_what_they_say():
     """The simulation itself: mean delays as their ticks and jitter have them."""
-    path = compute.Path("x", 1e-3, 1e-3, 1e-4, rate_hz=331.0)
+    path = tables.Path("x", 1e-3, 1e-3, 1e-4, rate_hz=331.0)
     frames = list(moments(path, 0.0, 1, 10.0))
     mean = np.mean([moment.arrived_s - moment.sampled_s for moment in frames])
-    assert mean == pytest.approx(compute.SENT_S + 0.5e-3 + 1e-4, rel=0.1)
+    assert mean == pytest.approx(tables.SENT_S + 0.5e-3 + 1e-4, rel=0.1)
     assert USUAL_PPM < 200

@@ -16,8 +16,8 @@ from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import command, request
+from contactfpga_sim.model.sheet.matrix import Shorts
 from contactfpga_sim.model.sheet.shift import SheetAtPins
-from contactfpga_sim.model.sheet.shorts import Shorts
 from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare
 

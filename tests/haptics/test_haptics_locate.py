@@ -25,7 +25,7 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.haptics import coverage
 
-QUIET = coverage.Case("closings", 5.0, coverage.RAMP, 0.0, 0.0)
+QUIET = coverage.CoverageCase("closings", 5.0, coverage.RAMP, 0.0, 0.0)
 
 
 def named(case):

@@ -7,8 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga_sim.verify.proofs import upset
 from contactfpga_sim.verify.proofs.__main__ import CASES, main
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case, prove, search
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase, prove, search
 
 LONG_S = 7000
 LONG = {
@@ -158,7 +157,7 @@ def test_time_that_runs_out_is_open():
 
 
 def test_a_planted_bug_is_found_and_gone_afterwards():
-    case = Case("counts", "to 5", counts, 3)
+    case = ProofCase("counts", "to 5", counts, 3)
     bug = Bug("one too far", Counter, "count", lambda count, inside: Mux(inside["count"] == 5, 6, count))
     assert case.run_with(bug).outcome == "counterexample"
     assert case.run().outcome == "proved"

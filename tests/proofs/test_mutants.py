@@ -13,7 +13,7 @@ from contactfpga_sim.model.golden import Timeline, units
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import heard
 from contactfpga_sim.verify.cosim.compare import Mismatch
-from contactfpga_sim.verify.mutants import aig, campaign, netlist, proof, sheets, stimuli, trial
+from contactfpga_sim.verify.mutants import aig, campaign, netlist, proof, sheets, stimuli
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
@@ -138,10 +138,10 @@ def test_an_untouched_sheet_leaves_more_mutants_than_a_touched_one(sample):
 def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
     model = netlist.model(sample.skin, sample.mutants)
     stimulus = next(stimuli.quick(sample.skin))
-    with CompiledBoard(sample.skin, trial.OBSERVED, model) as board:
-        assert len(trial.expected(board, stimulus)["bytes"]) > 100
-    with CompiledBoard(sample.skin.replace(settle_us=31.0), trial.OBSERVED, model) as board, pytest.raises(Mismatch):
-        trial.expected(board, stimulus)
+    with CompiledBoard(sample.skin, campaign.OBSERVED, model) as board:
+        assert len(campaign.expected(board, stimulus)["bytes"]) > 100
+    with CompiledBoard(sample.skin.replace(settle_us=31.0), campaign.OBSERVED, model) as board, pytest.raises(Mismatch):
+        campaign.expected(board, stimulus)
 
 
 @pytest.mark.campaign

@@ -15,8 +15,7 @@ from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes import scene as scenes
 from contactfpga_sim.model.scenes.contacts import Contact
 from contactfpga_sim.model.scenes.families import placements
-from contactfpga_sim.model.scenes.file import SceneFile
-from contactfpga_sim.model.scenes.placing import scene_of
+from contactfpga_sim.model.scenes.file import SceneFile, scene_of
 from contactfpga_sim.model.scenes.scene import Scene
 
 FOREARM = Skin.load(examples() / "forearm.toml")

@@ -11,8 +11,7 @@ from scipy.spatial.distance import cdist
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import M, Track
-from contactfpga_sim.model.scenes.file import Range, SceneFile, SceneFileError
-from contactfpga_sim.model.scenes.placing import distance_mm, scene_of
+from contactfpga_sim.model.scenes.file import Range, SceneFile, SceneFileError, distance_mm, scene_of
 
 ROOT = Path(__file__).resolve().parents[2]
 SHEETS = [Skin(rows=200 // pitch, columns=200 // pitch, pitch_x_mm=pitch, pitch_y_mm=pitch) for pitch in (10, 20, 25)]

@@ -12,9 +12,8 @@ from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.sheet.levels import at_rest
 from contactfpga_sim.model.sheet.line import ColumnLine, RowLine, lines_of
-from contactfpga_sim.model.sheet.wiring import Wiring
+from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
 
 SIZE = 3
 PATTERNS = (np.arange(1 << SIZE * SIZE)[:, None] >> np.arange(SIZE * SIZE) & 1).astype(bool).reshape(-1, SIZE, SIZE)

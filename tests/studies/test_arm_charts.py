@@ -14,11 +14,13 @@ from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept, registry
-from contactfpga_sim.lab.arm import latency_charts, sweep
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.arm import pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.sweep import Task
+from contactfpga_sim.lab.arm.sweep import SweepTask
+from contactfpga_sim.lab.registry import StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
 PAPER = Case.load("paper")
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
@@ -55,7 +57,7 @@ def test_the_bounds_hold_for_what_the_gateware_takes(nothing_kept):
 
 def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
     case = sweep.unlimited(PAPER).but(link={"speed_m_s": 0.4})
-    point = sweep.Point(**sweep.work(Task(case, latency_s=6e-3, thickness=True)))
+    point = sweep.SweepPoint(**sweep.work(SweepTask(case, latency_s=6e-3, thickness=True)))
     for less, flat in ((0.0, False), (2 * sweep.RESOLUTION_M, True)):
         thick = case.but(foam={"thickness_m": point.thickness_m - less}, run={"step_s": 25e-6, "duration_s": 0.05})
         assert run(thick, "latency", latency_s=6e-3).outcome.bottomed == flat
@@ -64,9 +66,9 @@ def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
 
 @pytest.mark.slow
 def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeypatch, capsys):
-    few = latency_charts.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
+    few = pictures.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
     few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force}, thick={})
-    monkeypatch.setattr(latency_charts, "plan", lambda case: few)
+    monkeypatch.setattr(pictures, "plan", lambda case: few)
     assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     ends = [f"{name}.{end}" for name in ("arm-force", "arm-speed", "arm-thickness") for end in ("png", "svg")]
@@ -81,13 +83,13 @@ def test_charts_of_an_arm_at_rest_are_refused(capsys):
 
 def test_the_arm_needs_no_more_than_the_simulation():
     arm = "contactfpga_sim.lab.arm"
-    code = f"import sys, contactfpga.tools.cli, {arm}.latency_charts; sys.exit('scipy' in sys.modules)"
+    code = f"import sys, contactfpga.tools.cli, {arm}.pictures; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 @pytest.mark.slow
 def test_charts_of_a_few_points(nothing_kept, tmp_path):
-    tasks = latency_charts.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
+    tasks = pictures.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
     few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]}, thick={0.23: tasks.thick[0.23][1:]})
     steps = []
     with ThreadPoolExecutor(2) as workers:
@@ -102,13 +104,13 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
     slow, fast = (found[task] for task in few.speed["6 ms"])
     assert slow.peak_force_n < fast.peak_force_n == pytest.approx(at.peak_force_n)
     drawn = dataclasses.replace(few, sheet={"uart": few.force[:1], "pin": few.force[:1]})
-    paths = latency_charts.draw(PAPER, drawn, found, tmp_path, ("svg",))
+    paths = pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))
     assert [path.name for path in paths] == ["arm-force.svg", "arm-speed.svg", "arm-thickness.svg"]
     texts = [path.read_text() for path in paths]
     assert all("<svg" in text for text in texts)
     assert "paper, 12 N" in texts[0]
-    assert latency_charts.draw(PAPER, drawn, found, tmp_path, ("svg",))[0].read_text() == texts[0]
-    text = latency_charts.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
+    assert pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))[0].read_text() == texts[0]
+    text = pictures.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
     lines = list(csv.DictReader(text.splitlines()))
     assert len(lines) == len(found)
     assert float(lines[1]["peak_force_n"]) == pytest.approx(at.peak_force_n, rel=1e-5)
@@ -117,7 +119,7 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_the_page_and_its_pictures_are_what_the_study_makes(tmp_path):
-    run = registry.StudyRun(registry.load("arm"))
+    run = StudyRun(STUDIES["arm"])
     assert {name: run.text(name) for name in run.study.sections} == {
         name: section("arm.md", name) for name in run.study.sections
     }

@@ -12,8 +12,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.latency import latency_s
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.usb import Chip
-from contactfpga_sim.lab.arm.world import Faults
+from contactfpga_sim.lab.arm.world import Chip, Faults
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, predict
 

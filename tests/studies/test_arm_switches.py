@@ -9,7 +9,7 @@ import pytest
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.parts import Touch
-from contactfpga_sim.lab.arm.switches import Switches
+from contactfpga_sim.lab.arm.world import Switches
 
 PAPER = Case.load("paper")
 SKIN = Skin(rows=12, columns=14, pitch_y_mm=8.0)

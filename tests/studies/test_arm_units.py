@@ -10,7 +10,7 @@ from contactfpga.tools import cli
 from contactfpga_sim.lab.arm import report
 from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.run import WITH_UNITS, run
-from contactfpga_sim.lab.arm.under import THRESHOLD_N, Under
+from contactfpga_sim.lab.arm.world import THRESHOLD_N, UnitsUnderSheet
 
 PAPER = Case.load("paper").but(run={"duration_s": 0.03})
 HALFWAY = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))
@@ -18,7 +18,7 @@ PAGE = (Path(__file__).resolve().parents[2] / "docs" / "arm.md").read_text(encod
 
 
 def test_units_share_a_push_by_its_place():
-    read = Under(HALFWAY, WITH_UNITS).readings([30.0])
+    read = UnitsUnderSheet(HALFWAY, WITH_UNITS).readings([30.0])
     assert sum(read) - 3000 == pytest.approx(30.0 / 0.02, abs=40)
     top, left, right = (one - 1000 for one in read)
     assert (75 * top - 37.5 * (left + right)) * 0.02 / 30 == pytest.approx(85 - 75, abs=1.5)  # mm from the middle

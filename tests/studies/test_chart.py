@@ -17,17 +17,7 @@ from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
 from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import (
-    compute,
-    errors,
-    front_picture,
-    host,
-    numbers,
-    picture,
-    speed,
-    steady,
-    tables,
-)
+from contactfpga_sim.lab.chart import compute, errors, front_picture, host, numbers, picture, speed, tables
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
 from contactfpga_sim.lab.chart.errors import Blob, Interval
 from contactfpga_sim.lab.chart.methods import EXTENT_MM, METHODS
@@ -147,7 +137,7 @@ def test_a_frame_of_an_adaptive_scan_takes_at_most_2_percent_more_than_the_bound
             continue
         _, size = speed.touch(skin, cells, 0.3)
         bound = (int(cells.any(axis=1).sum()) + 1) * skin.derived.row_clocks + size * 10 * skin.derived.bit_clocks
-        over.append(steady.frame_clocks(skin, cells, size) / bound - 1)
+        over.append(speed.frame_clocks(skin, cells, size) / bound - 1)
     assert min(over) > 0
     assert max(over) <= 0.02
     record_property("worst", f"{100 * max(over):.2f} %")
@@ -159,8 +149,8 @@ def test_a_steady_frame_takes_its_scan_and_its_bytes():
     cells = np.zeros((8, 8), bool)
     cells[7, 7] = True
     _, size = speed.touch(SMALL, cells, 0.1)
-    assert steady.frame_clocks(SMALL, cells, size) == 8 * 72 - 12 + 22 + size * 10 * 4
-    assert steady.frames_per_second(SMALL, cells, size) == pytest.approx(12e6 / max(8 * 72, size * 10 * 4), rel=0.01)
+    assert speed.frame_clocks(SMALL, cells, size) == 8 * 72 - 12 + 22 + size * 10 * 4
+    assert speed.frames_per_second(SMALL, cells, size) == pytest.approx(12e6 / max(8 * 72, size * 10 * 4), rel=0.01)
 
 
 def test_the_host_finds_the_zones_that_the_board_finds():

@@ -12,10 +12,11 @@ from study_pages import outdated, section
 from contactfpga.design.cover import Ball
 from contactfpga.design.cover.sense import LADDER
 from contactfpga.design.cover.task import FOAMS
-from contactfpga_sim.lab import registry
-from contactfpga_sim.lab.cover import formulas, paper, pictures, tables
+from contactfpga_sim.lab.cover import formulas, pictures, tables
+from contactfpga_sim.lab.registry import StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
-RUN = registry.StudyRun(registry.load("cover"))
+RUN = StudyRun(STUDIES["cover"])
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cover.md").read_text(encoding="utf-8")
 
@@ -76,7 +77,7 @@ def test_the_reference_has_no_error_and_the_half_space_has():
 
 
 def test_every_line_of_the_papers_table_has_a_verdict():
-    rows = paper.rows()
+    rows = tables.rows()
     assert len(rows) == 20
     assert all(row.printed and row.ours and row.verdict for row in rows)
     text = tables.paper_table()

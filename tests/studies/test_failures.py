@@ -16,7 +16,7 @@ from zone_oracles import zones_by_image_tools
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab.failures import electric, knob_pictures, line, shapes, tables, touch
+from contactfpga_sim.lab.failures import electric, knob_pictures, line, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.failures.line import Line
@@ -211,7 +211,7 @@ def test_the_page_and_its_pictures_are_up_to_date(turned):
 
 def test_the_arm_winds_without_touching_itself_or_the_finger():
     for quarters in range(12):
-        cells = shapes.arm(16, quarters)
+        cells = touch.arm(16, quarters)
         tips = (ndimage.convolve(cells.astype(int), np.ones((3, 3), int), mode="constant") * cells) == 2
         assert ndimage.label(cells, np.ones((3, 3)))[1] == 1
         assert tips.sum() == (2 if quarters else 0)  # a line with two ends

@@ -8,12 +8,11 @@ from study_pages import outdated, section
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
-from contactfpga_sim.lab.safety import compute, start, tables, trial
-from contactfpga_sim.lab.safety.catalogue import FAULTS
+from contactfpga_sim.lab.safety import compute, tables, trial
+from contactfpga_sim.lab.safety.catalogue import FAULTS, SheetFault
 from contactfpga_sim.lab.safety.compute import Place
-from contactfpga_sim.lab.safety.hurt import Hurt
 from contactfpga_sim.lab.safety.trial import Told
-from contactfpga_sim.model.sheet import guards
+from contactfpga_sim.model.sheet import wiring
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
@@ -59,7 +58,7 @@ def test_what_no_line_can_show_is_not_told(fault):
 
 
 def test_a_whole_sheet_is_right_and_tells_nothing():
-    place = compute.at(GUARDED, Hurt())
+    place = compute.at(GUARDED, SheetFault())
     assert not place.harmful
     assert [place.us(by) for by in ("flags", "deadline", "alive", "contact")] == [None] * 4
     assert place.wrong == 0
@@ -85,7 +84,7 @@ def test_two_pins_that_fight_are_told_where_the_column_reads_released():
 def test_each_fault_has_places_that_differ(fault):
     hurts = FAULTS[fault].places(GUARDED)
     assert hurts
-    assert all(hurt != Hurt() for hurt in hurts.values())
+    assert all(hurt != SheetFault() for hurt in hurts.values())
     assert len({repr(hurt) for hurt in hurts.values()}) == len(hurts)
 
 
@@ -98,14 +97,14 @@ def test_every_line_is_cut_at_both_ends():
 
 def test_guard_switches_surround_the_cells_and_their_corner_is_open():
     cells = np.eye(2, 3, dtype=bool)
-    sheet = guards.extended(cells)
+    sheet = wiring.extended(cells)
     assert sheet.tolist() == [
         [True, False, False, True],
         [False, True, False, True],
         [True, True, True, False],
     ]
     sheet[1, 3] = sheet[2, 0] = False
-    assert guards.missed(sheet) == ({1: 3}, {0: 2})
+    assert wiring.missed(sheet) == ({1: 3}, {0: 2})
 
 
 # ---- what is made of it
@@ -131,7 +130,7 @@ def test_coverage_counts_faults_that_are_told_at_every_place(monkeypatch):
     )
     halves = {"broken row": (tells, tells), "broken column": (tells, says_nothing)}
     monkeypatch.setattr(compute, "found", lambda skin, fault: halves.get(fault, (says_nothing,)))
-    monkeypatch.setattr(start, "found", lambda fault: {})
+    monkeypatch.setattr(compute, "times_at_start", lambda fault: {})
     lines = tables.coverage_table().splitlines()[2:]
     listed, places = len(FAULTS), len(FAULTS) + 2
     assert lines[0] == f"| none | 1 of {listed} | {100 / listed:.0f} % | 3 of {places} |"
@@ -156,8 +155,8 @@ def test_the_page_is_up_to_date():
 @pytest.mark.campaign
 @pytest.mark.parametrize("fault", ["shorted diode", "shorted rows", "shorted columns"])
 def test_a_self_test_at_power_up_tells_joined_lines_and_shorted_diodes(fault):
-    times = list(start.found(fault).values())
+    times = list(compute.times_at_start(fault).values())
     assert len(times) > 10
     assert None not in times
-    assert max(times) < start.clocks(start.TESTED) / start.TESTED.derived.clocks_per_us < 100
-    assert start.told_us(Hurt()) is None
+    assert max(times) < compute.clocks(compute.TESTED) / compute.TESTED.derived.clocks_per_us < 100
+    assert compute.told_us(SheetFault()) is None

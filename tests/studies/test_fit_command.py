@@ -14,12 +14,12 @@ from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import registry, size
+from contactfpga_sim.lab import size
 from contactfpga_sim.lab.fit import cost, search, tables
-from contactfpga_sim.lab.fit.goals import Goals
 from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import Task
+from contactfpga_sim.lab.fit.trial import FitTask, Goals
 from contactfpga_sim.lab.performance import scans
+from contactfpga_sim.lab.studies import STUDIES
 
 pytestmark = pytest.mark.usefixtures("alone")
 
@@ -119,7 +119,7 @@ def test_a_recording_of_few_frames_is_refused(tmp_path, capsys):
     assert "few.npy has 3 frames; two to choose with and two to report are the least" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", registry.load("fit").sections)
+@pytest.mark.parametrize("name", STUDIES["fit"].sections)
 def test_the_page_shows_what_the_examples_say(name):
     text = section("fit.md", name)
     command = text.partition("\n")[0].strip()
@@ -146,7 +146,7 @@ def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
 
 @pytest.mark.campaign
 @pytest.mark.timeout(7200)
-@pytest.mark.parametrize("name", registry.load("fit").sections)
+@pytest.mark.parametrize("name", STUDIES["fit"].sections)
 def test_the_page_is_up_to_date(name, monkeypatch):
     monkeypatch.undo()  # what was synthesized before is kept
     assert not outdated("fit", name)
@@ -179,6 +179,6 @@ def test_real_contacts_need_an_exact_labeller(shortcuts):
 def test_dataclasses_of_a_task_can_be_sent_to_another_process(file):
     import pickle
 
-    task = Task((source(file(HANDS)), source("moving")), ("a", "b"), Skin(), Goals(), 10)
+    task = FitTask((source(file(HANDS)), source("moving")), ("a", "b"), Skin(), Goals(), 10)
     assert pickle.loads(pickle.dumps(task)) == task
     assert dataclasses.replace(task, count=11) != task

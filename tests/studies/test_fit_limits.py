@@ -13,8 +13,8 @@ from contactfpga_sim.lab.chart.errors import Interval, interval
 from contactfpga_sim.lab.chart.speed import Speed
 from contactfpga_sim.lab.fit import cost, search
 from contactfpga_sim.lab.fit.candidates import METHODS, candidates, pitches_for, size_for
-from contactfpga_sim.lab.fit.goals import Goals, Measured
 from contactfpga_sim.lab.fit.sources import source
+from contactfpga_sim.lab.fit.trial import Goals, Measurement
 
 pytestmark = pytest.mark.usefixtures("alone")
 
@@ -68,7 +68,7 @@ def test_nothing_that_meets_the_limits_gives_the_nearest(file, shortcuts):
 
 def measured(**errors):
     usual = {name: Interval(0.0, 0.0, 0.0, 100) for name in ("miscounted", "missed", "barycenter_mm", "area")}
-    return Measured(usual | errors, Speed(100.0, 200.0, 50.0, 17.0, 60.0, 1e4))
+    return Measurement(usual | errors, Speed(100.0, 200.0, 50.0, 17.0, 60.0, 1e4))
 
 
 def test_errors_are_judged_by_the_upper_end_and_what_is_reported_by_the_mean():

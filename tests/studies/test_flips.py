@@ -13,11 +13,10 @@ from study_pages import outdated
 from contactfpga import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, tables, touches
-from contactfpga_sim.lab.flips.campaign import Row
-from contactfpga_sim.lab.flips.designs import DESIGNS
-from contactfpga_sim.lab.flips.flip import Flip, Found
-from contactfpga_sim.lab.flips.reference import Heard, Reference
+from contactfpga_sim.lab.flips import campaign, flip, reference, summary, tables, touches
+from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
+from contactfpga_sim.lab.flips.flip import Flip, FlipOutcome
+from contactfpga_sim.lab.flips.reference import DeliveredFrame, Reference
 from contactfpga_sim.lab.flips.summary import Design
 from contactfpga_sim.model.board import native, state
 from contactfpga_sim.model.board.state import Bit
@@ -103,7 +102,7 @@ def test_a_board_returns_to_a_moment(plain):
 
 @pytest.fixture(scope="module")
 def fast():
-    yield from made(designs.skin("run, on_change, reversal"))
+    yield from made(campaign.skin("run, on_change, reversal"))
 
 
 @pytest.mark.slow  # which has a board of its own to compile
@@ -203,7 +202,7 @@ def fake(send="always"):
     sheets = np.zeros((8, 4, 4), bool)
     sheets[2:, 1:3, 1] = True
     sheets[5:, 1:3, 1] = False
-    truth = touches.Truth(skin, sheets)
+    truth = touches.TruthWindow(skin, sheets)
     return types.SimpleNamespace(skin=skin, truth=truth, late_s=(0.4e-3, 0.6e-3), slack_s=0.5e-3)
 
 
@@ -211,7 +210,7 @@ NOTHING, HALF, ALL = (0, 0, ()), (1, 1, ((1, 1, 1),)), (2, 1, ((2, 2, 3),))
 
 
 def heard(time_s, said, late_s=0.5e-3, flagged=False):
-    return Heard(time_s, said, late_s, flagged)
+    return DeliveredFrame(time_s, said, late_s, flagged)
 
 
 @pytest.mark.parametrize(
@@ -258,8 +257,8 @@ def test_names_are_those_of_the_gateware():
 
 def test_numbers_are_read_back_as_they_were_written(tmp_path):
     rows = [
-        Row("run", Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))),
-        Row("run, dual", Found("dual.first.link.store", True, "masked", "", 0, 0.0, 0.005)),
+        Row("run", FlipOutcome("scan.time", False, "silent", "time", 3, 0.25, float("inf"))),
+        Row("run, dual", FlipOutcome("dual.first.link.store", True, "masked", "", 0, 0.0, 0.005)),
     ]
     campaign.write(rows, tmp_path / "flips.csv")
     assert campaign.read(tmp_path / "flips.csv") == rows
@@ -274,7 +273,7 @@ def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_mis
         kept.kept("flips", campaign._key("run", memory, block), lambda: [masked, masked])
     try:
         rows = campaign.finished(["run, dual", "run"])
-        assert rows == 6 * [Row("run", Found(*masked))]
+        assert rows == 6 * [Row("run", FlipOutcome(*masked))]
     finally:
         for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
             kept._path("flips", campaign._key("run", memory, block)).unlink()
@@ -288,7 +287,7 @@ def test_what_is_not_begun_in_time_is_left_out_and_the_first_block_of_each_never
     def block(design, memory, number):
         begun.append((design, memory, number))
         time.sleep(0.05)
-        return [Found(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
+        return [FlipOutcome(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
 
     monkeypatch.setattr(campaign, "_block", block)
     counted = []
@@ -322,7 +321,7 @@ def test_the_page_says_what_the_numbers_beside_it_say():
 
 
 def test_tables_count_what_came_out():
-    found = Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
+    found = FlipOutcome("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
     rows = [
         Row("run", found),
         *3 * [Row("run", found._replace(outcome="masked", kind=""))],
@@ -362,7 +361,7 @@ def test_a_raster_scan_finds_its_row_again(plain):
 @pytest.mark.campaign
 @pytest.mark.parametrize("design", [name for name in DESIGNS if name.endswith("dual")])
 def test_no_flip_of_two_copies_is_silently_wrong(design):
-    made = Reference(designs.skin(design))
+    made = Reference(campaign.skin(design))
     found = [flip.follow(made, each) for memory in (False, True) for each in flip.drawn(made, memory, 50, 99)]
     assert [one for one in found if one.outcome == "silent"] == []
     assert {one.outcome for one in found} == {"masked", "told"}

@@ -7,9 +7,9 @@ import pytest
 from study_pages import section
 
 from contactfpga.robot.haptics import Plane
-from contactfpga_sim.lab.failures import tables
 from contactfpga_sim.lab.failures.knob import Sweep
-from contactfpga_sim.lab.haptics import breaks, felt, felt_tables, pairs
+from contactfpga_sim.lab.failures.tables import rows
+from contactfpga_sim.lab.haptics import breaks, felt, pairs, tables
 from contactfpga_sim.lab.haptics.breaks import KNOBS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics.md").read_text(encoding="utf-8")
@@ -38,14 +38,14 @@ def on_page(name):
 def test_each_break_is_where_the_page_says(name, method):
     knob = KNOBS[name]
     found = Sweep(knob.values, tuple(map(knob.runs[method], knob.values)))
-    line = tables.rows(knob, {method: found})[0].split(" | ")[2:6]
+    line = rows(knob, {method: found})[0].split(" | ")[2:6]
     (stated,) = [one.split(" | ")[2:6] for one in on_page(name) if one.split(" | ")[1] == method]
     assert line == stated
 
 
 def test_what_nothing_disturbs_is_as_stated():
     """A covariance that is too small or too large by a tenth would show."""
-    trials = breaks._force(breaks.Load())
+    trials = breaks._force(breaks.Disturbance())
     assert 0.91 < np.mean([trial.holds for trial in trials]) < 0.99
 
 
@@ -66,8 +66,8 @@ PLACEMENTS = 334
 @pytest.mark.parametrize(("setting", "most_mm"), list(zip(felt.SETTINGS[1:], (0.15, 0.4))))
 def test_closings_of_many_placements_end_to_end(setting, most_mm):
     """At 5 mm, with as many switches as close: 0.15 mm without noise, 0.4 mm with it."""
-    errors = felt_tables.found(setting, PLACEMENTS, felt.TIMES_S[-1:])
-    assert felt_tables.interval(errors["closings"][:, -1])[2] <= 1e-3 * most_mm
+    errors = tables.found(setting, PLACEMENTS, felt.TIMES_S[-1:])
+    assert tables.interval(errors["closings"][:, -1])[2] <= 1e-3 * most_mm
 
 
 @pytest.mark.campaign
@@ -76,11 +76,11 @@ def test_centers_of_pressure_of_many_placements_end_to_end():
     """As far off as their covariance predicts. Between two samples, at a share s, noise is sqrt(s^2 + (1 - s)^2) of a
     sample's, which is sqrt(2 / 3) on average."""
     setting = felt.SETTINGS[0]
-    errors = felt_tables.found(setting, PLACEMENTS, felt.TIMES_S[-1:])["center of pressure"][:, -1]
+    errors = tables.found(setting, PLACEMENTS, felt.TIMES_S[-1:])["center of pressure"][:, -1]
     push = np.array([0, 0, -felt.MOST_N, 0, 0, 0])
     predicted = Plane().center(setting.cells.wrench(setting.cells.zeros + np.linalg.pinv(setting.cells.matrix) @ push))
     expected = np.sqrt(2 / 3 * np.trace(predicted.covariance_m2))
-    assert felt_tables.interval(errors)[0] == pytest.approx(expected, rel=0.1)
+    assert tables.interval(errors)[0] == pytest.approx(expected, rel=0.1)
 
 
 def test_places_limit_the_forces_of_two_fingers():

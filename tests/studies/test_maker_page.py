@@ -10,14 +10,14 @@ from study_pages import outdated
 
 from contactfpga.design.circuit import load_checked, needed
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.maker import schematic, tables
+from contactfpga_sim.lab.studies import STUDIES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "maker.md"
 
 
-@pytest.mark.parametrize("name", sample(registry.load("maker").sections, quick=["diodes"]))
+@pytest.mark.parametrize("name", sample(STUDIES["maker"].sections, quick=["diodes"]))
 def test_tables_are_up_to_date(name):
     assert not outdated("maker", name)
 

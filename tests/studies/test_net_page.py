@@ -2,8 +2,9 @@
 
 import collections
 
-from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.net import load, tables
+from contactfpga_sim.lab.registry import StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
 
 def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, tmp_path):
@@ -13,12 +14,12 @@ def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, 
         runs[links, batch_s, full] += 1
         cpu = dict.fromkeys(("publishers", "router", "reader", "other reader"), 0.1)
         times = {"latency": (0.01, 0.02), "bare": (0.001, 0.002)}
-        return load.Load(links=links, frames=1000.0, messages=100.0, share=1.0, lost=0, cpu=cpu, **times)
+        return load.NetworkRun(links=links, frames=1000.0, messages=100.0, share=1.0, lost=0, cpu=cpu, **times)
 
     monkeypatch.setattr(load, "measure", measure)
     tables.measured.cache_clear()
     try:
-        run = registry.StudyRun(registry.load("net"))
+        run = StudyRun(STUDIES["net"])
         for name in run.study.sections:
             run.text(name)
         tables.draw(tmp_path)

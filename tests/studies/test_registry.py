@@ -11,11 +11,13 @@ from study_pages import DOCS
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
-from contactfpga_sim.lab import meaning, registry, writer
+from contactfpga_sim.lab import meaning, studies, writer
 from contactfpga_sim.lab.registry import Section, Study, StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
 ROOT = DOCS.parent
-DECLARED = [registry.load(name) for name in registry.STUDIES]
+LAB = ROOT / "sim/contactfpga_sim/lab"
+DECLARED = list(STUDIES.values())
 PLACES = [
     (study, place)
     for study in DECLARED
@@ -40,8 +42,10 @@ def test_each_section_of_a_page_has_one_owner():
     assert set(owned.values()) == {1}
 
 
-def test_each_study_is_declared_in_its_own_folder():
-    assert [study.name for study in DECLARED] == list(registry.STUDIES)
+def test_each_folder_with_tables_or_pictures_is_a_study():
+    made = {path.parent.name for name in ("tables", "pictures") for path in LAB.glob(f"*/{name}.py")}
+    assert made <= set(STUDIES)
+    assert list(STUDIES) == sorted(STUDIES)
     for study in DECLARED:
         assert (DOCS / study.page).is_file()
         assert study.title
@@ -101,10 +105,9 @@ def toy(tmp_path, monkeypatch):
     (tmp_path / "toys" / "made_toy.py").write_text(MAKES)
     sections = {"toy": Section("toys/made_toy.py:table"), "fixed": Section("toys/made_toy.py:fixed")}
     places = {"compute": "toys/made_toy.py:compute", "pictures": "toys/made_toy.py:draw"}
-    declared = Study("lab.toy", title="Toys", page="toy.md", minutes=1, sections=sections, **places)
+    declared = Study("toy", title="Toys", page="toy.md", minutes=1, sections=sections, **places)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry, "STUDIES", {"toy": "its module"})
-    monkeypatch.setattr(registry, "load", {"toy": declared}.__getitem__)
+    monkeypatch.setattr(studies, "STUDIES", {"toy": declared})
     monkeypatch.setattr(sys, "path", [*sys.path])
     meaning._of.cache_clear()
     meaning._marks.cache_clear()
@@ -158,7 +161,7 @@ def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(m
     from contactfpga_sim.lab.several import tables
 
     monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured
-    several = registry.load("several")
+    several = STUDIES["several"]
     before = meaning.fingerprint(several, "several_size")
     assert meaning.fingerprint(several, "several_size") == before
     monkeypatch.setattr(tables, "SKIN", tables.SKIN.replace(zone_capacity=5))
@@ -166,16 +169,16 @@ def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(m
 
 
 def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):
-    whole = registry.load("toy")
-    lacking = Study("lab.toy", title="Toys", page="toy.md", minutes=1, needs=("no-such-program", "no/such/folder"))
-    monkeypatch.setattr(registry, "load", {"toy": lacking}.__getitem__)
+    whole = studies.STUDIES["toy"]
+    lacking = Study("toy", title="Toys", page="toy.md", minutes=1, needs=("no-such-program", "no/such/folder"))
+    monkeypatch.setattr(studies, "STUDIES", {"toy": lacking})
     with pytest.raises(ContactFPGAError, match=r"^toy needs no-such-program, no/such/folder$"):
         run(monkeypatch, "toy")
     assert run(monkeypatch, "--all") == 0
     assert capsys.readouterr().err == "left out: toy needs no-such-program, no/such/folder\n"
     without = {"toy": Section("toys/made_toy.py:table", needs=("no/such/folder",))}
-    part = Study("lab.toy", title="T", page="toy.md", minutes=1, sections=without, compute=whole.compute)
-    monkeypatch.setattr(registry, "load", {"toy": part}.__getitem__)
+    part = Study("toy", title="T", page="toy.md", minutes=1, sections=without, compute=whole.compute)
+    monkeypatch.setattr(studies, "STUDIES", {"toy": part})
     assert run(monkeypatch, "toy") == 0
     assert capsys.readouterr().out == "toy.md: toy stays as it is without no/such/folder\n"
     assert "old" in toy.read_text()
@@ -190,7 +193,7 @@ def test_a_package_that_is_not_installed_is_told_with_its_extra(toy, monkeypatch
 def test_all_studies_are_listed_without_what_they_need(monkeypatch, capsys):
     assert run(monkeypatch, "--list") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == list(registry.STUDIES)
+    assert [line.split()[0] for line in lines] == list(STUDIES)
     assert run(monkeypatch, "--list", "--quick") == 0
     assert 0 < len(capsys.readouterr().out.splitlines()) < len(lines)
 

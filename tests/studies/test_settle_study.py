@@ -8,7 +8,7 @@ import pytest
 from study_pages import outdated, section
 
 from contactfpga.design.circuit import Circuit
-from contactfpga_sim.lab.settle import breaks, shorted
+from contactfpga_sim.lab.settle import breaks, tables
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settle.md"
 
@@ -48,9 +48,9 @@ def test_coupling_breaks_where_capacitances_divide():
 
 
 def test_a_shorted_diode_carries_what_its_resistances_let_through():
-    found = shorted.row_time(shorted.sheet(1))
+    found = tables.row_time(tables.sheet(1))
     selecting = (found.seconds > 0.4e-6 + 0.04e-6) & (found.seconds < 0.75e-6)
-    row = shorted.patterns.middle(shorted.SIZE)
+    row = tables.patterns.middle(tables.SIZE)
     into = -found.pin_ma(row)[selecting]
     # Pin, switch, switch, series resistance and pin; the diode at 10 mA.
     junction = 0.02687 * np.log(into[-1] * 1e-3 / Circuit().diode.saturation_a)
@@ -59,14 +59,14 @@ def test_a_shorted_diode_carries_what_its_resistances_let_through():
 
 
 def test_no_current_flows_before_the_row_is_selected():
-    found = shorted.row_time(shorted.sheet(3))
+    found = tables.row_time(tables.sheet(3))
     before = (found.seconds > 0.1e-6) & (found.seconds < 0.28e-6)
-    assert np.abs(found.amperes[before, : shorted.SIZE]).max() < 0.5e-3  # what pulls feed
-    assert shorted.flowing_us(found, shorted.patterns.middle(shorted.SIZE)) == pytest.approx(0.5, abs=0.05)
+    assert np.abs(found.amperes[before, : tables.SIZE]).max() < 0.5e-3  # what pulls feed
+    assert tables.flowing_us(found, tables.patterns.middle(tables.SIZE)) == pytest.approx(0.5, abs=0.05)
 
 
 def test_without_a_shorted_diode_the_pins_carry_what_pulls_feed():
-    found = shorted.row_time(shorted.sheet(0))
-    row = shorted.patterns.middle(shorted.SIZE)
+    found = tables.row_time(tables.sheet(0))
+    row = tables.patterns.middle(tables.SIZE)
     last = int(np.flatnonzero(found.seconds < 0.79e-6)[-1])
     assert abs(found.pin_ma(row)[last]) < 0.1

@@ -11,8 +11,8 @@ from study_pages import outdated
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import tables as failures_tables
 from contactfpga_sim.lab.performance.scans import RECORDINGS
-from contactfpga_sim.lab.tracking import breaks, frames, judge, scenes, scores, speed
-from contactfpga_sim.lab.tracking.nearest import Nearest
+from contactfpga_sim.lab.tracking import breaks, scenes, scores, tables
+from contactfpga_sim.lab.tracking.scores import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/tracking.md"
@@ -23,7 +23,7 @@ PITCH_MM = 10.0
 def test_truth_lies_where_a_zone_is_that_no_other_contact_has(family):
     fingers = scenes.FAMILIES[family](np.random.default_rng(3))
     seen = 0
-    for shown in frames.played(fingers, 40.0):
+    for shown in scenes.played(fingers, 40.0):
         places = [(zone.x_mm, zone.y_mm) for zone in shown.zones]
         alone = [place for place in places if place not in shown.shared]
         assert len(alone) + len(shown.shared) == len(places)
@@ -36,7 +36,7 @@ def test_truth_lies_where_a_zone_is_that_no_other_contact_has(family):
 
 @pytest.mark.parametrize("family", ["crossing", "meeting"])
 def test_their_fingers_do_share_zones(family):
-    shown = list(frames.played(scenes.FAMILIES[family](np.random.default_rng(3)), 100.0))
+    shown = list(scenes.played(scenes.FAMILIES[family](np.random.default_rng(3)), 100.0))
     assert sum(bool(one.shared) for one in shown) > 10
     assert sum(len(one.truth) == 2 for one in shown) > 10
 
@@ -57,7 +57,7 @@ def test_the_baseline_takes_the_closest_pairs_first():
         pressed = np.zeros((16, 16), bool)
         for row, column in cells:
             pressed[row, column] = True
-        return nearest.update(frames.zones_of(pressed, 0)[0])
+        return nearest.update(scenes.zones_of(pressed, 0)[0])
 
     assert update([(3, 3), (3, 6)]) == {1: (30.0, 30.0), 2: (60.0, 30.0)}
     assert update([(3, 4), (3, 7)]) == {1: (40.0, 30.0), 2: (70.0, 30.0)}
@@ -75,7 +75,7 @@ def test_scores_are_those_counted_by_hand():
         ({0: here, 1: there}, {7: here}),
         ({0: here, 1: there}, {7: here, 9: there, 5: away}),
     ]
-    found = judge.score([history])
+    found = scores.score([history])
     assert (found.frames, found.switches, found.switches_per_1000) == (4, 1, 250.0)
     assert found.mota == pytest.approx(1 - (1 + 1 + 1) / 8)
     assert found.idf1 == pytest.approx(2 * 6 / (8 + 8))
@@ -86,7 +86,7 @@ def test_scores_are_those_counted_by_hand():
 def test_the_tracker_is_no_worse_than_the_nearest_zone(family):
     pytest.importorskip("motmetrics")
     for rate in (50.0, 200.0)[: 2 if family in ("crossing", "meeting") else 1]:
-        ours, nearest = (scores.of_family(family, rate, 3)[name] for name in judge.TRACKERS)
+        ours, nearest = (scores.of_family(family, rate, 3)[name] for name in scores.TRACKERS)
         assert ours.idf1 >= nearest.idf1 - 1e-9
         assert ours.mota >= nearest.mota - 0.01
     if family == "meeting":
@@ -137,7 +137,7 @@ def test_two_fingers_share_a_zone_from_the_distance_that_the_page_says():
 
 def test_ten_thousand_frames_per_second_with_two_contacts():
     """Of processor time, so that nothing else counts; a slower machine decodes slower, too."""
-    found = speed.measure(2, 2048)
+    found = tables.measure(2, 2048)
     assert found.tracked > 10_000 or found.ratio < 2
 
 
@@ -163,7 +163,7 @@ def test_on_recordings_it_is_no_worse_than_the_nearest_zone(name):
         pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
     stretches = [stretch[:200] for stretch in scores.histories(path, 1)[:2]]
     ours, nearest = (
-        judge.score([judge.followed(make(), one, judge.JUDGED_HZ) for one in stretches])
-        for make in judge.TRACKERS.values()
+        scores.score([scores.followed(make(), one, scores.JUDGED_HZ) for one in stretches])
+        for make in scores.TRACKERS.values()
     )
     assert ours.idf1 >= nearest.idf1 - 0.01

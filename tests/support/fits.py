@@ -8,10 +8,9 @@ from contactfpga.skin import Skin
 from contactfpga_sim.lab.chart.speed import Speed
 from contactfpga_sim.lab.fit import sources
 from contactfpga_sim.lab.fit.candidates import candidates, pitches_for, size_for
-from contactfpga_sim.lab.fit.goals import Goals
 from contactfpga_sim.lab.fit.search import fit
 from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import Task
+from contactfpga_sim.lab.fit.trial import FitTask, Goals
 
 BUMPER = 'width_mm = 80\nheight_mm = 80\ncount = 100\n[[contact]]\nshape = "disc"\nradius_mm = [12, 18]\n'
 SECOND = '[[contact]]\nshape = "disc"\nradius_mm = 12\n'
@@ -55,6 +54,6 @@ def chosen(*names, pitches=(10.0, 20.0), shuffled=None, tried=None, **limits):
         tried = candidates(base or Skin(), pitches_for(base, given, pitches), size_for(base, given))
     if shuffled is not None:
         random.Random(shuffled).shuffle(tried)
-    task = Task(given, names, base or Skin(), Goals(**limits), sources.default_count(given), timed=6, **options)
+    task = FitTask(given, names, base or Skin(), Goals(**limits), sources.default_count(given), timed=6, **options)
     with ThreadPoolExecutor(1) as executor:
         return fit(task, tried, executor)

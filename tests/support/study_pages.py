@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from contactfpga_sim.lab import registry, writer
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.registry import StudyRun
+from contactfpga_sim.lab.studies import STUDIES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -14,7 +16,7 @@ def section(page, name):
 
 def outdated(study, *names, without=(), computed=None):
     """Sections of a study, of these names or all, that it would make otherwise now; ``computed``: what they share."""
-    run = registry.StudyRun(registry.load(study))
+    run = StudyRun(STUDIES[study])
     if computed is not None:
         run.computed = computed
     named = names or [name for name in run.study.sections if name not in without]

@@ -6,7 +6,7 @@ from amaranth.lib import wiring
 
 from contactfpga.choices.labellers import Labeller
 from contactfpga_hdl.payloads import labeller_ports, row_number
-from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
+from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labelling
 
 TOY = Labeller(
     name="toy_labeller:TOY",

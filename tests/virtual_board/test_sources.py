@@ -181,7 +181,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
         ("contactfpga_sim.lab.arm.sweep", ["arm/plant.py", "arm/cases/push.toml", "../model/board/compiled.py"]),
         (
             "contactfpga_sim.verify.mutants.campaign",
-            ["../verify/mutants/trial.py", "../verify/mutants/stimuli.py", "../model/board/native.py"],
+            ["../verify/mutants/campaign.py", "../verify/mutants/stimuli.py", "../model/board/native.py"],
         ),
     ],
 )

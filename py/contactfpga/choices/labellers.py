@@ -14,7 +14,7 @@ class Labeller(Choice):
     """Rows in, zone records out.
 
     ``gateware`` is a component with the ports of :func:`contactfpga_hdl.payloads.labeller_ports`. ``golden`` is a
-    :class:`contactfpga_sim.model.golden.work.LabellerRule`.
+    :class:`contactfpga_sim.model.golden.zones.LabellerRule`.
     """
 
     exact: bool

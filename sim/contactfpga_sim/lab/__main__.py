@@ -13,7 +13,7 @@ from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
-from contactfpga_sim.lab import meaning, pool, registry, writer
+from contactfpga_sim.lab import meaning, pool, studies, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")
@@ -77,27 +77,27 @@ def listed(study: Study) -> str:
 def main() -> int:
     """The command; its status."""
     args = _parser().parse_args()
-    names = flags.known("study", args.name, list(registry.STUDIES))
-    studies = [registry.load(name) for name in names]
+    names = flags.known("study", args.name, list(studies.STUDIES))
+    chosen = [studies.STUDIES[name] for name in names]
     if args.quick:
-        studies = [study for study in studies if study.minutes <= QUICK_MINUTES]
+        chosen = [study for study in chosen if study.minutes <= QUICK_MINUTES]
     if args.list:
-        print(*map(listed, studies), sep="\n")
+        print(*map(listed, chosen), sep="\n")
         return 0
     if not DOCS.is_dir():
         raise StudyError("there is no folder 'docs' here; run this in the folder of the sources")
     if args.stale:
-        print(*(line for study in studies for line in stale(study)), sep="\n")
+        print(*(line for study in chosen for line in stale(study)), sep="\n")
         return 0
     if not (args.name or args.all):
         raise StudyError("name a study, or give --all or --list")
     with _settings(args):
-        return _make_all(studies, strict=bool(args.name))
+        return _make_all(chosen, strict=bool(args.name))
 
 
-def _make_all(studies: Iterable[Study], strict: bool) -> int:
+def _make_all(chosen: Iterable[Study], strict: bool) -> int:
     """Make each; ``strict``: what cannot be made here is an error, and not just left out."""
-    for study in studies:
+    for study in chosen:
         try:
             make(study)
         except (StudyError, MissingExtra) as error:

@@ -1,7 +1,7 @@
-"""The studies: each is a folder beside this file, with one declaration, ``STUDY`` in its ``study.py``.
+"""What a study is. Each has a folder beside this file, unless scripts make all of it, and an entry in ``studies.py``.
 
-A declaration names functions as ``module:function`` of the study's folder, or ``folder/file.py:function`` of the
-project's, so that it is read without what the study needs.
+An entry names functions as ``module:function`` of the study's folder, or ``folder/file.py:function`` of the project's,
+so that it is read without what the study needs.
 """
 
 from __future__ import annotations
@@ -14,12 +14,6 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-
-FOLDER = Path(__file__).parent
-STUDIES: Mapping[str, str] = {
-    path.parent.name: f"{__package__}.{path.parent.name}.study" for path in sorted(FOLDER.glob("*/study.py"))
-}
-"""The module of each study's declaration, by name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,8 +36,8 @@ class Section:
 class Study:
     """What a study makes, and what it takes to make it."""
 
-    package: str
-    """The study's folder: ``__package__``."""
+    name: str
+    """That of its folder."""
     title: str
     page: str
     """In ``docs``."""
@@ -60,10 +54,6 @@ class Study:
     needs: tuple[str, ...] = ()
     """Programs, and files or folders whose names have a slash."""
 
-    @property
-    def name(self) -> str:
-        return self.package.rpartition(".")[2]
-
     def page_of(self, section: str) -> str:
         """The page in ``docs`` that has this section."""
         return self.sections[section].page or self.page
@@ -71,7 +61,7 @@ class Study:
     def module(self, place: str) -> str:
         """The module of a function, or its file."""
         module = place.partition(":")[0]
-        return module if "/" in module else f"{self.package}.{module}"
+        return module if "/" in module else f"{__package__}.{self.name}.{module}"
 
     def function(self, place: str) -> Callable[..., Any]:
         """The function at a place."""
@@ -83,12 +73,6 @@ class Study:
             module = file.stem
         found: Callable[..., Any] = getattr(importlib.import_module(module), name)
         return found
-
-
-def load(name: str) -> Study:
-    """The declaration of a study; raises KeyError."""
-    found: Study = importlib.import_module(STUDIES[name]).STUDY
-    return found
 
 
 class StudyRun:

@@ -19,7 +19,7 @@ Tables = Mapping[str, Callable[[], str]]
 _SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end -->", re.DOTALL)
 
 
-class Written(NamedTuple):
+class PageSection(NamedTuple):
     """A section as it stands in a page."""
 
     text: str
@@ -27,9 +27,9 @@ class Written(NamedTuple):
     """Empty where none was stated."""
 
 
-def sections(page: str) -> dict[str, Written]:
+def sections(page: str) -> dict[str, PageSection]:
     """The sections of a page's text, by name."""
-    return {name: Written(text, fingerprint) for name, fingerprint, text in _SECTION.findall(page)}
+    return {name: PageSection(text, fingerprint) for name, fingerprint, text in _SECTION.findall(page)}
 
 
 def line(cells: Iterable[str]) -> str:

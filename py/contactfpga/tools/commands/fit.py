@@ -20,7 +20,7 @@ from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.fit.candidates import Candidate
-    from contactfpga_sim.lab.fit.trial import SoFar, Task
+    from contactfpga_sim.lab.fit.trial import FitTask, SoFar
 
 EXTRA = "chart"
 
@@ -108,12 +108,11 @@ def run(args: argparse.Namespace) -> int:
     return 0 if found.answer and not found.broken else UNSOLVED
 
 
-def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
+def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
     """The task, and all candidates; raises ValueError for what cannot be."""
     from contactfpga_sim.lab.fit import candidates
-    from contactfpga_sim.lab.fit.goals import Goals
     from contactfpga_sim.lab.fit.sources import default_count, source
-    from contactfpga_sim.lab.fit.trial import Task
+    from contactfpga_sim.lab.fit.trial import FitTask, Goals
 
     base = Skin.load(args.skin) if args.skin else None
     cover = load_cover(args.skin) if args.skin else None
@@ -136,7 +135,9 @@ def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
         flags.known("--scan", args.scan, list(SCANS)) if args.scan else None,
         args.baud,
     )
-    return Task(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick, cover=cover), tried
+    return FitTask(
+        sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick, cover=cover
+    ), tried
 
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from contactfpga.design.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
-from contactfpga_sim.lab.arm.parts import BEHAVIORS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
+from contactfpga_sim.lab.arm.parts import BEHAVIORS, ArmLink, Contacts, Control, Foam, Motor, Run, Touch, Usb
 
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz")
@@ -29,7 +29,7 @@ class CaseError(ContactFPGAError, ValueError):
 class Case:
     """A run of the arm. Raises :class:`CaseError`, or :class:`contactfpga.cover.CoverError` for a single number."""
 
-    link: Link
+    link: ArmLink
     motor: Motor
     control: Control
     foam: Foam
@@ -85,7 +85,7 @@ class Case:
 
 
 _PARTS = {
-    "link": Link,
+    "link": ArmLink,
     "motor": Motor,
     "control": Control,
     "foam": Foam,

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from contactfpga_sim.lab.arm.case import Case, CaseError
-from contactfpga_sim.lab.arm.run import Result, run
+from contactfpga_sim.lab.arm.run import RunRecord, run
 
 BACK_M = 1e-3
 """So near to where it was the arm counts as back."""
@@ -36,7 +36,7 @@ class Push:
     """The torque limit ended the compliance."""
 
 
-def pushed(case: Case, speed_m_s: float) -> tuple[Push, Result]:
+def pushed(case: Case, speed_m_s: float) -> tuple[Push, RunRecord]:
     """The case's push at another speed."""
     if case.control.behavior != "comply":
         raise CaseError(f"behavior is {case.control.behavior!r}; a push needs 'comply'")

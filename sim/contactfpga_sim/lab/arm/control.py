@@ -8,7 +8,7 @@ from typing import NamedTuple
 from contactfpga_sim.lab.arm.case import Case
 
 
-class Sensed(NamedTuple):
+class SensorReadings(NamedTuple):
     """What the controller knows at one of its samples."""
 
     angle_rad: float
@@ -45,9 +45,9 @@ class Controller:
         self._touched_at = -float("inf")
         self._stale = False  # this contact was gone back from as far as it goes
         self._turned_at = 0.0
-        self._old: collections.deque[Sensed] = collections.deque()
+        self._old: collections.deque[SensorReadings] = collections.deque()
 
-    def sample(self, seconds: float, now: Sensed) -> float:
+    def sample(self, seconds: float, now: SensorReadings) -> float:
         """The current in A to ask for until the next sample."""
         sensed = self._late(now)
         over = abs(sensed.torque_nm) >= self._control.torque_limit_nm
@@ -58,13 +58,13 @@ class Controller:
         self._decide(seconds, sensed, now.contact and not self._stale, over, now.alive)
         return self._speed(sensed)
 
-    def _late(self, now: Sensed) -> Sensed:
+    def _late(self, now: SensorReadings) -> SensorReadings:
         self._old.append(now)
         if len(self._old) > 1 + round(self._control.delay_s / self._control.period_s):
             self._old.popleft()
         return self._old[0]
 
-    def _decide(self, seconds: float, sensed: Sensed, contact: bool, over: bool, alive: bool) -> None:
+    def _decide(self, seconds: float, sensed: SensorReadings, contact: bool, over: bool, alive: bool) -> None:
         comply = self._control.behavior == "comply" and self.state == "moving"
         contact = contact and not comply
         if self.state != "reversing" and (over or contact):
@@ -82,12 +82,12 @@ class Controller:
             if self._wanted == 0:
                 self._now(seconds, "resting", "rest")
 
-    def _turn(self, seconds: float, sensed: Sensed, reason: str) -> None:
+    def _turn(self, seconds: float, sensed: SensorReadings, reason: str) -> None:
         self._turned_at = sensed.angle_rad
         self._wanted = -self._control.reverse_m_s / self._lever
         self._now(seconds, "reversing", reason)
 
-    def _retreat(self, seconds: float, sensed: Sensed) -> None:
+    def _retreat(self, seconds: float, sensed: SensorReadings) -> None:
         gone = self._lever * (self._turned_at - sensed.angle_rad)
         by_contact = self.events[-1][2] == "contact"
         if gone >= self._control.retreat_m:
@@ -96,7 +96,7 @@ class Controller:
         elif by_contact and seconds > self._touched_at and seconds - self._touched_at >= self._control.clear_s - 1e-9:
             self._now(seconds, "slowing", "resolved")
 
-    def _yield(self, sensed: Sensed) -> None:
+    def _yield(self, sensed: SensorReadings) -> None:
         """Admittance: I d wanted/dt = -torque - damping wanted - stiffness (angle - home)."""
         control = self._control
         if self._home is None:
@@ -106,7 +106,7 @@ class Controller:
         gained = self._wanted + control.period_s * push / control.virtual_kgm2
         self._wanted = gained / (1 + control.period_s * control.virtual_damping / control.virtual_kgm2)
 
-    def _speed(self, sensed: Sensed) -> float:
+    def _speed(self, sensed: SensorReadings) -> float:
         control = self._control
         error = self._wanted - sensed.speed_rad_s
         grown = self._sum + control.integral * error * control.period_s

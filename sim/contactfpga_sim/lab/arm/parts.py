@@ -31,7 +31,7 @@ class _Checked:
 
 
 @dataclasses.dataclass(frozen=True)
-class Link(_Checked):
+class ArmLink(_Checked):
     """The arm, which turns about one joint; gravity plays no part."""
 
     inertia_kgm2: float

@@ -8,17 +8,17 @@ from typing import Any, NamedTuple
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.comply import Push
-from contactfpga_sim.lab.arm.run import Outcome, Result, run
+from contactfpga_sim.lab.arm.run import ArmResponse, RunRecord, run
 
 UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}
 
 
-class Row(NamedTuple):
+class ReportLine(NamedTuple):
     """A line of the table."""
 
     name: str
     field: str
-    """Of :class:`contactfpga_sim.lab.arm.run.Outcome`."""
+    """Of :class:`contactfpga_sim.lab.arm.run.ArmResponse`."""
     unit: str
     scale: float
     """From SI to the unit."""
@@ -29,17 +29,17 @@ class Row(NamedTuple):
 
 
 ROWS = (
-    Row("switch closes", "closes_s", "ms", 1e3, None, 4.68e-3),
-    Row("detected", "detected_s", "ms", 1e3, None, None),
-    Row("reacts", "reacts_s", "ms", 1e3, None, 10.75e-3),
-    Row("speed stays positive for", "positive_s", "ms", 1e3, 5e-3, 5.05e-3),
-    Row("sensor torque before the reaction", "torque_before_nm", "Nm", 1, 2.3, 2.54),
-    Row("and 0.25 ms later", "torque_after_nm", "Nm", 1, None, 0.2),
-    Row("contact force at the reaction", "force_before_n", "N", 1, 12.0, 13.9),
-    Row("peak force", "peak_force_n", "N", 1, None, 18.9),
-    Row("peak indentation", "peak_indentation_m", "mm", 1e3, None, 2.92e-3),
-    Row("contact resolved", "resolved_s", "ms", 1e3, None, None),
-    Row("at rest", "rest_s", "ms", 1e3, None, None),
+    ReportLine("switch closes", "closes_s", "ms", 1e3, None, 4.68e-3),
+    ReportLine("detected", "detected_s", "ms", 1e3, None, None),
+    ReportLine("reacts", "reacts_s", "ms", 1e3, None, 10.75e-3),
+    ReportLine("speed stays positive for", "positive_s", "ms", 1e3, 5e-3, 5.05e-3),
+    ReportLine("sensor torque before the reaction", "torque_before_nm", "Nm", 1, 2.3, 2.54),
+    ReportLine("and 0.25 ms later", "torque_after_nm", "Nm", 1, None, 0.2),
+    ReportLine("contact force at the reaction", "force_before_n", "N", 1, 12.0, 13.9),
+    ReportLine("peak force", "peak_force_n", "N", 1, None, 18.9),
+    ReportLine("peak indentation", "peak_indentation_m", "mm", 1e3, None, 2.92e-3),
+    ReportLine("contact resolved", "resolved_s", "ms", 1e3, None, None),
+    ReportLine("at rest", "rest_s", "ms", 1e3, None, None),
 )
 
 NOTES = (
@@ -49,7 +49,7 @@ NOTES = (
 )
 
 
-def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -> dict[str, Result]:
+def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -> dict[str, RunRecord]:
     """The runs that stand side by side, by their heading."""
     late = f"{1e3 * latency_s:g} ms"
     found = {
@@ -65,19 +65,19 @@ def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -
     return found
 
 
-def cell(row: Row, outcome: Outcome) -> str:
+def cell(row: ReportLine, outcome: ArmResponse) -> str:
     """A number for people."""
     value = getattr(outcome, row.field)
     return "-" if value is None else f"{row.scale * value:.{2 if row.scale * abs(value) < 100 else 1}f}"
 
 
-def deviation(row: Row, outcome: Outcome) -> float | None:
+def deviation(row: ReportLine, outcome: ArmResponse) -> float | None:
     """Ours over the paper's, less 1."""
     value = getattr(outcome, row.field)
     return None if value is None or row.paper is None else value / row.paper - 1
 
 
-def table(found: dict[str, Result], paper: bool) -> list[list[str]]:
+def table(found: dict[str, RunRecord], paper: bool) -> list[list[str]]:
     """Headings and lines; with ``paper`` its numbers and those of the consistent set stand in front."""
     first = next(iter(found.values())).outcome
     lines = [["", *(["paper", "set"] if paper else []), *found]]
@@ -95,14 +95,14 @@ def table(found: dict[str, Result], paper: bool) -> list[list[str]]:
     return lines
 
 
-def _reasons(found: dict[str, Result], paper: bool) -> list[str]:
+def _reasons(found: dict[str, RunRecord], paper: bool) -> list[str]:
     reasons = [result.outcome.reason + (", flat" if result.outcome.bottomed else "") for result in found.values()]
     if paper:
         reasons.insert(1, "")
     return reasons
 
 
-def as_json(found: dict[str, Result], name: str) -> dict[str, Any]:
+def as_json(found: dict[str, RunRecord], name: str) -> dict[str, Any]:
     """All of it in SI units."""
     first = next(iter(found.values())).outcome
     known: dict[str, Any] = {

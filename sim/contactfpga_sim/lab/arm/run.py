@@ -10,8 +10,33 @@ from contactfpga.driver import driver
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case, CaseError
-from contactfpga_sim.lab.arm.plant_transport import PlantTransport
-from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, Faults, Moment, World
+from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, CourseStep, Faults, World
+
+
+class PlantTransport:
+    """A :class:`contactfpga.driver.transport.Transport`: while the driver waits, arm and gateware go on."""
+
+    live, threaded = True, False
+    name = "arm://"
+
+    def __init__(self, world: World):
+        self._world = world
+
+    def read(self, timeout_s: float) -> bytes:
+        until = self._world.clock() + timeout_s
+        while not (data := self._world.delivered()) and self._world.clock() < until:
+            self._world.step()
+        return data
+
+    def write(self, data: bytes) -> None:
+        self._world.send(data)
+
+    def clock(self) -> float:
+        return self._world.clock()
+
+    def close(self) -> None:
+        pass
+
 
 AFTER_S = 0.25e-3
 """So long after the reaction the torque is looked at again."""
@@ -27,7 +52,7 @@ STAY_S = 20e-3
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class ArmResponse:
     """Times in s from the touch, None where it did not happen. The reaction is the controller's sample at which it
     first turns the arm back or stops it."""
 
@@ -62,12 +87,12 @@ class Outcome:
 
 
 @dataclasses.dataclass(frozen=True)
-class Result:
+class RunRecord:
     """A run."""
 
-    outcome: Outcome
+    outcome: ArmResponse
     course: np.ndarray
-    """Structured, a :class:`contactfpga_sim.lab.arm.world.Moment` a step."""
+    """Structured, a :class:`contactfpga_sim.lab.arm.world.CourseStep` a step."""
     events: tuple[tuple[float, str, str], ...]
     """The controller's: (time in s, new state, reason)."""
     heard: tuple[tuple[float, int], ...]
@@ -76,7 +101,7 @@ class Result:
 
 def run(
     case: Case, way: str = "uart", *, latency_s: float = 6e-3, skin: Skin | None = None, faults: Faults | None = None
-) -> Result:
+) -> RunRecord:
     """Let the arm run into what it touches.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
@@ -105,7 +130,7 @@ def run(
             world.step()
     finally:
         world.close()
-    return Result(_outcome(world), _array(world.course), tuple(world.controller.events), tuple(world.heard))
+    return RunRecord(_outcome(world), _array(world.course), tuple(world.controller.events), tuple(world.heard))
 
 
 def _on_sheet(case: Case, skin: Skin) -> None:
@@ -139,27 +164,27 @@ def _over(world: World) -> bool:
     return resting and world.time_s - events[-1][0] > STAY_S and _slow(world, world.course[-1])
 
 
-def _slow(world: World, moment: Moment) -> bool:
+def _slow(world: World, moment: CourseStep) -> bool:
     return abs(moment.speed_rad_s) * world.case.link.lever_m < SLOW_M_S
 
 
-def _array(course: list[Moment]) -> np.ndarray:
-    kinds = [(name, bool if name in ("closed", "contact") else float) for name in Moment._fields]
+def _array(course: list[CourseStep]) -> np.ndarray:
+    kinds = [(name, bool if name in ("closed", "contact") else float) for name in CourseStep._fields]
     return np.array(course, dtype=kinds)
 
 
-def _outcome(world: World) -> Outcome:
+def _outcome(world: World) -> ArmResponse:
     course, events, lever = _array(world.course), world.controller.events, world.case.link.lever_m
     time = course["time_s"]
-    turns = [(at, reason) for at, state, reason in events if state in ("reversing", "stopped")]
-    reacts, reason = turns[0] if turns else (None, "")
+    reactions = [(at, reason) for at, state, reason in events if state in ("reversing", "stopped")]
+    reacts, reason = reactions[0] if reactions else (None, "")
     slow = np.abs(course["speed_rad_s"]) * lever < SLOW_M_S
     last_fast = int(np.flatnonzero(~slow)[-1]) if not slow.all() else -1
     closed = np.flatnonzero(course["closed"])
     opened = closed[-1] + 1 if len(closed) and closed[-1] + 1 < len(course) else None
     at = None if reacts is None else int(np.searchsorted(time, reacts - 1e-9))
     after = None if reacts is None else int(np.searchsorted(time, reacts + AFTER_S - 1e-9))
-    return Outcome(
+    return ArmResponse(
         closes_s=float(time[closed[0]]) if len(closed) else None,
         detected_s=world.detected_s,
         reacts_s=reacts,

@@ -32,7 +32,7 @@ THINNEST_M, THICKEST_M = 0.05e-3, 40e-3
 
 
 @dataclasses.dataclass(frozen=True)
-class Task:
+class SweepTask:
     """A run; or, with ``thickness``, the search for the thinnest foam that is not pressed flat."""
 
     case: Case
@@ -42,7 +42,7 @@ class Task:
 
 
 @dataclasses.dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """What came of it, in SI; NaN for what did not happen."""
 
     peak_force_n: float
@@ -55,35 +55,35 @@ class Point:
     thickness_m: float = math.nan
 
 
-def work(task: Task) -> dict[str, float]:
-    """The fields of the task's :class:`Point`, from the cache where the same code worked them out before."""
+def work(task: SweepTask) -> dict[str, float]:
+    """The fields of the task's :class:`SweepPoint`, from the cache where the same code worked them out before."""
     key = f"{kept.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
     return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
 
 
 def sweep(
-    tasks: Sequence[Task],
+    tasks: Sequence[SweepTask],
     executor: Executor,
     step: Callable[[str, int], None] = lambda name, of: None,
-    so_far: dict[Task, Point] | None = None,
-) -> list[Point]:
+    so_far: dict[SweepTask, SweepPoint] | None = None,
+) -> list[SweepPoint]:
     """The tasks' points, in their order; ``step(name, number of all)`` is called after each, and it is in ``so_far`` at
     once."""
     found = {} if so_far is None else so_far
     futures = {executor.submit(work, task): task for task in tasks}
     for future in as_completed(futures):
-        found[futures[future]] = Point(**future.result())
+        found[futures[future]] = SweepPoint(**future.result())
         step("runs of the arm", len(futures))
     return [found[task] for task in tasks]
 
 
-def _point(task: Task) -> Point:
+def _point(task: SweepTask) -> SweepPoint:
     short: dict[str, Any] = {"duration_s": ENDS_S + ENDS_M / task.case.link.speed_m_s}
     if task.way == "latency":
         short |= {"step_s": STEP_S, "lead_s": task.case.control.period_s}
     outcome = run(task.case.but(run=short), task.way, latency_s=task.latency_s).outcome
     closes, detected = _number(outcome.closes_s), _number(outcome.detected_s)
-    return Point(
+    return SweepPoint(
         outcome.peak_force_n,
         _number(outcome.force_before_n),
         outcome.peak_indentation_m,
@@ -96,10 +96,10 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _thinnest(task: Task) -> Point:
+def _thinnest(task: SweepTask) -> SweepPoint:
     """The smallest thickness at which the foam is not pressed flat; a thicker one also closes its switch later."""
 
-    def at(thickness_m: float) -> tuple[Point, bool]:
+    def at(thickness_m: float) -> tuple[SweepPoint, bool]:
         point = _point(dataclasses.replace(task, case=task.case.but(foam={"thickness_m": thickness_m})))
         return point, point.peak_indentation_m <= thickness_m
 

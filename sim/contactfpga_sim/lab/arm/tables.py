@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.arm import comply, latency_charts, report, run_pictures, sweep
+from contactfpga_sim.lab.arm import comply, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.run import Result, run
-from contactfpga_sim.lab.arm.sweep import Point, Task
+from contactfpga_sim.lab.arm.run import RunRecord, run
+from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 from contactfpga_sim.lab.arm.world import Faults
 from contactfpga_sim.lab.pool import executor, progress
 
@@ -26,25 +26,25 @@ LIMITS_N = (10.0, 15.0, 20.0, 30.0)
 class ArmRuns(NamedTuple):
     """The runs that tables and pictures share."""
 
-    plan: latency_charts.Plan
-    points: dict[Task, Point]
-    columns: dict[str, Result]
+    plan: pictures.Plan
+    points: dict[SweepTask, SweepPoint]
+    columns: dict[str, RunRecord]
     """The paper's experiment by way to the controller."""
 
 
 def compute() -> ArmRuns:
     """Run them."""
     case = Case.load("paper")
-    plan = latency_charts.plan(case)
+    plan = pictures.plan(case)
     with executor() as workers, progress() as step:
         points = dict(zip(plan.all, sweep.sweep(plan.all, workers, step)))
-    return ArmRuns(plan, points, report.columns(case, "paper", latency_charts.PAPER_S))
+    return ArmRuns(plan, points, report.columns(case, "paper", pictures.PAPER_S))
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
     """Its runs, and force, speed and thickness against latency."""
-    charts = latency_charts.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
-    return [*run_pictures.pictures(found.columns, folder, ("svg",)), *charts]
+    charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
+    return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
 
 
 class Failure(NamedTuple):
@@ -123,7 +123,7 @@ def step_table() -> str:
 def sheet_table(found: ArmRuns) -> str:
     """What the gateware's own runs take from the switch to the controller, and what that costs."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
-    bounds = sweep.bounds_s(Case.load("paper"), latency_charts.Skin())
+    bounds = sweep.bounds_s(Case.load("paper"), pictures.Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):
         points = [found.points[task] for task in found.plan.sheet[way]]
         takes = 1e3 * np.array([point.takes_s for point in points])
@@ -144,7 +144,5 @@ def speed_table(found: ArmRuns) -> str:
             forces = [np.array([getattr(found.points[task], field) for task in group]) for field in fields]
             safe, naive = (sweep.safe_speed(speeds, values, limit) for values in forces)
             cells.append(f"**{safe:.2f}** ({f'{naive:.2f}' if naive == naive else f'> {speeds[-1]:g}'})")
-        lines.append(
-            [f"{limit:g}", *cells, f"{sweep.naive_speed(Case.load('paper'), limit, latency_charts.PAPER_S):.2f}"]
-        )
+        lines.append([f"{limit:g}", *cells, f"{sweep.naive_speed(Case.load('paper'), limit, pictures.PAPER_S):.2f}"])
     return writer.table_of(lines)

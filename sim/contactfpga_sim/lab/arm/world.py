@@ -1,22 +1,157 @@
-"""Arm, sheet and gateware side by side in simulated time."""
+"""Arm, sheet and gateware side by side in simulated time, with switches and units under the cover and the USB chip."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from contactfpga.design.cover import Ball, Ellipse, Load, elastic
 from contactfpga.skin import Skin
+from contactfpga.wire.command import Command, encode_command
+from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.control import Controller, Sensed
+from contactfpga_sim.lab.arm.control import Controller, SensorReadings
+from contactfpga_sim.lab.arm.parts import Usb
 from contactfpga_sim.lab.arm.plant import Plant, finite
-from contactfpga_sim.lab.arm.switches import Switches
-from contactfpga_sim.lab.arm.under import Under
-from contactfpga_sim.lab.arm.usb import Chip
 from contactfpga_sim.model.board.compiled import CompiledBoard
+
+_MM = 1e-3
+_PATCH_M = 1e-3
+"""Radius of a patch where the model does not look at it."""
+
+
+class Switches:
+    """The (rows, columns) switches of a sheet under the case's cover."""
+
+    def __init__(self, case: Case, skin: Skin):
+        self._cover = case.cover
+        self._closing = case.switch.switch.closing_pa
+        self._opening = self._closing * (1 - case.switch.hysteresis)
+        self._bounce_s, self._period_s = case.switch.bounce_s, case.switch.bounce_period_s
+        self._touches = case.touch
+        foam = case.foam
+        self._ball = Ball(foam.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, foam.poisson))
+        self._x = np.arange(skin.columns) * skin.pitch_x_mm * _MM
+        self._y = (np.arange(skin.rows) * skin.pitch_y_mm * _MM)[:, None]
+        self._per_newton = [self._under(number, 1.0) for number in range(len(case.touch))]
+        self._made = np.zeros((skin.rows, skin.columns), bool)
+        self._since = np.full(self._made.shape, -np.inf)
+        self._any = False
+        self._closed = self._made
+        self._bounces_until = -np.inf
+
+    def stress_pa(self, forces_n: Sequence[float]) -> np.ndarray:
+        """(rows, columns) normal stress in Pa below the forces of the touches."""
+        stress = np.zeros(self._made.shape)
+        for number, force in enumerate(forces_n):
+            if force > 0:
+                point = self._cover.model == "point"  # in which stress is proportional to force
+                stress += force * self._per_newton[number] if point else self._under(number, force)
+        return stress
+
+    def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
+        """(rows, columns) bool: which are closed at a moment; moments come in order. The same array as long as nothing
+        changes."""
+        if any(forces_n) or self._any:
+            stress = self.stress_pa(forces_n)
+            made = np.where(self._made, stress > self._opening, stress >= self._closing)
+            changed = made != self._made
+            if changed.any():
+                self._since[changed] = seconds
+                self._made, self._any = made, bool(made.any())
+                self._bounces_until = seconds + self._bounce_s
+                self._closed = self._bouncing(seconds)
+        if self._closed is not self._made and seconds < self._bounces_until + self._period_s:
+            closed = self._bouncing(seconds)
+            self._closed = self._closed if np.array_equal(closed, self._closed) else closed
+        return self._closed
+
+    def _bouncing(self, seconds: float) -> np.ndarray:
+        if not self._bounce_s:
+            return self._made
+        age = seconds - self._since
+        bouncing = age < self._bounce_s
+        half_periods = np.where(bouncing, age, 0.0) // (self._period_s / 2)
+        found: np.ndarray = self._made ^ (bouncing & (half_periods % 2 == 1))
+        return found
+
+    def _under(self, number: int, force_n: float) -> np.ndarray:
+        touch = self._touches[number]
+        radius = _PATCH_M if self._cover.model == "point" else self._ball.patch_m(force_n)
+        part = Ellipse(radius, radius, touch.x_mm * _MM, touch.y_mm * _MM)
+        return self._cover.stress_pa([Load((part,), force_n)], self._x, self._y)
+
+
+THRESHOLD_N = 2.0
+"""Of the whole push; noise of the sum is 0.09 N."""
+GAIN_N = 0.02
+"""Newtons per step of the converter."""
+ZERO = 1000
+SIGMA_N = 0.05
+RING_MM = 75.0
+
+FIRST_NUMBER = 129 * 128 + 1
+"""Of a command; each of its two digits is above 0."""
+
+
+class UnitsUnderSheet:
+    """Three units at the corners of a triangle around the sheet's middle; the bumper weighs nothing."""
+
+    def __init__(self, case: Case, skin: Skin):
+        turn = np.radians([90, 210, 330])
+        middle = [0.5 * (skin.columns - 1) * skin.pitch_x_mm, 0.5 * (skin.rows - 1) * skin.pitch_y_mm]
+        places = np.stack([middle[0] + RING_MM * np.cos(turn), middle[1] + RING_MM * np.sin(turn), np.ones(3)])
+        touches = np.array([[touch.x_mm, touch.y_mm, 1.0] for touch in case.touch]).T
+        self._shares = np.linalg.solve(places, touches) / GAIN_N
+        self._rng = np.random.default_rng(0)
+        self._skin = skin
+
+    def readings(self, forces_n: Sequence[float]) -> list[int]:
+        """Of all units, while the touches push like this."""
+        loads = self._shares @ np.maximum(forces_n, 0.0) + SIGMA_N / GAIN_N * self._rng.standard_normal(3)
+        found: list[int] = np.clip(np.rint(ZERO + loads), 0, 4095).astype(int).tolist()
+        return found
+
+    def commands(self) -> bytes:
+        """Zeros, and the threshold of the plain sum."""
+        derived = self._skin.derived
+        facts = UnitFacts.of(derived.units)
+        wanted = [zero_value(facts, unit, ZERO) for unit in range(3)]
+        wanted.append(sum_threshold_value(facts, 0, round(THRESHOLD_N / GAIN_N)))
+        numbered = enumerate(wanted, FIRST_NUMBER)
+        return b"".join(encode_command(number, Command(*one), pulsed=derived.pulsed) for number, one in numbered)
+
+
+class Chip:
+    """Holds bytes until it has a packet full or its latency timer ran out, which runs also while it has none; the host
+    takes them at its next frame."""
+
+    def __init__(self, usb: Usb):
+        self._usb = usb
+        self._held: collections.deque[tuple[float, int]] = collections.deque()
+        self._sent = 0.0
+
+    def put(self, seconds: float, value: int) -> None:
+        """A byte whose stop bit ended at this time."""
+        self._held.append((seconds, value))
+
+    def take(self, seconds: float) -> bytes:
+        """What the host takes now; called once at each of its frames."""
+        ready = sum(1 for at, _ in self._held if at <= seconds)
+        if ready < self._usb.packet_bytes and seconds - self._sent < self._usb.timer_s - 1e-9:
+            return b""
+        self._sent = seconds
+        return bytes(self._held.popleft()[1] for _ in range(min(ready, int(self._usb.packet_bytes))))
+
+    def frame_at(self, seconds: float) -> int:
+        """Number of the host's frame at a time."""
+        return math.floor(seconds / self._usb.frame_s + 1e-9)
+
 
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
 """How a contact comes to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;
@@ -36,10 +171,10 @@ class Faults:
     host_dies_s: float | None = None
     """The program reads and says nothing from then on."""
     noise_s: tuple[float, float] | None = None
-    """Every byte whose stop bit ends in this time has its lowest bit turned over."""
+    """Every byte whose stop bit ends in this time has its lowest bit inverted."""
 
 
-class Moment(NamedTuple):
+class CourseStep(NamedTuple):
     """A step of the course."""
 
     time_s: float
@@ -64,7 +199,7 @@ class World:
         self.case = case
         self.faults = faults or Faults()
         self.controller = Controller(case)
-        self.course: list[Moment] = []
+        self.course: list[CourseStep] = []
         self.heard: list[tuple[float, int]] = []
         """What the host said: when it came to the controller, and the number of zones."""
         self.detected_s: float | None = None
@@ -73,7 +208,7 @@ class World:
         self._plant = Plant(case)
         self._switches = Switches(case, skin)
         self._board = CompiledBoard(skin, capture=("contact",)) if way in (*PINS, "uart") else None
-        self._under = Under(case, skin) if way in UNITS else None
+        self._under = UnitsUnderSheet(case, skin) if way in UNITS else None
         if self._board is not None and self._under is not None:
             self._board.load(self._under.readings([0.0] * len(case.touch)))
             self._board.send(self._under.commands())
@@ -129,11 +264,13 @@ class World:
         theta, omega, current = self._state[:3]
         if tick:
             torque = max(-case.control.sensor_nm, min(case.control.sensor_nm, forces.sensor_nm))
-            sensed = Sensed(theta, omega, torque, self._level, self._alive(now))
+            sensed = SensorReadings(theta, omega, torque, self._level, self._alive(now))
             self._wanted = self.controller.sample(now, sensed)
         total, deepest = sum(forces.contact_n), max(forces.indentation_m)
         self.course.append(
-            Moment(now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), self._closed, self._level)
+            CourseStep(
+                now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), self._closed, self._level
+            )
         )
         self._state = self._plant.step(now, self._state, self._wanted, case.run.step_s, forces)
         if not finite(self._state):

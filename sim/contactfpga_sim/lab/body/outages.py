@@ -128,7 +128,7 @@ OUTAGES = (
 
 
 @dataclasses.dataclass(frozen=True)
-class Seen:
+class OutageTimes:
     """What the body said."""
 
     statuses: tuple[str, ...]
@@ -141,7 +141,7 @@ class Seen:
     """Looks at which a frame from before passed for a new one, later than the link's ``late_s``."""
 
 
-def play(outage: Outage, folder: Path) -> Seen:
+def play(outage: Outage, folder: Path) -> OutageTimes:
     """Run it; ``folder`` gets the Skin's file. Raises RuntimeError where the body never says so."""
     (folder / "skin.toml").write_text(SKIN.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
@@ -161,7 +161,7 @@ def play(outage: Outage, folder: Path) -> Seen:
     ended_s = socket.now
     outage.end(socket)
     _until(reader, socket, "ok", statuses)
-    return Seen(tuple(statuses), noticed_s, socket.now - ended_s, stale)
+    return OutageTimes(tuple(statuses), noticed_s, socket.now - ended_s, stale)
 
 
 def _until(

@@ -9,7 +9,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.chart import front_picture, host, numbers, picture, speed, steady
+from contactfpga_sim.lab.chart import front_picture, host, numbers, picture, speed
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, front, study
 from contactfpga_sim.lab.chart.methods import METHODS
 
@@ -110,4 +110,4 @@ def _contacts(skin: Skin, count: int) -> np.ndarray:
 def _frame(skin: Skin, cells: np.ndarray) -> tuple[float, int]:
     """From a frame's first row time to its last byte in us, and its bytes."""
     _, size = speed.touch(skin, cells, 0.5)
-    return steady.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size
+    return speed.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size

@@ -1,11 +1,143 @@
-"""The table of docs/clock.md."""
+"""Board time on the host's clock, over simulated ways to the host: the fit's errors, and the table of docs/clock.md."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import dataclasses
+import random
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
+import numpy as np
+
+from contactfpga.driver.clock import ClockFit
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.clock.compute import PATHS, accuracy
+
+SECONDS, SEEDS = 60.0, 8
+"""Of device time in each of so many runs."""
+WANDER_PPM, WANDER_S = 1.0, 60.0
+"""A crystal's rate goes up and down by this much in this time, with the temperature."""
+SENT_S = 150e-6
+"""From the sample of a frame's first row to its last byte on the wire, of which WIRE_S are its bytes."""
+WIRE_S = 57e-6
+REQUEST_S, SCAN_S = 30e-6, 100e-6
+"""What a request takes on the wire, and the longest that it waits for the next scan."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Path:
+    """How bytes come from the wire to the program."""
+
+    title: str
+    tick_s: float
+    """They are handed over at multiples of this."""
+    out_tick_s: float
+    """The same of requests, the other way."""
+    jitter_s: float
+    """Mean of what the host adds, exponentially distributed."""
+    rate_hz: float = 1000.0
+    """Frames per second."""
+    asked_s: float = 1.0
+    """From request to request."""
+    stall: float = 0.0
+    """Share of frames that wait for another 20 ms, as the host is busy."""
+
+
+PATHS = {
+    "usb_125us": Path("USB, microframes of 125 µs", 125e-6, 125e-6, 20e-6),
+    "usb_1ms": Path("USB, frames of 1 ms", 1e-3, 1e-3, 50e-6),
+    "usb_once": Path("the same, asked once, when the port is opened", 1e-3, 1e-3, 50e-6, asked_s=1e9),
+    "busy": Path("USB, frames of 1 ms, and one frame of ten waits for 20 ms", 1e-3, 1e-3, 1e-3, stall=0.1),
+    "ftdi_16ms": Path("FTDI latency timer of 16 ms", 16e-3, 1e-3, 50e-6),
+    "slow": Path("the same, 2 frames per second", 16e-3, 1e-3, 50e-6, rate_hz=2.0),
+    "net": Path("network, batches of 10 ms", 10e-3, 1e-3, 1e-3),
+}
+
+
+class Moment(NamedTuple):
+    """One frame."""
+
+    time_us: int
+    arrived_s: float
+    sampled_s: float
+    """On the host's clock: the truth."""
+    asked_s: float | None
+    """When the request was sent that it answers first."""
+
+
+class FrameTimes(NamedTuple):
+    """What the fit says of frames, and the truth."""
+
+    found_s: np.ndarray
+    sigma_s: np.ndarray
+    arrived_s: np.ndarray
+    sampled_s: np.ndarray
+
+    @property
+    def errors_s(self) -> np.ndarray:
+        """Of each frame."""
+        return self.found_s - self.sampled_s
+
+
+def moments(path: Path, ppm: float, seed: int, seconds: float = SECONDS) -> Iterator[Moment]:
+    """Frames of a board whose clock is off by ``ppm``, as they arrive."""
+    rng = random.Random(seed)
+    base_s, phase_s = rng.uniform(0, 1000), rng.uniform(0, path.tick_s)
+    device_s = np.arange(1 / path.rate_hz, seconds, 1 / path.rate_hz)
+    drift = ppm * device_s - WANDER_PPM * WANDER_S / (2 * np.pi) * np.cos(2 * np.pi * device_s / WANDER_S)
+    ask_s, last_s = base_s, 0.0
+    for now_s, sampled_s in zip(device_s.tolist(), (base_s + device_s + drift * 1e-6).tolist()):
+        asked = None
+        if ask_s < sampled_s:
+            asked = sampled_s - REQUEST_S - rng.uniform(0, SCAN_S) - rng.uniform(0, path.out_tick_s)
+            ask_s = sampled_s + path.asked_s
+        ticks = -(-(sampled_s + SENT_S - phase_s) // path.tick_s)
+        wait_s = rng.expovariate(1 / path.jitter_s) + (0.02 if rng.random() < path.stall else 0.0)
+        last_s = max(last_s, phase_s + ticks * path.tick_s + wait_s)
+        yield Moment(round(now_s * 1e6), last_s, sampled_s, asked)
+
+
+def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTimes:
+    """Have a fit follow frames."""
+    fit = fit or ClockFit()
+    rows = []
+    for moment in frames:
+        fit.arrived(moment.time_us, moment.arrived_s, WIRE_S)
+        if moment.asked_s is not None:
+            fit.answered(moment.time_us, moment.asked_s)
+        line = fit.line(moment.arrived_s)
+        assert line is not None
+        rows.append((line.at(moment.time_us), line.sigma_s, moment.arrived_s, moment.sampled_s))
+    return FrameTimes(*np.array(rows).T)
+
+
+class Accuracy(NamedTuple):
+    """Over all runs of a path, the first second of each left out; times in s."""
+
+    late_s: float
+    """Mean of arrival less sample."""
+    error_s: float
+    """Median size of the error."""
+    worst_s: float
+    """99 % of errors are at most this."""
+    sigma_s: float
+    """Median of the stated uncertainty."""
+    within: float
+    """Share of errors of at most two of them."""
+
+
+def accuracy(path: Path, seeds: int = SEEDS, seconds: float = SECONDS) -> Accuracy:
+    """Over clocks that are off by -80 to 80 ppm."""
+    runs = []
+    for seed in range(seeds):
+        ppm = -80 + 160 * seed / max(1, seeds - 1)
+        frames = followed(moments(path, ppm, seed, seconds))
+        runs.append(np.array([part[frames.sampled_s > frames.sampled_s[0] + 1] for part in frames]))
+    found = FrameTimes(*np.concatenate(runs, axis=1))
+    errors = np.abs(found.errors_s)
+    late_s = float((found.arrived_s - found.sampled_s).mean())
+    middle, worst = float(np.median(errors)), float(np.quantile(errors, 0.99))
+    return Accuracy(late_s, middle, worst, float(np.median(found.sigma_s)), float((errors <= 2 * found.sigma_s).mean()))
+
 
 HEAD = (
     "way to the host",

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.lab.failures import electric, electric_reversal, line, lines, shapes, touch
+from contactfpga_sim.lab.failures import electric, line, touch
 
 KNOBS = {
     knob.name: knob
     for knob in (
-        shapes.WINDING,
-        shapes.CROSSING,
-        shapes.MANY,
+        touch.WINDING,
+        touch.CROSSING,
+        touch.MANY,
         touch.CLOSING,
         touch.MOVING,
         touch.BOUNCE,
         electric.SETTLE,
-        electric_reversal.SETTLE_REVERSAL,
-        electric_reversal.PROJECT_REVERSAL,
+        electric.SETTLE_REVERSAL,
+        electric.PROJECT_REVERSAL,
         electric.DIODES,
-        electric_reversal.DIODES_REVERSAL,
+        electric.DIODES_REVERSAL,
         electric.GHOST,
         electric.GHOSTS,
-        lines.BROKEN,
-        lines.BROKEN_REVERSAL,
-        lines.STUCK,
-        lines.STUCK_REVERSAL,
+        electric.BROKEN,
+        electric.BROKEN_REVERSAL,
+        electric.STUCK,
+        electric.STUCK_REVERSAL,
         line.BAUD,
         line.NOISE,
         line.HOST,

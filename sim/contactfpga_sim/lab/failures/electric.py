@@ -1,7 +1,8 @@
-"""Knobs of the sheet as a circuit: slow columns and missing diodes."""
+"""Knobs of the sheet's wiring: slow columns, weak switches, missing diodes, broken lines, what sticks."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -13,6 +14,8 @@ from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
+    REVERSAL,
+    REVERSAL_GUARDED,
     Rig,
     faults,
     hello_clocks,
@@ -22,10 +25,9 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     still,
 )
-from contactfpga_sim.model.sheet import guards
-from contactfpga_sim.model.sheet.levels import at_rest
+from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import lines_of
-from contactfpga_sim.model.sheet.wiring import Wiring
+from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
 
 
 def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:
@@ -92,7 +94,7 @@ def bare(skin: Skin, count: float) -> Outcome:
     for row, column in [(3, 4), (3, 5), (4, 4), (4, 5)][: int(count)]:
         bare[row, column] = True
     if skin.guard:
-        cells_, bare_ = guards.extended(cells), guards.extended(bare, guard=False)
+        cells_, bare_ = wiring.extended(cells), wiring.extended(bare, guard=False)
     else:
         cells_, bare_ = cells, bare
     read, undefined, amperes = at_rest(Circuit(column_pull_ohm=4700.0), cells_, bare_)
@@ -111,7 +113,7 @@ def _still(skin: Skin, read: np.ndarray) -> Zones:
     """The frame of a sheet that reads so, with its guard lines if it has some."""
     if not skin.guard:
         return still(skin, read)
-    return still(skin, read[:-1, :-1], guards.missed(read))
+    return still(skin, read[:-1, :-1], wiring.missed(read))
 
 
 DIODES = Knob(
@@ -224,4 +226,155 @@ GHOST = Knob(
     values=(1, 2, 3, 4),
     runs={"zones": _corners},
     helps="diodes",
+)
+
+
+SPOTS = [(3, 4), (9, 10)]
+PULLED = Circuit(column_pull_ohm=4700.0)
+PATIENT, PATIENT_GUARDED = (skin.replace(settle_us=5.0) for skin in (REVERSAL, REVERSAL_GUARDED))
+"""Columns have the time that weak switches need."""
+
+
+def _slow_reversal(skin: Skin, circuit: Circuit) -> Outcome:
+    """Two fingers on a sheet whose columns and rows take their time."""
+    cells = finger(skin, *SPOTS)
+    with Rig(skin) as rig:
+        rig.board.settle(*lines_of(circuit, skin, most=2))
+        rig.board.hold(cells[None], 2 * hello_clocks(skin))
+        zones = rig.frames()[-1]
+    return judged(zones, cells, [finger(skin, spot) for spot in SPOTS])
+
+
+def _capacitance(skin: Skin, picofarad: float) -> Outcome:
+    return _slow_reversal(skin, PULLED.replace(line_pf=picofarad))
+
+
+def _switch(skin: Skin, kiloohm: float) -> Outcome:
+    return _slow_reversal(skin, Circuit(switch_ohm=1000 * kiloohm))
+
+
+SETTLE_REVERSAL = Knob(
+    name="settle_reversal",
+    title="Lines slower than `settle_us = 0.5`, by line reversal",
+    axis="capacitance of a line, pF",
+    amount="cells that read pressed",
+    values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
+    runs={
+        "4.7 kΩ pull-up": functools.partial(_capacitance, REVERSAL),
+        "the same with guard lines": functools.partial(_capacitance, REVERSAL_GUARDED),
+    },
+    helps="`contactfpga settle` says which times a circuit needs; smaller resistances",
+)
+
+PROJECT_REVERSAL = Knob(
+    name="project_reversal",
+    title="Pressed switches too weak to lift their row, by line reversal",
+    axis="resistance of a pressed switch, kΩ",
+    amount="cells that read pressed",
+    values=(0.1, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 20),
+    runs={
+        "rows pulled by 10 kΩ": functools.partial(_switch, PATIENT),
+        "the same with guard lines": functools.partial(_switch, PATIENT_GUARDED),
+    },
+    helps="switches of less resistance, weaker pulls of the rows; `contactfpga settle` says what a circuit needs",
+    unnoticed="a row that is not lifted reads as one that nobody touches; guard lines with such switches report it",
+)
+
+DIODES_REVERSAL = dataclasses.replace(
+    DIODES,
+    name="diodes_reversal",
+    title="Switches without a sound diode, by line reversal",
+    runs={
+        "three fingers at corners": functools.partial(bare, REVERSAL),
+        "the same with guard lines": functools.partial(bare, REVERSAL_GUARDED),
+    },
+)
+
+
+def _broken(skin: Skin, line: str, count: float) -> Outcome:
+    """``line``: row or column."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[4:11, 5:12] = True
+    lines = tuple(range(7, 7 + int(count)))
+    cut = dict.fromkeys(lines, 0)
+    cuts = wiring.LineCuts(cut, {}) if line == "row" else wiring.LineCuts({}, cut)
+    return judged(still(skin, cells, cuts), cells, [cells])
+
+
+BROKEN = Knob(
+    name="broken",
+    title="Lines that are broken under a contact of 7x7 cells",
+    axis="broken lines side by side",
+    amount="cells that read pressed",
+    values=(0, 1, 2, 3),
+    runs={
+        "row": functools.partial(_broken, REFERENCE, "row"),
+        "column": functools.partial(_broken, REFERENCE, "column"),
+        "row, with guard lines": functools.partial(_broken, GUARDED, "row"),
+        "column, with guard lines": functools.partial(_broken, GUARDED, "column"),
+    },
+    helps="guard lines; `contactfpga wire` shows lines that never read pressed",
+    unnoticed="what is past a break looks like switches that nobody presses; only one that is closed for good shows "
+    "it, and guard lines have these",
+)
+
+BROKEN_REVERSAL = dataclasses.replace(
+    BROKEN,
+    name="broken_reversal",
+    title="Lines that are broken, by line reversal",
+    runs={
+        "row": functools.partial(_broken, REVERSAL, "row"),
+        "column": functools.partial(_broken, REVERSAL, "column"),
+        "row, with guard lines": functools.partial(_broken, REVERSAL_GUARDED, "row"),
+        "column, with guard lines": functools.partial(_broken, REVERSAL_GUARDED, "column"),
+    },
+)
+
+STUCK_SPOTS = [(2, 3), (12, 2), (5, 12), (13, 13), (1, 9), (9, 14)]
+MASKED = REFERENCE.replace(mask=tuple(STUCK_SPOTS[:3]))
+
+
+def _stuck(skin: Skin, count: float) -> Outcome:
+    touch = finger(skin, (7, 7))
+    closed = np.zeros_like(touch)
+    for row, column in STUCK_SPOTS[: int(count)]:
+        closed[row, column] = True
+    zones = still(skin, Wiring(closed=closed).read(touch)[0])
+    return judged(zones, touch | closed, [touch])
+
+
+def _stuck_columns(skin: Skin, count: float) -> Outcome:
+    touch = finger(skin, (7, 7))
+    columns = np.zeros(skin.columns, bool)
+    columns[[2, 12, 4, 14, 0, 10][: int(count)]] = True
+    with Rig(skin) as rig:
+        rig.board.stick(columns)
+        rig.board.hold(touch[None], hello_clocks(skin) + 4 * skin.derived.frame_clocks)
+        zones = rig.frames()[-1]
+    return judged(zones, touch | columns, [touch])
+
+
+STUCK = Knob(
+    name="stuck",
+    title="Switches that are stuck closed, beside a finger",
+    axis="how many are stuck",
+    amount="cells that read pressed",
+    values=(0, 1, 2, 3, 4, 5, 6),
+    runs={
+        "no mask": functools.partial(_stuck, REFERENCE),
+        "three in the mask": functools.partial(_stuck, MASKED),
+        "columns shorted to the rows' level": functools.partial(_stuck_columns, REFERENCE),
+    },
+    helps="`contactfpga doctor --watch` names them in time; list them in `mask`",
+    unnoticed="a switch that is stuck and one that is pressed are the same circuit; only time tells them apart",
+)
+
+STUCK_REVERSAL = dataclasses.replace(
+    STUCK,
+    name="stuck_reversal",
+    title="Switches that are stuck closed, by line reversal",
+    runs={
+        "no mask": functools.partial(_stuck, REVERSAL),
+        "columns shorted to the rows' level": functools.partial(_stuck_columns, REVERSAL),
+    },
 )

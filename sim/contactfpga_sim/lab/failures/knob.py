@@ -36,17 +36,17 @@ class Outcome:
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One thing that is turned until something breaks."""
+    """One quantity that is moved until something breaks."""
 
     name: str
     """Of its picture's file."""
     title: str
     axis: str
-    """What is turned, with its unit."""
+    """What is moved, with its unit."""
     amount: str
     """What :attr:`Outcome.amount` is."""
     values: tuple[float, ...]
-    """In the order in which the knob is turned."""
+    """In the order in which the knob is moved."""
     runs: Mapping[str, Callable[[float], Outcome]]
     """What comes out at a value, for each method or setting that is compared."""
     helps: str

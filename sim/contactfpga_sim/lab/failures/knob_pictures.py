@@ -30,7 +30,7 @@ class Span(NamedTuple):
 
 
 def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span], str]:
-    """The values' places, in the order in which they are turned, and what is to be said of the scale.
+    """The values' places, in the order in which the knob is moved, and what is to be said of the scale.
 
     Values that are evenly spaced or reach below 0 lie so; others in powers of ten, where a first value of 0 stands
     apart.

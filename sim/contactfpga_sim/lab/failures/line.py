@@ -57,7 +57,7 @@ class Line:
             return cls(skin, edges, float(rig.board.cycle), tuple(packets))
 
     def noisy(self, rate_hz: float, seed: int) -> Line:
-        """With this many pulses per second that turn the level around for half a bit to two bits."""
+        """With this many pulses per second that invert the level for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
         bit = self.skin.derived.bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)
@@ -94,7 +94,7 @@ class Line:
 
 
 @dataclasses.dataclass(frozen=True)
-class Heard:
+class HostDecoding:
     """What the host makes of a line."""
 
     sent: int
@@ -107,7 +107,7 @@ class Heard:
     """Counters that are not 0, and errors."""
 
 
-def heard(line: Line, data: bytes, greeted: bytes = b"") -> Heard:
+def heard(line: Line, data: bytes, greeted: bytes = b"") -> HostDecoding:
     """The host's frames and counters; ``greeted`` came before, as it was sent."""
     sent = _decoded(b"".join(packet + bytes([protocol.DELIMITER]) for packet in line.frames))[0]
     frames, conversation = _decoded(greeted + data)
@@ -117,7 +117,7 @@ def heard(line: Line, data: bytes, greeted: bytes = b"") -> Heard:
     told = [name for name, count in counters.items() if count]
     if conversation.hello is None:
         told = ["OnlyNoise"]
-    return Heard(len(sent), right, len(frames) - right, tuple(told))
+    return HostDecoding(len(sent), right, len(frames) - right, tuple(told))
 
 
 def _decoded(data: bytes) -> tuple[list[str], Conversation]:
@@ -143,7 +143,7 @@ def recorded(scans: int = FRAMES) -> Line:
     return Line.record(SKIN, scans, seed=3)
 
 
-def _of_line(found: Heard, extra: str = "") -> Outcome:
+def _of_line(found: HostDecoding, extra: str = "") -> Outcome:
     """Right if every frame arrives; a frame that was never sent is worse than one that is lost, and silent."""
     missing = found.sent - found.arrived
     what = f"{missing} of {found.sent} frames do not arrive" + extra

@@ -12,7 +12,7 @@ from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Place
 from contactfpga_sim.model.board.compiled import CompiledBoard
-from contactfpga_sim.model.sheet.guards import LineCuts
+from contactfpga_sim.model.sheet.wiring import LineCuts
 
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)

@@ -76,7 +76,7 @@ def pictures() -> str:
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
-    """Every knob turned until something breaks."""
+    """Every knob moved until something breaks."""
     sweeps: dict[str, dict[str, Sweep]] = {}
     sweep_all(list(KNOBS), sweeps)
     return sweeps

@@ -14,10 +14,10 @@ from contactfpga_sim.lab.chart.compute import Found, compared, intervals
 from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.speed import Speed
 from contactfpga_sim.lab.fit.sources import Source
-from contactfpga_sim.lab.fit.trial import Task
+from contactfpga_sim.lab.fit.trial import FitTask
 
 
-def errors_of(task: Task, source: Source, skins: Sequence[Skin], others: bool) -> list[dict[str, Interval]]:
+def errors_of(task: FitTask, source: Source, skins: Sequence[Skin], others: bool) -> list[dict[str, Interval]]:
     """By metric, of each Skin's zones against what there is; all of them have the same sheet. ``others``: on the scenes
     that are not used to choose."""
 
@@ -31,7 +31,7 @@ def errors_of(task: Task, source: Source, skins: Sequence[Skin], others: bool) -
     return [intervals([one])["total"] for one in found]
 
 
-def speed_of(task: Task, source: Source, skin: Skin, others: bool, checked: int) -> Speed:
+def speed_of(task: FitTask, source: Source, skin: Skin, others: bool, checked: int) -> Speed:
     """Of touches spread over the same scenes; ``checked`` of them go through the compiled gateware as well."""
 
     def new() -> dict[str, float]:
@@ -46,5 +46,5 @@ def speed_of(task: Task, source: Source, skin: Skin, others: bool, checked: int)
     return Speed(**kept.kept("fit-speed", _key(task, source, [skin], numbers, count, checked), new))
 
 
-def _key(task: Task, source: Source, skins: Sequence[Skin], *more: Any) -> str:
+def _key(task: FitTask, source: Source, skins: Sequence[Skin], *more: Any) -> str:
     return "\n".join((kept.made_by(__name__, *skins, task.base), repr(source), repr(more)))

@@ -11,9 +11,8 @@ from typing import Any
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.fit.candidates import SHEET, Candidate
 from contactfpga_sim.lab.fit.cost import cheapest, second
-from contactfpga_sim.lab.fit.goals import Measured
 from contactfpga_sim.lab.fit.measuring import errors_of, speed_of
-from contactfpga_sim.lab.fit.trial import Fit, SoFar, Step, Task, Trial, gathered
+from contactfpga_sim.lab.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 
 CHECKED = 2
 """Of the answer's reported touches, this many go through the compiled gateware as well."""
@@ -22,7 +21,7 @@ ZONES_ON_HOST = "reports no zones: say with --host-us how long the host takes to
 
 
 def fit(
-    task: Task,
+    task: FitTask,
     tried: Iterable[Candidate],
     executor: Executor,
     step: Step = lambda name, of: None,
@@ -55,12 +54,12 @@ def fit(
     )
 
 
-def _none(task: Task, trials: list[Trial], impossible: list[Trial], executor: Executor, step: Step) -> Fit:
+def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor: Executor, step: Step) -> Fit:
     nearest = trials[:1]
     return Fit(task, None, None, tuple(trials), tuple(impossible), 0, _reported(task, nearest, executor, step, 0), ())
 
 
-def _judged(task: Task, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar) -> list[Trial]:
+def _judged(task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar) -> list[Trial]:
     """All that were measured on the scenes to choose with, with the limits that they miss."""
     sheets: dict[Settings, dict[Settings, Skin]] = {}
     for one in tried:
@@ -83,11 +82,11 @@ def _judged(task: Task, tried: Sequence[Candidate], executor: Executor, step: St
 
 
 def _trial(
-    task: Task, one: Candidate, sheets: dict[Settings, dict[Settings, Skin]], found: dict[Hashable, Any]
+    task: FitTask, one: Candidate, sheets: dict[Settings, dict[Settings, Skin]], found: dict[Hashable, Any]
 ) -> Trial:
     place = list(sheets[_sheet(one)]).index(_sees(one))
     measured = tuple(
-        _with_host(task, one.skin, Measured(found[source, _sheet(one)][place], found[source, one.skin]))
+        _with_host(task, one.skin, Measurement(found[source, _sheet(one)][place], found[source, one.skin]))
         for source in task.sources
     )
     trial = Trial(one, measured, _words(task, measured), max(map(task.goals.excess, measured)))
@@ -108,7 +107,7 @@ def _sees(one: Candidate) -> Settings:
     return tuple((name, value) for name, value in one.settings if name not in ("scan", "baud"))
 
 
-def _words(task: Task, measured: Sequence[Measured], sure: bool = True) -> tuple[str, ...]:
+def _words(task: FitTask, measured: Sequence[Measurement], sure: bool = True) -> tuple[str, ...]:
     """The limits that are missed; of each source where there are several."""
     several = len(task.sources) > 1
     return tuple(
@@ -118,7 +117,7 @@ def _words(task: Task, measured: Sequence[Measured], sure: bool = True) -> tuple
     )
 
 
-def _with_host(task: Task, skin: Skin | None, found: Measured) -> Measured:
+def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurement:
     """With the time that the host takes to find zones, where it has to."""
     if skin is None or skin.report != "cells" or task.host_us is None:
         return found
@@ -127,8 +126,8 @@ def _with_host(task: Task, skin: Skin | None, found: Measured) -> Measured:
 
 
 def _reported(
-    task: Task, trials: Sequence[Trial], executor: Executor, step: Step, checked: int
-) -> tuple[tuple[Measured, ...], ...]:
+    task: FitTask, trials: Sequence[Trial], executor: Executor, step: Step, checked: int
+) -> tuple[tuple[Measurement, ...], ...]:
     """Measured on the other scenes; touches of the first one are checked against the gateware."""
     jobs: dict[Hashable, tuple[Any, ...]] = {}
     for number, one in enumerate(trials):
@@ -138,7 +137,7 @@ def _reported(
     found = gathered("report", jobs, executor, step)
     return tuple(
         tuple(
-            _with_host(task, one.skin, Measured(found[number, source, "errors"][0], found[number, source, "speed"]))
+            _with_host(task, one.skin, Measurement(found[number, source, "errors"][0], found[number, source, "speed"]))
             for source in task.sources
         )
         for number, one in enumerate(trials)

@@ -11,9 +11,8 @@ from contactfpga.design.cover.press import write_cover
 from contactfpga.tools.console import tables
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
 from contactfpga_sim.lab.fit.cost import DEVICE
-from contactfpga_sim.lab.fit.goals import Measured
 from contactfpga_sim.lab.fit.sources import Recorded
-from contactfpga_sim.lab.fit.trial import Fit, Trial
+from contactfpga_sim.lab.fit.trial import Fit, Measurement, Trial
 
 HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
 """Baud is left out where all have the same."""
@@ -188,11 +187,11 @@ def _trial(one: Trial) -> dict[str, Any]:
     }
 
 
-def _sources(fit: Fit, measured: Sequence[Measured]) -> dict[str, Any]:
+def _sources(fit: Fit, measured: Sequence[Measurement]) -> dict[str, Any]:
     return {name: _measured(one) for name, one in zip(fit.task.names, measured, strict=True)}
 
 
-def _measured(one: Measured) -> dict[str, Any]:
+def _measured(one: Measurement) -> dict[str, Any]:
     return {
         "errors": {metric: dataclasses.asdict(error) for metric, error in one.errors.items()},
         "speed": dataclasses.asdict(one.speed),

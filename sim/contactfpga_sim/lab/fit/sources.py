@@ -21,8 +21,7 @@ from contactfpga_sim.lab.chart import errors
 from contactfpga_sim.lab.chart.compute import Look, look
 from contactfpga_sim.model.scenes.contacts import Contact, Value
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
-from contactfpga_sim.model.scenes.file import SceneFile
-from contactfpga_sim.model.scenes.placing import scene_of
+from contactfpga_sim.model.scenes.file import SceneFile, scene_of
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, Scene
 

@@ -1,4 +1,4 @@
-"""All flips of all designs, in blocks that are kept, and their table."""
+"""All flips of all designs, in blocks that are kept, and their table; the designs, and what each takes of an FPGA."""
 
 from __future__ import annotations
 
@@ -10,13 +10,38 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from contactfpga.inputs.files import replaced
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.flips import designs, flip
-from contactfpga_sim.lab.flips.flip import Found
-from contactfpga_sim.lab.flips.reference import Reference
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim.lab import kept, size
+from contactfpga_sim.lab.flips import flip
+from contactfpga_sim.lab.flips.flip import FlipOutcome
+from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference
+
+DESIGNS: dict[str, dict[str, Any]] = {
+    "run": {},
+    "run, on_change": {"send": "on_change"},
+    "serial": {"labeller": "serial"},
+    "run, on_change, reversal": {"send": "on_change", "scan": "reversal", "precharge_us": 0.5},
+    "run, dual": {"dual": True},
+    "run, on_change, dual": {"send": "on_change", "dual": True},
+    "serial, dual": {"labeller": "serial", "dual": True},
+}
+"""Fields that differ from the reference Skin's."""
+
+
+def skin(design: str) -> Skin:
+    """The design with the clock and the line of the study."""
+    return Skin(clock_hz=CLOCK_HZ, baud=BAUD, **DESIGNS[design])
+
+
+def luts(design: str) -> int:
+    """LUT4 of the design on a UP5K, with the reference Skin's clock."""
+    return size.luts(lambda: Top(Skin(**DESIGNS[design])), sizes.UP5K)
+
 
 BLOCK = 25
 """Flips that one process follows before it is asked again."""
@@ -26,7 +51,7 @@ class Row(NamedTuple):
     """A flip of a design."""
 
     design: str
-    found: Found
+    found: FlipOutcome
 
 
 def run(
@@ -58,7 +83,7 @@ def run(
     finally:
         timer.cancel()
     return [
-        Row(name, Found(*one))
+        Row(name, FlipOutcome(*one))
         for memory, count in counts.items()
         for name in names
         for one in _first(
@@ -68,45 +93,45 @@ def run(
     ]
 
 
-def _first(blocks: Iterable[list[Found] | None]) -> Iterator[Found]:
+def _first(blocks: Iterable[list[FlipOutcome] | None]) -> Iterator[FlipOutcome]:
     """Flips of the blocks up to the first that is not there: which ones are there may depend on what came of them."""
     for found in itertools.takewhile(lambda block: block is not None, blocks):
         yield from found or ()
 
 
-def _block(design: str, memory: bool, block: int) -> list[Found]:
-    def new() -> list[Found]:
+def _block(design: str, memory: bool, block: int) -> list[FlipOutcome]:
+    def new() -> list[FlipOutcome]:
         reference = _reference(design)
         return [flip.follow(reference, each) for each in flip.drawn(reference, memory, BLOCK, block)]
 
-    rows: list[Found] = kept.kept("flips", _key(design, memory, block), new)
+    rows: list[FlipOutcome] = kept.kept("flips", _key(design, memory, block), new)
     return rows
 
 
 def _key(design: str, memory: bool, block: int) -> str:
-    return repr((kept.made_by(__name__, designs.skin(design)), memory, block))
+    return repr((kept.made_by(__name__, skin(design)), memory, block))
 
 
 def finished(names: Iterable[str]) -> list[Row]:
     """All flips of these designs that were followed before: of each the blocks up to the first one that was not."""
     return [
-        Row(name, Found(*one))
+        Row(name, FlipOutcome(*one))
         for memory in (False, True)
         for name in names
         for one in _first(kept.found("flips", _key(name, memory, block)) for block in itertools.count())
     ]
 
 
-@functools.lru_cache(maxsize=len(designs.DESIGNS))
+@functools.lru_cache(maxsize=len(DESIGNS))
 def _reference(design: str) -> Reference:
-    return Reference(designs.skin(design))
+    return Reference(skin(design))
 
 
 def write(rows: Iterable[Row], path: Path) -> None:
     """One line per flip."""
     with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(("design", *Found._fields))
+        lines.writerow(("design", *FlipOutcome._fields))
         for row in rows:
             found = row.found._replace(seconds=round(row.found.seconds, 6), gone_s=round(row.found.gone_s, 6))
             lines.writerow((row.design, *found))
@@ -119,7 +144,7 @@ def read(path: Path) -> list[Row]:
 
 
 def _row(line: dict[str, str]) -> Row:
-    found = Found(
+    found = FlipOutcome(
         name=line["name"],
         memory=line["memory"] == "True",
         outcome=line["outcome"],  # type: ignore[arg-type]

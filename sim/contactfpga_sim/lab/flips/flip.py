@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from contactfpga_sim.lab.flips import touches
-from contactfpga_sim.lab.flips.reference import AFTER_S, FIRST_S, LAST_S, Heard, Listener, Reference
+from contactfpga_sim.lab.flips.reference import AFTER_S, FIRST_S, LAST_S, DeliveredFrame, Listener, Reference
 from contactfpga_sim.model.board.state import Bit, Storage
 
 SETTLED_STEPS = 4
@@ -30,7 +30,7 @@ class Flip(NamedTuple):
     cycle: int
 
 
-class Found(NamedTuple):
+class FlipOutcome(NamedTuple):
     """What came of it."""
 
     name: str
@@ -68,7 +68,7 @@ def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Fli
     return flips
 
 
-def follow(reference: Reference, flip: Flip) -> Found:
+def follow(reference: Reference, flip: Flip) -> FlipOutcome:
     """Flip it and say what comes of it."""
     listener, heard, gone_s = _run(reference, flip)
     place = reference.board.places[flip.bit.place]
@@ -80,19 +80,21 @@ def follow(reference: Reference, flip: Flip) -> Found:
         return _silent(place, heard, silent, gone_s)
     flags = [kind for one, kind in wrong if one.flagged]
     kind = told or ("flag" if flags or any(one.flagged for one in heard) else "")
-    return Found(place.name, place.memory, "told" if kind else "masked", kind, 0, 0.0, gone_s)
+    return FlipOutcome(place.name, place.memory, "told" if kind else "masked", kind, 0, 0.0, gone_s)
 
 
-def _silent(place: Storage, heard: list[Heard], silent: list[tuple[Heard, str]], gone_s: float) -> Found:
+def _silent(
+    place: Storage, heard: list[DeliveredFrame], silent: list[tuple[DeliveredFrame, str]], gone_s: float
+) -> FlipOutcome:
     first, last = silent[0][0].time_s, silent[-1][0].time_s
     after = [one.time_s for one in heard if one.time_s > last]
     until = after[0] if after else last
     kinds = sorted({kind for _, kind in silent})
     frames = sum(kind != "stale" for _, kind in silent)
-    return Found(place.name, place.memory, "silent", ", ".join(kinds), frames, until - first, gone_s)
+    return FlipOutcome(place.name, place.memory, "silent", ", ".join(kinds), frames, until - first, gone_s)
 
 
-def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[Heard], float]:
+def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFrame], float]:
     """The host after it, all frames since, and how long the board was another one."""
     board, skin, clocks = reference.board, reference.skin, reference.step_clocks
     number = flip.cycle // clocks
@@ -117,7 +119,7 @@ def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[Heard], float
     return listener, [one for one in heard if one.time_s > flip.cycle / skin.clock_hz], gone_s
 
 
-def _told(reference: Reference, listener: Listener, heard: list[Heard], gone_s: float, begun_s: float) -> str:
+def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame], gone_s: float, begun_s: float) -> str:
     """The first of the ways in which the host knows."""
     stats = listener.conversation.stats
     if listener.surprises:
@@ -133,7 +135,7 @@ def _told(reference: Reference, listener: Listener, heard: list[Heard], gone_s: 
     return "silence" if max(np.diff(times), default=0.0) > QUIET_S[reference.skin.send] else ""
 
 
-def _wrong(reference: Reference, heard: list[Heard]) -> list[tuple[Heard, str]]:
+def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[DeliveredFrame, str]]:
     """Frames that say what was not there or a time that was not theirs, and moments at which the host believes in a
     frame that a newer one should have replaced."""
     found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
@@ -142,7 +144,7 @@ def _wrong(reference: Reference, heard: list[Heard]) -> list[tuple[Heard, str]]:
     return sorted(found, key=lambda pair: pair[0].time_s)
 
 
-def _since_restart(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
+def _since_restart(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
     """The same with times as if the board had not been restarted: the first frame after it is as late as usual."""
     begun: dict[int, float] = {0: 0.0}
     for one in heard:
@@ -150,7 +152,7 @@ def _since_restart(reference: Reference, heard: Sequence[Heard]) -> Iterator[Hea
         yield one._replace(late_s=one.late_s - shift)
 
 
-def _kind(reference: Reference, one: Heard) -> str:
+def _kind(reference: Reference, one: DeliveredFrame) -> str:
     early, late = reference.late_s[0] - reference.slack_s, reference.late_s[1] + reference.slack_s
     first = max(0, int((one.time_s - late) / touches.STEP_S))
     if not reference.truth.holds(one.said, first, int(one.time_s / touches.STEP_S)):
@@ -158,7 +160,7 @@ def _kind(reference: Reference, one: Heard) -> str:
     return "" if early <= one.late_s <= late else "time"
 
 
-def _stale(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
+def _stale(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
     """For each change of the sheet that the host does not know of in time: that moment."""
     late = reference.late_s[1] + reference.slack_s
     for before, after in itertools.pairwise(heard):

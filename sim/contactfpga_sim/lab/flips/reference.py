@@ -26,7 +26,7 @@ AFTER_S = 0.5
 """How long a flip is followed."""
 
 
-class Heard(NamedTuple):
+class DeliveredFrame(NamedTuple):
     """A frame that the driver passed on."""
 
     time_s: float
@@ -52,11 +52,11 @@ class Listener:
     def new(cls, skin: Skin) -> Listener:
         return cls(Conversation("the board", expected=skin, rng=random.Random(1)))
 
-    def hear(self, events: np.ndarray, clock_hz: int) -> list[Heard]:
+    def hear(self, events: np.ndarray, clock_hz: int) -> list[DeliveredFrame]:
         """Bytes as they came; each packet is handed on with its delimiter."""
         data = events["data"].astype(np.uint8)
         ends = np.flatnonzero(data == framing.DELIMITER) + 1
-        found: list[Heard] = []
+        found: list[DeliveredFrame] = []
         for start, end in zip([0, *ends], [*ends, len(data)]):
             if start == end:
                 continue
@@ -68,12 +68,12 @@ class Listener:
         return found
 
 
-def _heard(event: Arrival, now: float, restarts: int) -> Heard:
+def _heard(event: Arrival, now: float, restarts: int) -> DeliveredFrame:
     zones = event.zones
     assert zones.time_us is not None
     # The touches of the study jump, and the host says so.
     flagged = bool(zones.flags - {"motion"} or zones.faults)
-    return Heard(now, touches.said(zones), now - zones.time_us / 1e6, flagged, restarts)
+    return DeliveredFrame(now, touches.said(zones), now - zones.time_us / 1e6, flagged, restarts)
 
 
 class Step(NamedTuple):
@@ -83,7 +83,7 @@ class Step(NamedTuple):
     listener: Listener
     events: np.ndarray
     """Bytes until the next one."""
-    heard: list[Heard]
+    heard: list[DeliveredFrame]
     """Frames among them."""
 
 
@@ -111,8 +111,8 @@ class Reference:
         self.late_s = min(late), max(late)
 
     @functools.cached_property
-    def truth(self) -> touches.Truth:
-        return touches.Truth(self.skin, self.sheets)
+    def truth(self) -> touches.TruthWindow:
+        return touches.TruthWindow(self.skin, self.sheets)
 
     @property
     def slack_s(self) -> float:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.inputs.files import replaced
-from contactfpga_sim.lab.flips import designs
+from contactfpga_sim.lab.flips import campaign
 from contactfpga_sim.lab.flips.campaign import Row, wilson
 from contactfpga_sim.lab.flips.flip import module
 from contactfpga_sim.model.board.state import StateBoard
@@ -49,10 +49,10 @@ def measured(names: Iterable[str]) -> list[Design]:
     """Bits and LUT4 of designs; needs the programs of the extra ``boards``."""
     found = []
     for name in names:
-        board = StateBoard(designs.skin(name))
+        board = StateBoard(campaign.skin(name))
         bits = [sum(place.bits for place in board.places if place.memory == memory) for memory in (False, True)]
         board.close()
-        found.append(Design(name, designs.luts(name), *bits))
+        found.append(Design(name, campaign.luts(name), *bits))
     return found
 
 

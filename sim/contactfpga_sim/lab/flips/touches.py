@@ -44,7 +44,7 @@ def said(zones: Zones) -> Said:
     return zones.pressed, zones.total_zones, moments
 
 
-class Truth:
+class TruthWindow:
     """What frames may say at each step: any scan of the sheet, which may have changed between two of its rows. A scan
     that looks first which rows are touched passes over those that were not.
 

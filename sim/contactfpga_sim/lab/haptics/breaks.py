@@ -1,4 +1,4 @@
-"""Where force joined to location fails: one thing that is not as assumed is turned up until what is stated is wrong.
+"""Where force joined to location fails: one thing that is not as assumed is increased until what is stated is wrong.
 
 Each value of a knob is tried with many contacts. It is right while the stated 95 % hold for 90 % of them at least. The
 system says so where it does for more than half of those for which they do not hold.
@@ -20,7 +20,7 @@ from contactfpga.robot.haptics.rate import hexapod
 from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.haptics import coverage
-from contactfpga_sim.lab.haptics.coverage import PATCH, Case
+from contactfpga_sim.lab.haptics.coverage import PATCH, CoverageCase
 
 CONTACTS = 300
 """At each value."""
@@ -39,7 +39,7 @@ Random = np.random.Generator
 
 
 @dataclasses.dataclass(frozen=True)
-class Load:
+class Disturbance:
     """What is done to a link with units, and what is not as assumed."""
 
     unseen_n: float = 0.0
@@ -54,7 +54,7 @@ class Load:
 
 
 @dataclasses.dataclass(frozen=True)
-class Trial:
+class ContactTrial:
     """One contact: whether what was stated holds, what said that it does not, and how far it is off."""
 
     holds: bool
@@ -62,7 +62,7 @@ class Trial:
     off: float
 
 
-def outcome(trials: list[Trial], unit: str) -> Outcome:
+def outcome(trials: list[ContactTrial], unit: str) -> Outcome:
     """Of all contacts at a value."""
     off = math.sqrt(sum(trial.off**2 for trial in trials) / len(trials))
     share = sum(trial.holds for trial in trials) / len(trials)
@@ -72,7 +72,7 @@ def outcome(trials: list[Trial], unit: str) -> Outcome:
     return Outcome(share >= HOLDS, told, f"{off:.3g} {unit} off, {100 * share:.0f} % as stated", 100 * (1 - share))
 
 
-def cells(load: Load) -> LoadCells:
+def cells(load: Disturbance) -> LoadCells:
     """A hexapod at mid-length, tilted by 60 degrees."""
     ends = None if math.isinf(load.ends_n) else (-load.ends_n, load.ends_n)
     units = [
@@ -82,7 +82,7 @@ def cells(load: Load) -> LoadCells:
     return LoadCells(units)
 
 
-def pressed(load: Load, made: LoadCells, rng: Random) -> tuple[Floats, Floats, Contacts]:
+def pressed(load: Disturbance, made: LoadCells, rng: Random) -> tuple[Floats, Floats, Contacts]:
     """Place and force of one contact, and what is found of it."""
     x, y = rng.uniform(0, 2 * math.pi * SURFACE.radius_m), rng.uniform(-LEVER_M, LEVER_M)
     point, normal = (np.array(each) for each in SURFACE.place(x, y))
@@ -112,7 +112,7 @@ def _told(found: Contacts, alarm: bool) -> tuple[str, ...]:
     return tuple(name for name, mark in marks.items() if mark)
 
 
-def _force(load: Load) -> list[Trial]:
+def _force(load: Disturbance) -> list[ContactTrial]:
     """The force at the zone, by the zone's place."""
     rng, made, trials = np.random.default_rng(1), cells(load), []
     for _ in range(CONTACTS):
@@ -120,11 +120,11 @@ def _force(load: Load) -> list[Trial]:
         assert found.covariance_n2 is not None
         off = np.array(found[0].force_n) - force
         within = bool(off @ np.linalg.solve(found.covariance_n2, off) < CHI2_3)
-        trials.append(Trial(within, _told(found, True), float(np.linalg.norm(off))))
+        trials.append(ContactTrial(within, _told(found, True), float(np.linalg.norm(off))))
     return trials
 
 
-def _center(load: Load) -> list[Trial]:
+def _center(load: Disturbance) -> list[ContactTrial]:
     """The center of pressure, by the units alone."""
     rng, made, trials = np.random.default_rng(1), cells(load), []
     around = 2 * math.pi * SURFACE.radius_m
@@ -132,18 +132,18 @@ def _center(load: Load) -> list[Trial]:
         place, _, found = pressed(load, made, rng)
         center = SURFACE.center(found.wrench)
         if center is None or center.covariance_m2 is None:
-            trials.append(Trial(False, ("no center",), 0.0))
+            trials.append(ContactTrial(False, ("no center",), 0.0))
             continue
         away = np.array(center.sheet_m) - place
         away[0] -= around * round(away[0] / around)
         off = float(np.hypot(*away))
-        trials.append(Trial(off <= radius_95(center.covariance_m2), _told(found, False), 1e3 * off))
+        trials.append(ContactTrial(off <= radius_95(center.covariance_m2), _told(found, False), 1e3 * off))
     return trials
 
 
-def _friction(kind: str, drag: float) -> list[Trial]:
+def _friction(kind: str, drag: float) -> list[ContactTrial]:
     """Two fingers that push and drag: whether the stated intervals hold the true pushes."""
-    rng, made, trials = np.random.default_rng(1), cells(Load()), []
+    rng, made, trials = np.random.default_rng(1), cells(Disturbance()), []
     assert made.noise is not None
     for _ in range(CONTACTS):
         places = [SURFACE.place(rng.uniform(0, 0.09), at) for at in (-0.03, 0.03)]
@@ -162,11 +162,11 @@ def _friction(kind: str, drag: float) -> list[Trial]:
             slack = 4 * SIGMA_N * 2
             stated.append(low - slack <= push <= (math.inf if high is None else high) + slack)
             off = max(off, abs((one.normal_n or 0.0) - push))
-        trials.append(Trial(all(stated) if kind == "interval" else off <= 1.0, told, off))
+        trials.append(ContactTrial(all(stated) if kind == "interval" else off <= 1.0, told, off))
     return trials
 
 
-def _located(case: Case) -> list[Trial]:
+def _located(case: CoverageCase) -> list[ContactTrial]:
     """Places on a flat sheet."""
     rng, finder, trials = np.random.default_rng(1), coverage.locator(case), []
     for _ in range(CONTACTS):
@@ -175,11 +175,11 @@ def _located(case: Case) -> list[Trial]:
             continue
         place, _ = coverage.METHODS[case.method](case, finder, rng, one)
         off = math.hypot(place.x_m - one.x_m, place.y_m - one.y_m)
-        trials.append(Trial(off <= place.radius_m, () if place.agrees else ("agrees = False",), 1e3 * off))
+        trials.append(ContactTrial(off <= place.radius_m, () if place.agrees else ("agrees = False",), 1e3 * off))
     return trials
 
 
-def _both(change: Callable[[float], Load]) -> dict[str, Callable[[float], Outcome]]:
+def _both(change: Callable[[float], Disturbance]) -> dict[str, Callable[[float], Outcome]]:
     """The force at a zone, and the center of pressure."""
     return {
         "force at the zone": lambda value: outcome(_force(change(value)), "N"),
@@ -187,39 +187,41 @@ def _both(change: Callable[[float], Load]) -> dict[str, Callable[[float], Outcom
     }
 
 
-def _places(*methods: tuple[str, Case], **knob: Callable[[float], object]) -> dict[str, Callable[[float], Outcome]]:
-    def run(case: Case, value: float) -> Outcome:
-        turned = dataclasses.replace(case, **{name: change(value) for name, change in knob.items()})  # type: ignore[arg-type]
-        return outcome(_located(turned), "mm")
+def _places(
+    *methods: tuple[str, CoverageCase], **knob: Callable[[float], object]
+) -> dict[str, Callable[[float], Outcome]]:
+    def run(case: CoverageCase, value: float) -> Outcome:
+        changed = dataclasses.replace(case, **{name: change(value) for name, change in knob.items()})  # type: ignore[arg-type]
+        return outcome(_located(changed), "mm")
 
     return {name: functools.partial(run, case) for name, case in methods}
 
 
 RAMP = (30.0, 30.0)
-CLOSINGS = Case("closings", 5.0, RAMP)
+CLOSINGS = CoverageCase("closings", 5.0, RAMP)
 SHARE = "contacts outside the stated 95 %, %"
 
 KNOBS = {
     knob.name: knob
     for knob in (
         Knob("unseen", "A second contact that the sheet does not show", "its push, N", SHARE,
-              (0, 0.1, 0.2, 0.5, 1, 2, 4, 8), _both(lambda value: Load(unseen_n=value)),
+              (0, 0.1, 0.2, 0.5, 1, 2, 4, 8), _both(lambda value: Disturbance(unseen_n=value)),
               "look at `alarm`; trust neither force nor place where it is set"),
         Knob("drift", "A unit whose zero has drifted", "drift, N", SHARE, (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
-              _both(lambda value: Load(drift_n=value)), "`haptics zero` while nothing touches; `DriftWatch`"),
+              _both(lambda value: Disturbance(drift_n=value)), "`haptics zero` while nothing touches; `DriftWatch`"),
         Knob("torsion", "A contact that turns about its normal", "torsion, Nm", SHARE,
-              (0, 0.002, 0.005, 0.01, 0.02, 0.05), _both(lambda value: Load(torsion_nm=value)),
+              (0, 0.002, 0.005, 0.01, 0.02, 0.05), _both(lambda value: Disturbance(torsion_nm=value)),
               "the center of pressure, which measures the torsion"),
         Knob("clipping", "A unit that reads no more than this", "end of its range, N", SHARE,
-              (20, 14, 12, 10, 8, 6, 4), _both(lambda value: Load(ends_n=value)),
+              (20, 14, 12, 10, 8, 6, 4), _both(lambda value: Disturbance(ends_n=value)),
               "units for the loads that `haptics place` names; `saturated`"),
         Knob("lifted", "Units that only push, on springs", "preload, N", SHARE, (20, 14, 12, 10, 8, 6, 4),
-              _both(lambda value: Load(preload_n=value)), "more preload; `lifted`"),
+              _both(lambda value: Disturbance(preload_n=value)), "more preload; `lifted`"),
         Knob("elsewhere", "A stuck switch: the zone is not where the contact is", "distance, mm", SHARE,
-              (0, 2, 5, 10, 20, 40), _both(lambda value: Load(elsewhere_m=1e-3 * value)),
+              (0, 2, 5, 10, 20, 40), _both(lambda value: Disturbance(elsewhere_m=1e-3 * value)),
               "`contactfpga doctor --watch` names the switch; `mask`"),
         Knob("shape", "A ball that is taken for a point", "its radius, mm", SHARE, (1, 2, 3, 5, 8, 12, 19),
-              _places(("set, 5 mm", Case("set", 5.0, true=PATCH)),
+              _places(("set, 5 mm", CoverageCase("set", 5.0, true=PATCH)),
                       ("closings, 5 mm", dataclasses.replace(CLOSINGS, true=PATCH)),
                       ball=lambda value: Ball(1e-3 * value, 4.6e5)),
               "the right `Model`; with several, the one that agrees"),
@@ -231,12 +233,13 @@ KNOBS = {
         Knob("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms", SHARE,
               (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
               _places(("closings, 0.5 N of noise", CLOSINGS),
-                      ("closings, 0.1 N, no spread", Case("closings", 5.0, RAMP, 0.0, 0.1)),
+                      ("closings, 0.1 N, no spread", CoverageCase("closings", 5.0, RAMP, 0.0, 0.1)),
                       late_n=lambda value: 1.6 * value),
               "units on the board, which has one clock"),
         Knob("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm", SHARE,
               (12, 8, 5, 2, 0, -1, -2, -3),
-              _places(("barycenter, 5 mm", Case("barycenter", 5.0, RAMP, 0.0, 0.0)), ("set, 5 mm", Case("set", 5.0)),
+              _places(("barycenter, 5 mm", CoverageCase("barycenter", 5.0, RAMP, 0.0, 0.0)),
+                      ("set, 5 mm", CoverageCase("set", 5.0)),
                       ("closings, 5 mm", CLOSINGS), inside_mm=float),
               "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
     )

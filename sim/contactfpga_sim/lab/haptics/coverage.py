@@ -41,7 +41,7 @@ def units() -> LoadCells:
 
 
 @dataclasses.dataclass(frozen=True)
-class Case:
+class CoverageCase:
     """A method, what it assumes, and what is true."""
 
     method: str
@@ -69,7 +69,7 @@ class Case:
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class Coverage:
     """Over all contacts that closed a switch."""
 
     count: int
@@ -98,7 +98,7 @@ class Pressed:
     """True forces, in the order of the cells."""
 
 
-def locator(case: Case) -> Locator:
+def locator(case: CoverageCase) -> Locator:
     """As the case assumes it to be."""
     sheet = Sheet(
         rows=LINES,
@@ -115,7 +115,7 @@ def locator(case: Case) -> Locator:
     return Locator(sheet, reach_of(case.assumed), case.spread, case.force_sigma_n)
 
 
-def run(case: Case, count: int, seed: int = 1) -> Outcome:
+def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
     """Press ``count`` times."""
     rng, finder = np.random.default_rng(seed), locator(case)
     find: Callable[[Pressed], tuple[Place, float]] = functools.partial(METHODS[case.method], case, finder, rng)
@@ -134,12 +134,12 @@ def run(case: Case, count: int, seed: int = 1) -> Outcome:
     covered = float(np.mean(np.array(errors) <= radii))
     finite = [one for one in theory if math.isfinite(one)]
     least = float(np.median(finite)) if finite else math.nan
-    return Outcome(
+    return Coverage(
         len(errors), _rms(errors), _rms(coarse), covered, float(np.median(radii)), least, 1 - float(np.mean(agrees))
     )
 
 
-def press(case: Case, rng: np.random.Generator) -> Pressed:
+def press(case: CoverageCase, rng: np.random.Generator) -> Pressed:
     """A push that rises at a random place of a cell."""
     pitch = 1e-3 * case.pitch_mm
     x, y = (MIDDLE + rng.random(2)) * pitch
@@ -154,46 +154,46 @@ def press(case: Case, rng: np.random.Generator) -> Pressed:
     return Pressed(float(x), float(y), push, cells, [float(closing[cell]) for cell in cells])
 
 
-def _measured(case: Case, rng: np.random.Generator, force: float) -> float:
+def _measured(case: CoverageCase, rng: np.random.Generator, force: float) -> float:
     sigma = case.force_sigma_n if case.true_sigma_n is None else case.true_sigma_n
     return max(0.01, force + sigma * float(rng.standard_normal()))
 
 
-def _closings(case: Case, rng: np.random.Generator, one: Pressed) -> list[Closing]:
+def _closings(case: CoverageCase, rng: np.random.Generator, one: Pressed) -> list[Closing]:
     return [Closing(*cell, _measured(case, rng, force + case.late_n)) for cell, force in zip(one.cells, one.closing_n)]
 
 
-def by_barycenter(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_barycenter(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
     """Static, with the push known."""
     rows, columns = np.mean(one.cells, axis=0) * 1e-3 * case.pitch_mm
     return finder.barycenter(float(columns), float(rows), _measured(case, rng, one.push_n)), math.nan
 
 
-def by_set(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
     """Static, with cells and push known."""
     return finder.locate(one.cells, _measured(case, rng, one.push_n)), math.nan
 
 
-def by_closings(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_closings(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
     """With the push at each closing."""
     closings = _closings(case, rng, one)
     return finder.locate(one.cells, _measured(case, rng, one.push_n), closings), bound_m(case, one)
 
 
-def by_center(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
     """By three units alone."""
     found = _center(case, finder, rng, one)
     return found, found.radius_m
 
 
-def by_both(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_both(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
     """Closings and units."""
     center = _center(case, finder, rng, one)
     found = finder.locate(one.cells, one.push_n, _closings(case, rng, one), center)
     return found, math.nan
 
 
-def _center(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> Place:
+def _center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> Place:
     cells = units()
     x, y = one.x_m - _middle_m(case), one.y_m - _middle_m(case)
     exerted = np.array([0, 0, -one.push_n, -one.push_n * y, one.push_n * x, 0])
@@ -204,11 +204,11 @@ def _center(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed)
     return finder.center(center, (-_middle_m(case), -_middle_m(case)))
 
 
-def _middle_m(case: Case) -> float:
+def _middle_m(case: CoverageCase) -> float:
     return 1e-3 * case.pitch_mm * (LINES - 1) / 2
 
 
-def bound_m(case: Case, one: Pressed) -> float:
+def bound_m(case: CoverageCase, one: Pressed) -> float:
     """The smallest radius that holds 95 % and that noise allows, from how steeply each closing's force depends on the
     place (Cramér and Rao); NaN with less than two closings, or with two and the contact on their line."""
     reach, pitch = reach_of(case.assumed), 1e-3 * case.pitch_mm
@@ -231,7 +231,7 @@ def _rms(errors: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-METHODS: dict[str, Callable[[Case, Locator, np.random.Generator, Pressed], tuple[Place, float]]] = {
+METHODS: dict[str, Callable[[CoverageCase, Locator, np.random.Generator, Pressed], tuple[Place, float]]] = {
     "barycenter": by_barycenter,
     "set": by_set,
     "closings": by_closings,
@@ -241,22 +241,22 @@ METHODS: dict[str, Callable[[Case, Locator, np.random.Generator, Pressed], tuple
 
 RAMP = (30.0, 30.0)
 RIGHT = (
-    Case("barycenter", 10.0, RAMP, 0.0, 0.0),
-    Case("barycenter", 5.0, RAMP, 0.0, 0.0),
-    Case("set", 5.0),
-    Case("set", 3.4),
-    Case("closings", 5.0, RAMP),
-    Case("closings", 3.4, RAMP),
-    Case("center of pressure", 10.0, (12.0, 12.0)),
-    Case("closings + center of pressure", 5.0, RAMP),
+    CoverageCase("barycenter", 10.0, RAMP, 0.0, 0.0),
+    CoverageCase("barycenter", 5.0, RAMP, 0.0, 0.0),
+    CoverageCase("set", 5.0),
+    CoverageCase("set", 3.4),
+    CoverageCase("closings", 5.0, RAMP),
+    CoverageCase("closings", 3.4, RAMP),
+    CoverageCase("center of pressure", 10.0, (12.0, 12.0)),
+    CoverageCase("closings + center of pressure", 5.0, RAMP),
 )
 """What is assumed is true."""
 
 WRONG = (
-    Case("set", 5.0, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
-    Case("closings", 5.0, RAMP, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
-    Case("closings", 5.0, RAMP, true_spread=0.3, wrong="thresholds spread by 30 %, taken for 10 %"),
-    Case("closings", 5.0, RAMP, true_sigma_n=2.0, wrong="forces off by 2 N, taken for 0.5 N"),
-    Case("center of pressure", 10.0, (12.0, 12.0), drift_n=0.2, wrong="a unit drifted by 0.2 N"),
+    CoverageCase("set", 5.0, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
+    CoverageCase("closings", 5.0, RAMP, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
+    CoverageCase("closings", 5.0, RAMP, true_spread=0.3, wrong="thresholds spread by 30 %, taken for 10 %"),
+    CoverageCase("closings", 5.0, RAMP, true_sigma_n=2.0, wrong="forces off by 2 N, taken for 0.5 N"),
+    CoverageCase("center of pressure", 10.0, (12.0, 12.0), drift_n=0.2, wrong="a unit drifted by 0.2 N"),
 )
 """What is assumed is not."""

@@ -118,7 +118,7 @@ class Touching:
 
 
 @dataclasses.dataclass
-class Heard:
+class FrameArrival:
     """A frame, and when the host had it and its readings."""
 
     zones: Zones
@@ -126,13 +126,13 @@ class Heard:
     known_s: float = math.inf
 
 
-def heard(touching: Touching, until_s: float) -> list[Heard]:
+def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
     """All frames until then."""
-    found: list[Heard] = []
-    open_ones: list[Heard] = []
+    found: list[FrameArrival] = []
+    open_ones: list[FrameArrival] = []
     with contactfpga.open(touching.board(), touching.setting.skin) as board:
         while board.clock() < until_s:
-            one = Heard(board.next(), board.clock())
+            one = FrameArrival(board.next(), board.clock())
             found.append(one)
             open_ones.append(one)
             for each in [each for each in open_ones if each.zones.units is not None]:
@@ -190,7 +190,7 @@ def _places(
 
 
 @dataclasses.dataclass(frozen=True)
-class Forces:
+class PairForces:
     """What is found of two contacts."""
 
     zones: int
@@ -207,7 +207,7 @@ BOTH = 4
 """Frames of both, the last of which is asked."""
 
 
-def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> Forces:
+def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> PairForces:
     """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found. Points
     lie where each alone closes a switch; fingers lie anywhere, since they are wider than the pitch."""
     setting = SETTINGS[0]
@@ -233,10 +233,10 @@ def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) ->
             both += len(zones) == 2
     found = felt(cells, zones, friction=0.0, alone=alone)
     if found is None or len(zones) != 2:
-        return Forces(len(zones), ())
+        return PairForces(len(zones), ())
     true_m = 1e-3 * np.array(places) + np.array(cells.sheet_m)
     pairs = [min(found, key=lambda one: math.dist(one.point_m[:2], place)) for place in true_m]
-    return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
+    return PairForces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
 
 
 def pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 
+import matplotlib
+import numpy as np
+
+from contactfpga import picture_style as style
+from contactfpga.inputs.files import write_text
 from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.haptics import coverage, felt_tables
-from contactfpga_sim.lab.haptics.coverage import Case
+from contactfpga_sim.lab.failures import knob_pictures, tables
+from contactfpga_sim.lab.failures.knob import Sweep
+from contactfpga_sim.lab.haptics import breaks, coverage, felt, pairs
+from contactfpga_sim.lab.haptics.coverage import CoverageCase
+from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
 RING_M = 0.03
@@ -65,7 +74,7 @@ def wrong_table() -> str:
     return writer.table_of(rows)
 
 
-def _named(case: Case) -> str:
+def _named(case: CoverageCase) -> str:
     return f"{case.method}, {case.pitch_mm:g} mm"
 
 
@@ -75,4 +84,114 @@ def _percent(share: float) -> str:
 
 def draw(folder: Path) -> list[Path]:
     """The arrangements of units, and what is felt."""
-    return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *felt_tables.draw(folder)]
+    return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *draw_felt(folder)]
+
+
+END_TO_END = 100
+"""Of each line; `make campaign` presses 1,000 in all."""
+
+LIMITS = 1000
+"""Pairs that tell what limits them."""
+APART_MM = (30.0, 60.0, 100.0)
+SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
+
+
+@functools.cache
+def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
+    """(contacts, times) errors in m of each method."""
+    each = [felt.errors(setting, seed, times_s) for seed in range(count)]
+    return {method: np.array([one[method] for one in each]) for method in METHODS}
+
+
+def interval(errors: np.ndarray) -> tuple[float, float, float]:
+    """Root mean square, and its 95 % interval, from the spread of the squares; NaN are left out."""
+    squares = errors[~np.isnan(errors)] ** 2
+    mean, half = squares.mean(), 1.96 * squares.std(ddof=1) / math.sqrt(len(squares))
+    return math.sqrt(mean), math.sqrt(max(0.0, mean - half)), math.sqrt(mean + half)
+
+
+def felt_table() -> str:
+    """Errors of the place over time, by setting and method."""
+    rows = [["sheet", "method", *(f"{1e3 * one:g} ms" for one in SHOWN_S)]]
+    for setting in SETTINGS:
+        for method, errors in found(setting).items():
+            cells = []
+            for time_s in SHOWN_S:
+                middle, low, high = interval(errors[:, TIMES_S.index(time_s)])
+                cells.append(f"{1e3 * middle:.2f} ({1e3 * low:.2f} to {1e3 * high:.2f}) mm")
+            rows.append([setting.name, method, *cells])
+    return writer.table_of(rows)
+
+
+def pairs_table() -> str:
+    """Forces of two contacts."""
+    rows = [["contacts", "apart", "error of a push", "95 % interval"]]
+    for kind in felt.KINDS:
+        for apart in APART_MM:
+            each = [felt.two(apart, seed, kind) for seed in range(END_TO_END)]
+            off = np.array([one for pair in each for one in pair.off_n])
+            middle, low, high = interval(off)
+            rows.append([kind, f"{apart:g} mm", f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
+    return writer.table_of(rows)
+
+
+def limits_table() -> str:
+    """What limits the forces of two fingers."""
+    rows = [["how fingers are located", "error of a push", "95 % interval"]]
+    for method, errors in pairs.errors(60.0, LIMITS).items():
+        middle, low, high = interval(errors)
+        rows.append([method, f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
+    return writer.table_of(rows)
+
+
+@functools.cache
+def swept() -> dict[str, dict[str, Sweep]]:
+    """Every break."""
+    return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
+
+
+def breaks_table() -> str:
+    """Where each method breaks."""
+    lines = [line for name, methods in swept().items() for line in tables.rows(breaks.KNOBS[name], methods)]
+    return writer.table(tables.HEAD, lines)
+
+
+def breaks_pictures() -> str:
+    """A heading and a picture for each."""
+    return "\n".join(
+        f"({knob.name})=\n\n![{knob.title}](images/haptics/{knob.name}.svg)\n" for knob in breaks.KNOBS.values()
+    )
+
+
+def draw_felt(folder: Path) -> list[Path]:
+    """Error over time, and a picture for each break."""
+    drawn = [_front(folder / "haptics-front.svg")]
+    (folder / "haptics").mkdir(exist_ok=True)
+    for name, methods in swept().items():
+        path = folder / "haptics" / f"{name}.svg"
+        write_text(path, knob_pictures.svg(breaks.KNOBS[name], methods))
+        drawn.append(path)
+    return drawn
+
+
+COLORS = (style.SKY, style.ORANGE, style.PURPLE, style.BLACK)
+MARKS = "o^sD"
+
+
+def _front(path: Path) -> Path:
+    with matplotlib.rc_context(style.SETTINGS):
+        figure = style.new(3.4)
+        panels = figure.subplots(1, len(SETTINGS), sharey=True)
+        for panel, setting in zip(panels, SETTINGS):
+            for (method, errors), color, mark in zip(found(setting).items(), COLORS, MARKS):
+                middle = [1e3 * interval(errors[:, at])[0] for at in range(len(TIMES_S))]
+                panel.loglog([1e3 * one for one in TIMES_S], middle, marker=mark, ms=4, color=color, label=method)
+            noisy = ", noisy" if setting.spread else ""
+            panel.set_title(f"pitch {setting.pitch_mm:g} mm{noisy}", loc="left", fontsize=style.NORMAL)
+            panel.set(xlabel="ms after the first switch closed", xticks=(0.3, 1, 3, 10), yticks=(0.01, 0.1, 1))
+            panel.minorticks_off()
+            panel.xaxis.set_major_formatter("{x:g}")
+            panel.yaxis.set_major_formatter("{x:g}")
+        panels[0].set(ylabel="error of the place, mm")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(METHODS))
+        return style.save(figure, path)

@@ -8,7 +8,7 @@ from pathlib import Path
 from contactfpga import picture_style as style
 from contactfpga.robot.net.message import HEAD_BYTES
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.net import load, source
+from contactfpga_sim.lab.net import load
 
 BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)
@@ -19,7 +19,7 @@ GIGABIT = 1e9 / 8
 
 
 @functools.cache
-def measured(links: int, batch_ms: float, *, full: bool) -> load.Load:
+def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
     """Once per run of this program. ``full`` has no default: the cache takes a call that leaves it out for another."""
     return load.measure(links, batch_ms / 1000, full)
 
@@ -48,7 +48,7 @@ def links_table() -> str:
     return writer.table_of(rows)
 
 
-def _ends(found: load.Load) -> tuple[float, float, float]:
+def _ends(found: load.NetworkRun) -> tuple[float, float, float]:
     cpu = found.cpu
     return cpu["publishers"], cpu["router"], cpu["reader"] + cpu["other reader"]
 
@@ -57,7 +57,7 @@ def thousand_table() -> str:
     """What a thousand links would take, from what was measured and computed."""
     found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
-    frame = len(source.frames(1)[0])
+    frame = len(load.frames(1)[0])
     messages = 1000 / GROWTH_MS
     per_link = load.RATE_HZ * frame + messages * (HEAD_BYTES + LINE_BYTES)
     total = 1000 * per_link
@@ -78,7 +78,7 @@ def thousand_table() -> str:
     return writer.table_of(rows)
 
 
-def _ratio(found: load.Load) -> str:
+def _ratio(found: load.NetworkRun) -> str:
     return " / ".join(f"{one / bare:.1f}" for one, bare in zip(found.latency, found.bare, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""Measures what the pages state, in clock cycles of the gateware, and writes it there."""
+"""What the pages state of scans, measured in clock cycles of the gateware."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import latency, writer
 from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.adaptive import AdaptiveScanModel
 from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.scenes.families import FAMILIES, placements
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS
 
@@ -52,14 +54,14 @@ REPORTS = ("moments", "barycenter")
 """Those that report zones."""
 
 
-class Latency(NamedTuple):
+class EventTimes(NamedTuple):
     """Median and worst time in us from a switch closing to an event, over the touch instants."""
 
     median: float
     worst: float
 
     @classmethod
-    def of(cls, cycles: list[int], skin: Skin) -> Latency:
+    def of(cls, cycles: list[int], skin: Skin) -> EventTimes:
         us = np.array(cycles) / (skin.clock_hz / 1e6)
         return cls(float(np.median(us)), float(us.max()))
 
@@ -81,7 +83,7 @@ def dots_in_last_row(skin: Skin) -> np.ndarray:
     return cells
 
 
-def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, Latency]:
+def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, EventTimes]:
     """From switches of one row closing to the pin, and to the first and last byte of their frame; by default that of a
     single one in the first row, which is the worst place: the rest of the scan follows it.
     """
@@ -98,7 +100,7 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
             first, last = _first_frame_with_cells(board, skin)
         found["first byte"].append(first - start)
         found["last byte"].append(last - start)
-    return {name: Latency.of(cycles, skin) for name, cycles in found.items()}
+    return {name: EventTimes.of(cycles, skin) for name, cycles in found.items()}
 
 
 def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:
@@ -221,3 +223,90 @@ def reference_sample() -> str:
 def report_sample() -> str:
     """Its first row of :func:`report_table`."""
     return report_row("reference", Skin(report="moments"))
+
+
+FAST, FAST_64 = Skin.load(examples() / "fast.toml"), Skin.load(examples() / "fast-64x64.toml")
+
+FAST_SKINS = {
+    "16x16": (FAST, (3, 3)),
+    "64x64": (FAST_64, (3, 3)),
+    "64x64, palm": (FAST_64, (10, 10)),
+    "64x64, any pattern": (FAST_64.replace(settle_us=2.9, project_us=8.2), (3, 3)),
+}
+"""The last one has the times that docs/settle.md gives for a sheet of which any switches may be pressed."""
+
+TOUCHES = 196
+"""Places of a contact, spread over the sheet; on 16x16 that is every place of 3x3 cells."""
+
+SCENES = 400
+"""Of each family."""
+
+
+def latency_table() -> str:
+    """Latency of the reversal scan, and of a raster scan of the reference sheet."""
+    head = (
+        "sheet", "contact", "touch to `contact` pin, worst", "touch to last byte, median / worst", "bound",
+        "change to last byte, worst", "frames per second", "bytes",
+    )  # fmt: skip
+    rows = [latency_row(name, skin, cells) for name, (skin, cells) in FAST_SKINS.items()]
+    return writer.table(head, [*rows, latency_row("16x16, raster, reference", Skin(), (3, 3))])
+
+
+def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
+    """One line of :func:`latency_table`."""
+    found = latency.measure(skin, cells, TOUCHES)
+    last = found.touch_to_last_byte_us
+    return writer.line(
+        (
+            name,
+            f"{cells[0]}x{cells[1]}",
+            f"{found.touch_to_contact_us.worst:.2f} us",
+            f"**{last.median:.1f} / {last.worst:.1f} us**",
+            _bound(skin, cells, found),
+            f"{found.change_to_last_byte_us.worst:.1f} us",
+            f"{found.frames_per_s:,.0f}",
+            str(found.bytes),
+        )
+    )
+
+
+def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
+    """The projection, a row time per touched row, and the frame's bits; and how far the worst touch is above it."""
+    if not skin.reads_rows:
+        return ""
+    derived = skin.derived
+    slots = derived.project_clocks + cells[0] * derived.row_clocks
+    bound = (slots + 10 * found.bytes * derived.bit_clocks) / derived.clocks_per_us
+    return f"{bound:.1f} us, + {100 * (found.touch_to_last_byte_us.worst / bound - 1):.0f} %"
+
+
+def sides_table() -> str:
+    """Slots per frame of the built-in families, by rows only and by the side with fewer touched lines."""
+    head = ("scenes", "touched rows, mean / most", "slots by rows", "slots by the shorter side", "saved")
+    return writer.table(head, [sides_row(name) for name in FAMILIES])
+
+
+def sides_row(name: str) -> str:
+    """One line of :func:`sides_table`, on 16x16: a projection and a slot per row, or two projections and a slot per row
+    or per column, whichever are fewer, where that is less."""
+    frames = np.stack([scene.pressed(0.0, Skin()) for scene in placements(name, SCENES, 0, Skin())])
+    rows, columns = frames.any(axis=2).sum(axis=1), frames.any(axis=1).sum(axis=1)
+    one = 1 + rows
+    both = np.minimum(one, 2 + np.minimum(rows, columns))
+    saved = 1 - both.mean() / one.mean()
+    counts = (
+        f"{rows.mean():.1f} / {rows.max()}",
+        f"{one.mean():.1f} / {one.max()}",
+        f"{both.mean():.1f} / {both.max()}",
+    )
+    return writer.line((name, *counts, f"{100 * saved:.0f} %"))
+
+
+def latency_sample() -> str:
+    """The first row of :func:`latency_table`."""
+    return latency_row("16x16", *FAST_SKINS["16x16"])
+
+
+def sides_sample() -> str:
+    """The first row of :func:`sides_table`."""
+    return sides_row(next(iter(FAMILIES)))

@@ -1,4 +1,4 @@
-"""The electrical faults of docs/safety.md: how each is put into the simulated sheet, at which places, and what it does.
+"""The electrical faults of docs/safety.md: what a fault is to the simulated sheet, at which places, and what it does.
 
 A new one is an entry in :data:`FAULTS`; study and page take it from there.
 """
@@ -8,12 +8,98 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import ColumnLine
+from contactfpga_sim.model.sheet.wiring import Wiring
 
-Places = Callable[[Skin], Mapping[str, Hurt]]
+Cell = tuple[int, int]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SheetFault:
+    """What is wrong. Rows and columns are those of the sheet; cells are (row, column)."""
+
+    rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
+    """Cut rows: the column from which on their switches no longer reach the pin; 0 is also a driver that never
+    selects."""
+    columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
+    """Cut columns, likewise; 0 is also an input that always reads released."""
+    selected: tuple[int, ...] = ()
+    """Rows that are at the selecting level all the time."""
+    stuck: tuple[int, ...] = ()
+    """Columns that read pressed all the time."""
+    closed: tuple[Cell, ...] = ()
+    """Switches that always conduct."""
+    dead: tuple[Cell, ...] = ()
+    """Switches that never do."""
+    bare: tuple[Cell, ...] = ()
+    """Switches whose diode is shorted."""
+    joined_rows: tuple[Cell, ...] = ()
+    """Pairs of rows that are shorted to each other."""
+    joined_columns: tuple[Cell, ...] = ()
+    """Pairs of columns."""
+    pulls_win: bool = False
+    """How undefined levels read, where two pins drive against each other: as released."""
+    line: ColumnLine | None = None
+    """The columns' time; None: none."""
+    running: bool = True
+    """The board has its supply, its clock and its configuration."""
+    connected: bool = True
+    """Its bytes reach the host."""
+    contact_connected: bool = True
+    """Its pin `contact` reaches the robot."""
+
+    def middle(self, rows: int, columns: int) -> Cell:
+        """A cell that it is at, of a sheet of this size."""
+        for row, column in (*self.closed, *self.dead, *self.bare, *self.rows.items()):
+            return row, min(column, columns - 1)
+        for column, row in self.columns.items():
+            return min(row, rows - 1), column
+        for row in (*self.selected, *(one for one, _ in self.joined_rows)):
+            return row, columns // 2
+        for column in (*self.stuck, *(one for one, _ in self.joined_columns)):
+            return rows // 2, column
+        return rows // 2, columns // 2
+
+    def press(self, board: CompiledBoard, touched: np.ndarray) -> None:
+        """The sheet of a running board from the next cycle on, touched so."""
+        read = self._read(wiring.extended(touched))
+        cuts = wiring.missed(read)
+        board.cut(cuts.rows | dict(self.rows), cuts.columns | dict(self.columns))
+        stuck = np.zeros(board.skin.column_lines, bool)
+        stuck[list(self.stuck)] = True
+        for row in self.selected:  # its columns read pressed whatever row is driven, its guard column too
+            stuck |= read[row, : len(stuck)]
+        board.stick(stuck)
+        if self.line is not None:
+            board.settle(self.line)
+        board.press(read[:-1, :-1])
+
+    def _read(self, closed: np.ndarray) -> np.ndarray:
+        """The switches that read pressed, each in its row's time, of those of an extended sheet that are closed."""
+        cells = closed.copy()
+        for cell in self.closed:
+            cells[cell] = True
+        for cell in self.dead:
+            cells[cell] = False
+        if self.bare:
+            bare = np.zeros_like(cells)
+            bare[tuple(zip(*self.bare, strict=True))] = True
+            read, undefined = Wiring(bare=bare).read(cells)
+            cells = read if self.pulls_win else read | undefined
+        for one, other in self.joined_rows:
+            cells[[one, other]] = False if self.pulls_win else cells[one] | cells[other]
+        for one, other in self.joined_columns:
+            cells[:, one] = cells[:, other] = cells[:, one] | cells[:, other]
+        return cells
+
+
+Places = Callable[[Skin], Mapping[str, SheetFault]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,43 +122,45 @@ def _ends(length: int) -> tuple[int, ...]:
     return 0, length // 2, length - 1
 
 
-def _cut_rows(skin: Skin) -> Mapping[str, Hurt]:
+def _cut_rows(skin: Skin) -> Mapping[str, SheetFault]:
     ends = _ends(skin.columns)
-    return {f"row {row} at column {end}": Hurt(rows={row: end}) for row in range(skin.rows) for end in ends}
+    return {f"row {row} at column {end}": SheetFault(rows={row: end}) for row in range(skin.rows) for end in ends}
 
 
-def _cut_columns(skin: Skin) -> Mapping[str, Hurt]:
+def _cut_columns(skin: Skin) -> Mapping[str, SheetFault]:
     ends = _ends(skin.rows)
-    return {f"column {line} at row {end}": Hurt(columns={line: end}) for line in range(skin.columns) for end in ends}
+    return {
+        f"column {line} at row {end}": SheetFault(columns={line: end}) for line in range(skin.columns) for end in ends
+    }
 
 
-def _row_chips(skin: Skin) -> Mapping[str, Hurt]:
+def _row_chips(skin: Skin) -> Mapping[str, SheetFault]:
     """Of a connector or a 74HC595: its rows, or all rows after it in the chain too."""
     firsts = range(0, skin.rows, 8)
     alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
     return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
 
 
-def _rows(numbers: range) -> Hurt:
-    return Hurt(rows=dict.fromkeys(numbers, 0))
+def _rows(numbers: range) -> SheetFault:
+    return SheetFault(rows=dict.fromkeys(numbers, 0))
 
 
-def _column_chips(skin: Skin) -> Mapping[str, Hurt]:
+def _column_chips(skin: Skin) -> Mapping[str, SheetFault]:
     firsts = range(0, skin.columns, 8)
     alone = {f"columns {first} on, 8": _columns(range(first, min(first + 8, skin.columns))) for first in firsts}
     return alone | {f"columns {first} on, all": _columns(range(first, skin.column_lines)) for first in firsts}
 
 
-def _columns(numbers: range) -> Hurt:
-    return Hurt(columns=dict.fromkeys(numbers, 0))
+def _columns(numbers: range) -> SheetFault:
+    return SheetFault(columns=dict.fromkeys(numbers, 0))
 
 
-def _selected(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"row {row}": Hurt(selected=(row,)) for row in range(skin.rows)}
+def _selected(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"row {row}": SheetFault(selected=(row,)) for row in range(skin.rows)}
 
 
-def _stuck_columns(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"column {column}": Hurt(stuck=(column,)) for column in range(skin.columns)}
+def _stuck_columns(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"column {column}": SheetFault(stuck=(column,)) for column in range(skin.columns)}
 
 
 def _cells(skin: Skin) -> list[tuple[int, int]]:
@@ -82,27 +170,27 @@ def _cells(skin: Skin) -> list[tuple[int, int]]:
     return corners + [(rows * step // 4, columns * step // 4) for step in (1, 2, 3)]
 
 
-def _closed(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"switch {cell}": Hurt(closed=(cell,)) for cell in _cells(skin)}
+def _closed(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"switch {cell}": SheetFault(closed=(cell,)) for cell in _cells(skin)}
 
 
-def _dead(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"switch {cell}": Hurt(dead=(cell,)) for cell in _cells(skin)}
+def _dead(skin: Skin) -> Mapping[str, SheetFault]:
+    return {f"switch {cell}": SheetFault(dead=(cell,)) for cell in _cells(skin)}
 
 
-def _bare(skin: Skin) -> Mapping[str, Hurt]:
+def _bare(skin: Skin) -> Mapping[str, SheetFault]:
     """Undefined levels are tried both ways."""
     return {
-        f"switch {cell}, {'released' if released else 'pressed'} wins": Hurt(bare=(cell,), pulls_win=released)
+        f"switch {cell}, {'released' if released else 'pressed'} wins": SheetFault(bare=(cell,), pulls_win=released)
         for cell in _cells(skin)
         for released in (False, True)
     }
 
 
-def _joined_rows(skin: Skin) -> Mapping[str, Hurt]:
+def _joined_rows(skin: Skin) -> Mapping[str, SheetFault]:
     """Two pins drive against each other: which level a column comes to is tried both ways."""
     return {
-        f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": Hurt(
+        f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": SheetFault(
             joined_rows=((row, row + 1),), pulls_win=released
         )
         for row in range(skin.rows - 1)
@@ -110,13 +198,14 @@ def _joined_rows(skin: Skin) -> Mapping[str, Hurt]:
     }
 
 
-def _joined_columns(skin: Skin) -> Mapping[str, Hurt]:
+def _joined_columns(skin: Skin) -> Mapping[str, SheetFault]:
     return {
-        f"columns {line} and {line + 1}": Hurt(joined_columns=((line, line + 1),)) for line in range(skin.columns - 1)
+        f"columns {line} and {line + 1}": SheetFault(joined_columns=((line, line + 1),))
+        for line in range(skin.columns - 1)
     }
 
 
-def _slow(skin: Skin) -> Mapping[str, Hurt]:
+def _slow(skin: Skin) -> Mapping[str, SheetFault]:
     """Lines of ever more capacitance, with pulls that lift them late and with a resistance that lowers them late."""
     found = {}
     for picofarad in (464, 1000, 2154, 4642):
@@ -127,12 +216,12 @@ def _slow(skin: Skin) -> Mapping[str, Hurt]:
             line = ColumnLine.of(
                 circuit.replace(line_pf=float(picofarad)), skin.row_lines, skin.column_lines, skin.diodes, most=4
             )
-            found[f"{picofarad} pF, {name}"] = Hurt(line=line)
+            found[f"{picofarad} pF, {name}"] = SheetFault(line=line)
     return found
 
 
 def _once(**what: bool) -> Places:
-    return lambda skin: {"the board": Hurt(**what)}  # type: ignore[arg-type]
+    return lambda skin: {"the board": SheetFault(**what)}  # type: ignore[arg-type]
 
 
 METER = "check with a meter before the first power-up"

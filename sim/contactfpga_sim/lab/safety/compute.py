@@ -1,4 +1,6 @@
-"""Every fault at every place, in every scene: what tells it, how fast, and what was wrong before."""
+"""Every fault at every place, in every scene: what tells it, how fast, and what was wrong before; and those that a
+self-test is meant for, with which the compiled board is powered up while the pin `contact` is watched.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +8,21 @@ import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
 from contactfpga_sim.lab.safety import trial
-from contactfpga_sim.lab.safety.catalogue import FAULTS
-from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.lab.safety.catalogue import FAULTS, SheetFault
 from contactfpga_sim.lab.safety.trial import Told
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.sheet.matrix import Shorts
 
 SKINS = {"plain": REFERENCE, "guarded": GUARDED}
 
 PHASES = (0.03, 0.37, 0.71)
-"""Shares of a scan after whose beginning faults come, in turn: the longest time counts."""
+"""Shares of a scan after whose beginning faults come, one after the other: the longest time counts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,12 +56,12 @@ class Place:
         return tuple(dict.fromkeys(word for told in self.scenes.values() for word in told.words))
 
 
-def places(skin: Skin, fault: str) -> Iterator[tuple[str, Hurt]]:
+def places(skin: Skin, fault: str) -> Iterator[tuple[str, SheetFault]]:
     """The places of a fault on a sheet."""
     yield from FAULTS[fault].places(skin).items()
 
 
-def at(skin: Skin, hurt: Hurt, name: str = "", phase: float = PHASES[0]) -> Place:
+def at(skin: Skin, hurt: SheetFault, name: str = "", phase: float = PHASES[0]) -> Place:
     """What becomes of a fault at a place."""
     return Place(
         name, {scene: trial.run(skin, hurt, touched, phase) for scene, touched in trial.scenes(skin, hurt).items()}
@@ -73,3 +79,37 @@ def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
     """At how many of the places at which it does harm a fault is told by one of these, and how many these are."""
     harmful = [place for place in found(skin, fault) if place.harmful]
     return sum(any(place.us(channel) is not None for channel in channels) for place in harmful), len(harmful)
+
+
+TESTED = Skin.load(examples() / "fast.toml").replace(guard=True, self_test=True, fail_safe=True, alive=True)
+
+HOST = "self_test"
+"""What :attr:`~contactfpga_sim.lab.safety.catalogue.Fault.host` says of these faults."""
+
+
+def clocks(skin: Skin) -> int:
+    """That the self-test takes at power-up, and the pin after it; no row is driven by the scan until then."""
+    derived = skin.derived
+    slot = 2 * derived.project_clocks + derived.settle_clocks + 8
+    return (1 + skin.rows + skin.columns) * slot + 2
+
+
+def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
+    """When the pin says so, in us from power-up, with the switches pressed whose diodes are shorted; None: it does
+    not."""
+    cells = np.zeros((1, skin.rows, skin.columns), bool)
+    for cell in hurt.bare:
+        cells[0][cell] = True
+    with CompiledBoard(skin, ("contact",)) as board:
+        board.join(Shorts(rows=hurt.joined_rows, columns=hurt.joined_columns, bridged=hurt.bare))
+        board.hold(cells, clocks(skin))
+        rises = board.take("contact")
+    return float(rises["cycle"][0]) / skin.derived.clocks_per_us if len(rises) else None
+
+
+@functools.cache
+def times_at_start(fault: str) -> dict[str, float | None]:
+    """By place when the self-test tells this fault; of a fault that it is not meant for nothing."""
+    if FAULTS[fault].host != HOST:
+        return {}
+    return {name: told_us(hurt) for name, hurt in places(TESTED, fault)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.safety import compute, start, trial
+from contactfpga_sim.lab.safety import compute, trial
 from contactfpga_sim.lab.safety.catalogue import FAULTS
 from contactfpga_sim.lab.safety.compute import Place
 
@@ -14,7 +14,7 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard` and a deadline": ("guarded", ("flags", "deadline")),
     "`guard` and `alive`": ("guarded", ("flags", "alive")),
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
-    "these and `self_test`": ("guarded", ("flags", "deadline", "alive", start.HOST)),
+    "these and `self_test`": ("guarded", ("flags", "deadline", "alive", compute.HOST)),
 }
 """Options with the Skin and with what reports a fault."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
@@ -62,7 +62,7 @@ def coverage_table() -> str:
 
 def _told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
     """As :func:`compute.told`; the self-test is asked as well where it is one of the channels."""
-    tested = start.found(fault) if start.HOST in channels else {}
+    tested = compute.times_at_start(fault) if compute.HOST in channels else {}
     if not tested:
         return compute.told(skin, fault, channels)
     places = _harmful(skin, fault)
@@ -98,8 +98,8 @@ def _told_by(places: list[Place], host: str) -> str:
 
 def _tested(fault: str) -> str:
     """What the self-test at power-up reports of it."""
-    times = [us for us in start.found(fault).values() if us is not None]
-    of = len(start.found(fault))
+    times = [us for us in compute.times_at_start(fault).values() if us is not None]
+    of = len(compute.times_at_start(fault))
     share = "" if len(times) == of else f" at {len(times)} of {of} places"
     return f"; the self-test, {max(times):.0f} µs after power-up at most{share}" if times else ""
 

@@ -10,19 +10,19 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments, reported
-from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.lab.safety.catalogue import SheetFault
 
 LONGEST_US = 5000
 """A fault that is not told until then is not told."""
 STEP_US = 8
 """How exactly times are told."""
 QUIET_US = 2500
-"""Without an edge of `alive` for this long a watchdog acts: two and a half of its turns."""
+"""Without an edge of `alive` for this long a watchdog acts: two and a half of its half periods."""
 DEADLINE_US = 1000
 """Without a frame for this long the host's deadline passes; a user sets it, ten frames is a short one."""
 
 WARM_UP_US = 3000
-"""The board has run for this long after its hello: frames come and `alive` turns."""
+"""The board has run for this long after its hello: frames come and `alive` toggles."""
 SEEN_SCANS = 6
 """A fault that is told is watched for so many scans, to see what it does."""
 
@@ -43,7 +43,7 @@ class Told:
     """Something is wrong at some time: a frame, or nothing where something should come."""
 
 
-def scenes(skin: Skin, hurt: Hurt) -> dict[str, np.ndarray]:
+def scenes(skin: Skin, hurt: SheetFault) -> dict[str, np.ndarray]:
     """What is touched meanwhile: nothing, a finger at the fault, everything."""
     finger = np.zeros((skin.rows, skin.columns), bool)
     row, column = hurt.middle(*finger.shape)
@@ -51,7 +51,7 @@ def scenes(skin: Skin, hurt: Hurt) -> dict[str, np.ndarray]:
     return {"rest": np.zeros_like(finger), "finger": finger, "all": np.ones_like(finger)}
 
 
-def run(skin: Skin, hurt: Hurt, touched: np.ndarray, phase: float = 0.0) -> Told:
+def run(skin: Skin, hurt: SheetFault, touched: np.ndarray, phase: float = 0.0) -> Told:
     """A sheet that is touched so gets the fault this share of a scan after its beginning."""
     with Rig(skin, capture=PINS) as rig:
         board = rig.board
@@ -65,7 +65,7 @@ def run(skin: Skin, hurt: Hurt, touched: np.ndarray, phase: float = 0.0) -> Told
         return _watch(rig, hurt, watched)
 
 
-def _watch(rig: Rig, hurt: Hurt, watched: _Watched) -> Told:
+def _watch(rig: Rig, hurt: SheetFault, watched: _Watched) -> Told:
     skin, board = rig.skin, rig.board
     clocks = skin.derived.clocks_per_us * STEP_US
     for step in range(1, LONGEST_US // STEP_US + 1):
@@ -104,7 +104,7 @@ class _Watched:
         pins |= {"alive"} if self._skin.alive else set()
         return self._now_us > SEEN_SCANS * self._scan_us and {"flags", *pins} <= set(self._by)
 
-    def step(self, now_us: int, frames: list[Zones], edges: Mapping[str, int], hurt: Hurt) -> None:
+    def step(self, now_us: int, frames: list[Zones], edges: Mapping[str, int], hurt: SheetFault) -> None:
         """What came since the last step."""
         self._now_us = now_us
         for zones in frames:

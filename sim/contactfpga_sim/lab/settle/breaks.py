@@ -1,4 +1,4 @@
-"""Knobs of the sheet's circuit under precharge, turned until a time or a level is missed."""
+"""Knobs of the sheet's circuit under precharge, moved until a time or a level is missed."""
 
 from __future__ import annotations
 

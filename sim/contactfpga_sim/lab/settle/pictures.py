@@ -10,9 +10,9 @@ import numpy as np
 from contactfpga import picture_style as style
 from contactfpga.design.circuit import Circuit, patterns
 from contactfpga.design.circuit.network import Network
-from contactfpga_sim.lab.settle import breaks, shorted
+from contactfpga_sim.lab.settle import breaks, tables
 from contactfpga_sim.lab.settle.breaks import HIGH_V, KNOBS, SETTLE_US, SIZE, US
-from contactfpga_sim.lab.settle.shorted import NAMES, RowTime
+from contactfpga_sim.lab.settle.tables import NAMES, RowTime
 
 COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
 
@@ -43,7 +43,7 @@ def _thresholds(axes: Any) -> None:
 
 def _row(path: Path) -> Path:
     network = Network(Circuit(), patterns.named(SIZE, SIZE)["all but a column"])
-    found = shorted.row_time(network)
+    found = tables.row_time(network)
     middle = patterns.middle(SIZE)
     figure = style.new(3.0)
     axes = figure.subplots()
@@ -95,7 +95,7 @@ def _shorted(folder: Path) -> Path:
     figure = style.new(3.6)
     upper, lower = figure.subplots(2, 1, sharex=True)
     for color, count in zip(COLORS, (1, 3)):
-        found = shorted.row_time(shorted.sheet(count))
+        found = tables.row_time(tables.sheet(count))
         label = f"{count} shorted" if count > 1 else "1 shorted diode"
         upper.plot(US * found.seconds, found.column, color=color, lw=1.8, label=label)
         lower.plot(US * found.seconds, -found.pin_ma(patterns.middle(SIZE)), color=color, lw=1.8, label="selected row")

@@ -1,4 +1,4 @@
-"""Where ids are lost: one knob at a time, turned until a contact no longer keeps its id."""
+"""Where ids are lost: one knob at a time, moved until a contact no longer keeps its id."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from collections.abc import Callable, Sequence
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Knob, Outcome
-from contactfpga_sim.lab.tracking.frames import zones_of
-from contactfpga_sim.lab.tracking.judge import Update, ours
-from contactfpga_sim.lab.tracking.nearest import Nearest
-from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Finger
+from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Finger, zones_of
+from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)

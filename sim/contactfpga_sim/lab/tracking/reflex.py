@@ -29,7 +29,7 @@ ROUNDS = 4
 HEAD = ("stops on a touch", "median", "99 %", "worst", "stops on silence")
 
 
-class Measured(NamedTuple):
+class ReactionTimes(NamedTuple):
     """From the last byte of the first frame with a touch to the loop's decision, in us."""
 
     found_us: list[float]
@@ -56,7 +56,7 @@ def example() -> ModuleType:
     return module
 
 
-def measured(rounds: int = ROUNDS) -> Measured:
+def measured(rounds: int = ROUNDS) -> ReactionTimes:
     """Run the loop again and again, each time from an untouched sheet."""
     loop, found, last, silent = example(), [], (rounds - 1) * FRAMES, 0
 
@@ -77,7 +77,7 @@ def measured(rounds: int = ROUNDS) -> Measured:
             touch = number - number % PERIOD + PERIOD - TOUCHED
             if number > FRAMES // 10:
                 found.append((stop.decided_s - feeder.written_s[touch]) * 1e6)
-    return Measured(sorted(found), silent)
+    return ReactionTimes(sorted(found), silent)
 
 
 def main() -> int:

@@ -1,21 +1,141 @@
-"""Scores of the tracker and the baseline on random scenes and on recordings, at several frame rates."""
+"""Scores of the tracker and a baseline on random scenes and on recordings, at several frame rates.
+
+Ids are judged as trackers are judged, by py-motmetrics: MOTA, IDF1, id switches.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
+import math
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from contactfpga.errors import MissingExtra
 from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.tracking import frames, judge, scenes
-from contactfpga_sim.lab.tracking.frames import Place, Shown, zones_of
-from contactfpga_sim.lab.tracking.judge import Score
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.lab.tracking import scenes
+from contactfpga_sim.lab.tracking.scenes import FrameTruth, Place, zones_of
 from contactfpga_sim.model.scenes.recordings import Recording
+
+
+class Nearest:
+    """Neither speed nor memory: an id ends with the first frame that does not show it."""
+
+    def __init__(self, gate_mm: float = 20.0):
+        self._gate_mm = gate_mm
+        self._before: dict[int, tuple[float, float]] = {}
+        self._next_id = 1
+
+    def update(self, zones: Zones) -> dict[int, tuple[float, float]]:
+        """The place of each id."""
+        places = [(zone.x_mm, zone.y_mm) for zone in zones if zone.x_mm is not None and zone.y_mm is not None]
+        pairs = sorted(
+            (math.dist(place, old), index, name)
+            for index, place in enumerate(places)
+            for name, old in self._before.items()
+        )
+        names: dict[int, int] = {}
+        for distance, index, name in pairs:
+            if distance <= self._gate_mm and index not in names and name not in names.values():
+                names[index] = name
+        for index in range(len(places)):
+            if index not in names:
+                names[index] = self._next_id
+                self._next_id += 1
+        self._before = {name: places[index] for index, name in names.items()}
+        return self._before
+
+
+NEAR_MM = 15.0
+"""How far from a contact an id may lie to be its own."""
+
+JUDGED_HZ = 200.0
+"""Frames per second that are judged at most; all of them are tracked."""
+
+Update = Callable[[Zones], dict[int, Place]]
+"""The place of each id after a frame."""
+
+
+def ours() -> Update:
+    """The tracker with its default settings."""
+    tracker = Tracker()
+
+    def update(zones: Zones) -> dict[int, Place]:
+        active = tracker.update(zones).active
+        return {track.id: (track.zone.x_mm or 0.0, track.zone.y_mm or 0.0) for track in active}
+
+    return update
+
+
+TRACKERS: dict[str, Callable[[], Update]] = {"`Tracker`": ours, "nearest zone": lambda: Nearest().update}
+"""What is compared."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """What came out."""
+
+    frames: int
+    mota: float
+    idf1: float
+    switches: int
+
+    @property
+    def switches_per_1000(self) -> float:
+        """Id switches per thousand judged frames."""
+        return 1000 * self.switches / self.frames
+
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """For a table: MOTA and IDF1 in percent, switches per thousand frames."""
+        return f"{100 * self.mota:.1f}", f"{100 * self.idf1:.1f}", f"{self.switches_per_1000:.1f}"
+
+
+Judged = tuple[dict[int, Place], dict[int, Place]]
+"""Truth, and what a tracker said."""
+
+
+def followed(update: Update, frames: Iterable[FrameTruth], rate_hz: float) -> list[Judged]:
+    """What a tracker says of these frames, where it is judged."""
+    every = max(1, round(rate_hz / JUDGED_HZ))
+    found = []
+    for number, shown in enumerate(frames):
+        said = update(shown.zones)
+        if number % every == 0:
+            apart = {name: place for name, place in said.items() if place not in shown.shared}
+            found.append((shown.truth, apart))
+    return found
+
+
+def score(histories: Sequence[Sequence[Judged]], near_mm: float = NEAR_MM) -> Score:
+    """Of several scenes together. Raises :class:`MissingExtra` without py-motmetrics."""
+    try:
+        import motmetrics
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"judging the tracker ({error})", "test") from None
+    made = []
+    for history in histories:
+        made.append(motmetrics.MOTAccumulator(auto_id=True))
+        for truth, said in history:
+            distances = [[_near(math.dist(one, other), near_mm) for other in said.values()] for one in truth.values()]
+            made[-1].update(list(truth), list(said), distances)
+    metrics = ["num_frames", "mota", "idf1", "num_switches"]
+    names = [str(number) for number in range(len(made))]
+    table = motmetrics.metrics.create().compute_many(made, metrics=metrics, names=names, generate_overall=True)
+    total = table.loc["OVERALL"]
+    return Score(int(total["num_frames"]), float(total["mota"]), float(total["idf1"]), int(total["num_switches"]))
+
+
+def _near(distance: float, limit: float) -> float:
+    return distance if distance <= limit else math.nan
+
 
 MOST = 1500
 """Frames of a recording that are taken."""
@@ -28,7 +148,7 @@ def skin_of(recording: Recording) -> Skin:
     return Skin(rows=rows, columns=columns, pitch_x_mm=pitch, pitch_y_mm=pitch, settle_us=100.0)
 
 
-def histories(path: Path, every: int) -> list[list[Shown]]:
+def histories(path: Path, every: int) -> list[list[FrameTruth]]:
     """The frames of each stretch of a recording between which the scene jumps, one of ``every`` frames, with the truth
     of all of them."""
     recording = Recording.load(path)
@@ -41,7 +161,7 @@ def histories(path: Path, every: int) -> list[list[Shown]]:
     return [list(_linked(pressed[start:end], skin, step_us))[::every] for start, end in itertools.pairwise(jumps)]
 
 
-def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[Shown]:
+def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[FrameTruth]:
     """The frames, with a name for each zone."""
     linker = _Linker(frames.shape[1:])
     for number, cells in enumerate(frames):
@@ -50,7 +170,7 @@ def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[Shown]:
         for new, name in linker.take(labels).items():
             y, x = np.nonzero(labels == new)
             truth[name] = float(x.mean() * skin.pitch_x_mm), float(y.mean() * skin.pitch_y_mm)
-        yield Shown(zones, truth, ())
+        yield FrameTruth(zones, truth, ())
 
 
 class _Linker:
@@ -116,13 +236,10 @@ def of_family(family: str, rate_hz: float, count: int = SCENES) -> Scores:
     """On random scenes; the same ones at every rate."""
     name = zlib.crc32(family.encode())
     made = [
-        list(frames.played(scenes.FAMILIES[family](np.random.default_rng([name, number])), rate_hz))
+        list(scenes.played(scenes.FAMILIES[family](np.random.default_rng([name, number])), rate_hz))
         for number in range(count)
     ]
-    return {
-        tracker: judge.score([judge.followed(make(), one, rate_hz) for one in made])
-        for tracker, make in judge.TRACKERS.items()
-    }
+    return {tracker: score([followed(make(), one, rate_hz) for one in made]) for tracker, make in TRACKERS.items()}
 
 
 @functools.cache
@@ -130,8 +247,8 @@ def of_recording(path: Path, every: int) -> Scores:
     """On the stretches of a recording between which the scene jumps."""
     stretches = histories(path, every)
     return {
-        tracker: judge.score([judge.followed(make(), stretch, judge.JUDGED_HZ) for stretch in stretches])
-        for tracker, make in judge.TRACKERS.items()
+        tracker: score([followed(make(), stretch, JUDGED_HZ) for stretch in stretches])
+        for tracker, make in TRACKERS.items()
     }
 
 

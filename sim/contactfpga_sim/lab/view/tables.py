@@ -81,7 +81,7 @@ class Stopwatch:
             (self._virtual, "touch", self._touch),
             (Link, "_take", self._take),
             (source, "frames", self._frames),
-            (source, "turn", self._turn),
+            (source, "poll", self._poll),
             (self._stage, "draw", self._draw),
         ]
         with contextlib.ExitStack() as stack:
@@ -108,9 +108,9 @@ class Stopwatch:
             self.times.setdefault("arrived", float(closed["arrived_s"][0]))
         return batch
 
-    def _turn(self, turn: Any) -> Any:
+    def _poll(self, poll: Any) -> Any:
         self._driver_s = 0.0
-        moment = turn()
+        moment = poll()
         if moment is not None and len(moment.zones) and "arrived" in self.times and "read" not in self.times:
             self.times |= {"read": time.time(), "driver": self._driver_s}
         return moment
@@ -162,7 +162,7 @@ def click_table(found: list[Click]) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class Load:
+class ProcessorLoad:
     """Processor time per second of board time, all in s."""
 
     board: float
@@ -171,7 +171,7 @@ class Load:
     """Driver and view, without a browser."""
 
 
-def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
+def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
     """While these fingers press. Processor time does not depend on what else the computer does."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
@@ -192,7 +192,7 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
     passed_s, used = virtual.clock() - began_s, time.thread_time() - began
     virtual.read = read
     shown.hand.lift()
-    return Load(spent[0] / passed_s, (used - spent[0]) / passed_s)
+    return ProcessorLoad(spent[0] / passed_s, (used - spent[0]) / passed_s)
 
 
 def load_table(shown: ServedView) -> str:

@@ -18,8 +18,7 @@ from contactfpga_sim.model.board import native
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.sheet.converter import check_simulated
 from contactfpga_sim.model.sheet.line import ColumnLine, RowLine
-from contactfpga_sim.model.sheet.matrix import Contention
-from contactfpga_sim.model.sheet.shorts import Shorts
+from contactfpga_sim.model.sheet.matrix import Contention, Shorts
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the

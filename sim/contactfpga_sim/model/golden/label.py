@@ -12,8 +12,7 @@ import numpy as np
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
 from contactfpga_sim.model.golden import volume
-from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
-from contactfpga_sim.model.golden.zones import closed_flood, flood, moments
+from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labelling, closed_flood, flood, moments
 
 StripClocks = Callable[[np.ndarray, int], tuple[np.ndarray, int, int]]
 

@@ -16,7 +16,7 @@ from contactfpga_sim.model.golden.frame import Divider, Items, Packer, Queue, jo
 from contactfpga_sim.model.golden.hello import State
 from contactfpga_sim.model.golden.link import Link, SharedLine
 from contactfpga_sim.model.golden.trace import Timeline, Trace
-from contactfpga_sim.model.golden.work import Departure
+from contactfpga_sim.model.golden.zones import Departure
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

@@ -11,7 +11,7 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.model.golden.work import LabellerRule
+from contactfpga_sim.model.golden.zones import LabellerRule
 
 _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
 

@@ -16,10 +16,9 @@ from contactfpga.design.cover import Cover, Load
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import cells, contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Round, Swing
-from contactfpga_sim.model.scenes.cylinder import all_loads, truth_around
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.shapes import SHAPES
-from contactfpga_sim.model.scenes.truth import Box, Truth, truth_of
+from contactfpga_sim.model.scenes.truth import Box, Truth, all_loads, truth_around, truth_of
 
 CellsAt = Callable[[float], np.ndarray]
 """Time in s to the (rows, columns) bool cells that are pressed then."""

@@ -1,14 +1,20 @@
 """What a faulty sheet reads: which lines pressed switches join, where diodes, wires and switches have faults.
 
-Levels, currents and times are :mod:`contactfpga.design.circuit`'s; this is what they come to where switches and pins
-have no resistance beside the pulls.
+In :class:`Wiring` nothing but the pulls has a resistance; :func:`at_rest` asks :mod:`contactfpga.design.circuit` for
+levels and currents once the columns have settled. Guard lines are one more row and one more column; what they miss is
+a cut.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
+
+from contactfpga.design.circuit import Circuit, phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
 
 
 def _none() -> np.ndarray:
@@ -61,3 +67,42 @@ class Wiring:
             if (wider == reached).all():
                 return np.flatnonzero(reached).tolist(), columns
             reached = wider
+
+
+def at_rest(circuit: Circuit, cells: np.ndarray, bare: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Of (rows, columns) bool pressed cells, scanned row by row: those that read pressed, those whose level is neither
+    low nor high, and the most that a pin of a row that is not selected carries, in A."""
+    levels, network = Levels.of(circuit), Network(circuit, cells, bare)
+    read, undefined, most = np.zeros_like(cells), np.zeros_like(cells), 0.0
+    for row in range(len(cells)):
+        phase = phases.settle(network, levels, row)
+        volts, drive = phases.rest_volts(phase), phase.drives[-1]
+        columns = volts[: network.columns]
+        read[row] = columns <= levels.low
+        undefined[row] = (columns > levels.low) & (columns < levels.high)
+        most = max(most, float(np.delete(network.pin_amperes(volts, drive), network.columns + row).max()))
+    return read, undefined, most
+
+
+class LineCuts(NamedTuple):
+    """As :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut` takes them."""
+
+    rows: dict[int, int]
+    columns: dict[int, int]
+
+
+def extended(cells: np.ndarray, guard: bool = True) -> np.ndarray:
+    """(rows + 1, columns + 1) bool: the cells, and as guard switches ``guard``; the corner is open."""
+    found = np.full((cells.shape[0] + 1, cells.shape[1] + 1), guard)
+    found[:-1, :-1] = cells
+    found[-1, -1] = False
+    return found
+
+
+def missed(read: np.ndarray) -> LineCuts:
+    """Of what an extended sheet reads: lines whose guard switch reads open, as lines that are cut right before it."""
+    rows, columns = (number - 1 for number in read.shape)
+    return LineCuts(
+        dict.fromkeys(np.flatnonzero(~read[:rows, columns]).tolist(), columns),
+        dict.fromkeys(np.flatnonzero(~read[rows, :columns]).tolist(), rows),
+    )

@@ -57,7 +57,7 @@ def _names(path: Path) -> dict[tuple[str, int], list[str]]:
     for line in path.read_text().splitlines():
         kind, number, *rest = line.split(" ", 3)
         if rest:
-            # Yosys turns a latch around that starts at 1.
+            # Yosys inverts a latch that starts at 1.
             found[kind.removeprefix("inv"), int(number)].append(f"{rest[1]}[{rest[0]}]")
     return defaultdict(lambda: ["?"], found)
 

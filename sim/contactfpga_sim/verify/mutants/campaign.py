@@ -7,13 +7,128 @@ left then goes through long stimuli, and through longer trials of a proof. What 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
 
 from contactfpga.skin.several import Several
-from contactfpga_sim.verify.mutants import netlist, proof, sheets, stimuli, trial
+from contactfpga_sim.model import golden
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import CompiledBoard, CompiledSheets
+from contactfpga_sim.model.golden.predict import predict_several
+from contactfpga_sim.model.sheet.matrix import Contention
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.mutants import netlist, proof, sheets, stimuli
 from contactfpga_sim.verify.mutants.netlist import STAGES, Design, Mutant
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.verify.mutants.stimuli import Stimulus
+
+OBSERVED = (*golden.BOUNDARIES, "driven", "charged")
+"""Where a mutant can be told from the gateware as it should be."""
+SHARED = ("line", "contact")
+"""The same of several sheets."""
+
+_FIRST_LOOK = 512
+"""Cycles before the first comparison; each further one comes after twice as many."""
+
+Events = Mapping[str, np.ndarray]
+
+
+def survivors(design: Design, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus]) -> list[int]:
+    """The mutants that no stimulus tells from the gateware as it should be."""
+    left = list(numbers)
+    with _board(design, model) as board:
+        for stimulus in stimuli:
+            events = expected(board, stimulus)
+            left = [number for number in left if killed_at(board, number, stimulus, events) is None]
+    return left
+
+
+def expected(board: CompiledBoard | CompiledSheets, stimulus: Stimulus) -> Events:
+    """What the board without a mutant does, after it was compared with the golden model in every clock, unless lines
+    are joined.
+
+    Raises :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where they differ.
+    """
+    board.restart()
+    _play(board, stimulus, stimulus.cycles)
+    events = {name: board.take(name) for name in _observed(board)}
+    if stimulus.shorts:
+        return events
+    if isinstance(board, CompiledSheets):
+        _compare_shared(board.several, stimulus, events)
+        return events
+    trace = bench_native.trace(events, stimulus.cycles)
+    compare(golden.predict(board.skin, stimulus.timeline, stimulus.cycles), trace)
+    rows = [(int(event["cycle"]), int(event["data"])) for event in events["driven"]]
+    if rows != golden.driven(board.skin, stimulus.timeline, stimulus.cycles):
+        raise AssertionError("rows are not driven as docs/timing.md says")
+    return events
+
+
+def _board(design: Design, model: native.Model) -> CompiledBoard | CompiledSheets:
+    return CompiledSheets(design, model) if isinstance(design, Several) else CompiledBoard(design, OBSERVED, model)
+
+
+def _observed(board: CompiledBoard | CompiledSheets) -> tuple[str, ...]:
+    return SHARED if isinstance(board, CompiledSheets) else OBSERVED
+
+
+def _compare_shared(several: Several, stimulus: Stimulus, events: Events) -> None:
+    predicted = predict_several(several.skins, [stimulus.timeline, *stimulus.others], stimulus.cycles)[0]
+    wanted, got = golden.Trace(stimulus.cycles), golden.Trace(stimulus.cycles)
+    for name in SHARED:
+        setattr(wanted, name, getattr(predicted, name))
+        setattr(got, name, [(int(event["cycle"]), int(event["data"])) for event in events[name]])
+    compare(wanted, got)
+
+
+def killed_at(board: CompiledBoard | CompiledSheets, number: int, stimulus: Stimulus, events: Events) -> str | None:
+    """The first boundary at which mutant ``number`` does something other than ``events``, or "contention" where it
+    drives lines against each other; None where it never does."""
+    board.restart(number)
+    while (start := board.cycle) < stimulus.cycles:
+        until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)
+        try:
+            _play(board, stimulus, until)
+        except Contention:
+            return "contention"
+        for name in _observed(board):
+            first, last = np.searchsorted(events[name]["cycle"], (start, until))
+            if not np.array_equal(board.take(name), events[name][first:last]):
+                return name
+    return None
+
+
+def _play(board: CompiledBoard | CompiledSheets, stimulus: Stimulus, until: int) -> None:
+    if isinstance(board, CompiledSheets):
+        _play_sheets(board, [stimulus.timeline, *stimulus.others], until)
+        return
+    done = [(start, lambda cycles=cycles: board.pull_low(cycles)) for start, cycles in stimulus.noise]
+    done += [(start, lambda shorts=shorts: board.join(shorts)) for start, shorts in stimulus.shorts]
+    for start, do in done:
+        if board.cycle <= start < until:
+            bench_native.play(board, stimulus.timeline, start)
+            do()
+    bench_native.play(board, stimulus.timeline, until)
+
+
+def _play_sheets(board: CompiledSheets, timelines: Sequence[golden.Timeline], until: int) -> None:
+    """Cells of each sheet, and what the first one's timeline says is received."""
+    received = dict(timelines[0].received)
+    pressed: dict[int, list[tuple[int, np.ndarray]]] = {}
+    for number, timeline in enumerate(timelines):
+        for cycle, cells, _ in timeline.pieces:
+            pressed.setdefault(cycle, []).append((number, cells))
+    for now in sorted(cycle for cycle in {*received, *pressed} if board.cycle <= cycle < until):
+        board.run(now - board.cycle)
+        for number, cells in pressed.get(now, ()):
+            board.press(number, cells)
+        if now in received:
+            board.send(received[now])
+    board.run(until - board.cycle)
+
 
 BATCH = 500
 """Mutants in one board: with more of them it runs slower."""
@@ -45,7 +160,7 @@ def left_by(design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulu
     for start in range(0, len(mutants), BATCH):
         batch = mutants[start : start + BATCH]
         model = netlist.model(design, batch)
-        left += [batch[n - 1] for n in trial.survivors(design, model, range(1, len(batch) + 1), given)]
+        left += [batch[n - 1] for n in survivors(design, model, range(1, len(batch) + 1), given)]
     return left
 
 

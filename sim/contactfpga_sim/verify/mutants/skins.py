@@ -270,5 +270,5 @@ SEVERAL: dict[str, tuple[Several, tuple[str, ...]]] = {
         ("several", "serial", "link"),
     ),
 }
-"""Sheets at one FPGA, and the stages whose mutants are drawn: whose turn it is, the reader of requests that say which
-sheet they are for, and links that wait for their turn."""
+"""Sheets at one FPGA, and the stages whose mutants are drawn: which sheet may send, the reader of requests that say
+which sheet they are for, and links that wait until they may."""

@@ -19,7 +19,7 @@ from contactfpga_sim.model.golden.hello import hello
 from contactfpga_sim.model.golden.request import command, requests
 from contactfpga_sim.model.golden.trace import Cuts, Timeline
 from contactfpga_sim.model.scenes import shapes
-from contactfpga_sim.model.sheet.shorts import Shorts
+from contactfpga_sim.model.sheet.matrix import Shorts
 from contactfpga_sim.verify.cosim import covering
 
 _TIME_WRAPS_US = 1 << 24

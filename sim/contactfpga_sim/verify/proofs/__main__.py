@@ -29,9 +29,9 @@ from contactfpga_sim.verify.proofs import (
     units,
     upset,
 )
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import ProofCase
 
-CASES: tuple[Case, ...] = (
+CASES: tuple[ProofCase, ...] = (
     *scan.CASES,
     *raster_guard.CASES,
     *adaptive.CASES,
@@ -77,7 +77,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0 if cases and all(good) else 1
 
 
-def _report(case: Case, number: str) -> bool:
+def _report(case: ProofCase, number: str) -> bool:
     """One line of the table, with what is done shown before on a terminal."""
     _progress(f"{number}: {case.name}")
     verdict = case.run()

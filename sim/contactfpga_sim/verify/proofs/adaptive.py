@@ -8,8 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.util.bits import popcount
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -201,8 +200,8 @@ def _in_state(inside: Inside, state: int):
 
 def _highest(rows):
     """The highest of the rows, alone."""
-    turned = rows[::-1]
-    return (turned & -turned)[: len(rows)][::-1]
+    mirrored = rows[::-1]
+    return (mirrored & -mirrored)[: len(rows)][::-1]
 
 
 def _wrong_half(suspects, inside: Inside):
@@ -223,8 +222,8 @@ _SEEK_BUGS = (
         lambda rows, inside: Mux(_in_state(inside, PICK), 0, rows)),
 )  # fmt: skip
 CASES = (
-    Case("frames of an adaptive scan", "4 rows", partial(frames, rows=4), 3, _SEEK_BUGS, 40),
-    Case("frames of an adaptive scan", "8 rows", partial(frames, rows=8), 3),
-    Case("frames of an adaptive scan", "16 rows", partial(frames, rows=16), 3),
-    Case("a release between rows", "2 rows", released_between, 4, _BUGS, 60),
+    ProofCase("frames of an adaptive scan", "4 rows", partial(frames, rows=4), 3, _SEEK_BUGS, 40),
+    ProofCase("frames of an adaptive scan", "8 rows", partial(frames, rows=8), 3),
+    ProofCase("frames of an adaptive scan", "16 rows", partial(frames, rows=16), 3),
+    ProofCase("a release between rows", "2 rows", released_between, 4, _BUGS, 60),
 )

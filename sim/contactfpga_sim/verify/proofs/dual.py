@@ -8,8 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.dual import PAUSE_BITS, Dual
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 
@@ -82,7 +81,7 @@ _BUGS = (
         lambda differs, inside: differs & ~inside["holds"] & inside["tx"]),
 )  # fmt: skip
 CASES = (
-    Case("differences stop the line", "two copies, contact fail-safe",
-         partial(differences_stop_the_line, fail_safe=True), 2, _BUGS),
-    Case("differences stop the line", "two copies", partial(differences_stop_the_line, fail_safe=False), 2),
+    ProofCase("differences stop the line", "two copies, contact fail-safe",
+              partial(differences_stop_the_line, fail_safe=True), 2, _BUGS),
+    ProofCase("differences stop the line", "two copies", partial(differences_stop_the_line, fail_safe=False), 2),
 )  # fmt: skip

@@ -9,8 +9,7 @@ from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller, Sum
 from contactfpga_hdl.label.steps import Walk, place_of, waiting
 from contactfpga_hdl.util.stack import Stack
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -199,25 +198,25 @@ _END_BUGS = (
 )  # fmt: skip
 CASES = (
     *(
-        Case("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected",
-             partial(nothing_overflows, columns=columns, connectivity=connectivity), clocks,
-             _OVERFLOW_BUGS if (columns, connectivity) == (4, 8) else (), bug_clocks=14, campaign=columns == 8)
+        ProofCase("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected",
+                  partial(nothing_overflows, columns=columns, connectivity=connectivity), clocks,
+                  _OVERFLOW_BUGS if (columns, connectivity) == (4, 8) else (), bug_clocks=14, campaign=columns == 8)
         for columns, connectivity, clocks in ((4, 8, 9), (4, 4, 12), (8, 8, 14), (8, 4, 24))
     ),
     *(
-        Case("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected, closed",
-             partial(nothing_overflows, columns=columns, connectivity=connectivity, closed=True), clocks,
-             _OVERFLOW_BUGS[:2] if columns == 4 else (), bug_clocks=14, campaign=True)
+        ProofCase("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected, closed",
+                  partial(nothing_overflows, columns=columns, connectivity=connectivity, closed=True), clocks,
+                  _OVERFLOW_BUGS[:2] if columns == 4 else (), bug_clocks=14, campaign=True)
         for columns, connectivity, clocks in ((3, 8, 9), (4, 8, 10), (4, 4, 13))
     ),
-    Case("a stall changes nothing", "8 columns, 8-connected, closed",
-         partial(stalls_change_nothing, columns=8, connectivity=8, closed=True), 2),
-    Case("a stall changes nothing", "8 columns, 8-connected",
-         partial(stalls_change_nothing, columns=8, connectivity=8), 2, _STALL_BUGS, bug_clocks=16),
-    Case("a stall changes nothing", "8 columns, 4-connected",
-         partial(stalls_change_nothing, columns=8, connectivity=4), 2),
-    Case("an end mark a frame", "8 columns, 8-connected",
-         partial(an_end_mark_a_frame, columns=8, connectivity=8), 2, _END_BUGS),
-    Case("an end mark a frame", "8 columns, 4-connected",
-         partial(an_end_mark_a_frame, columns=8, connectivity=4), 2),
+    ProofCase("a stall changes nothing", "8 columns, 8-connected, closed",
+              partial(stalls_change_nothing, columns=8, connectivity=8, closed=True), 2),
+    ProofCase("a stall changes nothing", "8 columns, 8-connected",
+              partial(stalls_change_nothing, columns=8, connectivity=8), 2, _STALL_BUGS, bug_clocks=16),
+    ProofCase("a stall changes nothing", "8 columns, 4-connected",
+              partial(stalls_change_nothing, columns=8, connectivity=4), 2),
+    ProofCase("an end mark a frame", "8 columns, 8-connected",
+              partial(an_end_mark_a_frame, columns=8, connectivity=8), 2, _END_BUGS),
+    ProofCase("an end mark a frame", "8 columns, 4-connected",
+              partial(an_end_mark_a_frame, columns=8, connectivity=4), 2),
 )  # fmt: skip

@@ -8,8 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -212,11 +211,13 @@ _OVERFLOW_BUGS = (
 )  # fmt: skip
 
 
-def _case(claim, columns: int, connectivity: int, clocks: int, rows: int = 4, closed: bool = False, **options) -> Case:
+def _case(
+    claim, columns: int, connectivity: int, clocks: int, rows: int = 4, closed: bool = False, **options
+) -> ProofCase:
     build = partial(claim, columns=columns, connectivity=connectivity, rows=rows, closed=closed)
     title = f"serial: {claim.__name__.replace('_', ' ')}"
     size = f"{columns} columns, {rows} rows, {connectivity}-connected{', closed' * closed}"
-    return Case(title, size, build, clocks, **options)
+    return ProofCase(title, size, build, clocks, **options)
 
 
 CASES = (

@@ -15,8 +15,7 @@ from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
 from contactfpga_hdl.link.link import HELLO_REGION, Link, hello_words, offset_bits, stored_hello
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.streams import drain, feed
@@ -329,13 +328,13 @@ _ODOMETER_BUGS = (
         lambda waits, inside: waits & ~((inside["carry_state"] == _REST) & inside["sent_waits"])),
 )  # fmt: skip
 CASES = (
-    Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3, campaign=True),
-    Case("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
-         _BUGS, bug_clocks=40),
-    Case("the first frame is sent", "raster", partial(first_is_sent, scan="raster"), 2, _FIRST_BUGS),
-    Case("the first frame is sent", "adaptive", partial(first_is_sent, scan="adaptive"), 2),
-    Case("the first frame is sent", "line reversal", partial(first_is_sent, scan="reversal", precharge_us=1.0), 2),
-    Case("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
-    Case("digits are the counts", "epoch", partial(digits_are_the_counts, counter="epoch"), 2, _ODOMETER_BUGS,
-         bug_clocks=30),
+    ProofCase("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3, campaign=True),
+    ProofCase("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
+              _BUGS, bug_clocks=40),
+    ProofCase("the first frame is sent", "raster", partial(first_is_sent, scan="raster"), 2, _FIRST_BUGS),
+    ProofCase("the first frame is sent", "adaptive", partial(first_is_sent, scan="adaptive"), 2),
+    ProofCase("the first frame is sent", "line reversal", partial(first_is_sent, scan="reversal", precharge_us=1.0), 2),
+    ProofCase("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
+    ProofCase("digits are the counts", "epoch", partial(digits_are_the_counts, counter="epoch"), 2, _ODOMETER_BUGS,
+              bug_clocks=30),
 )  # fmt: skip

@@ -7,8 +7,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.streams import feed
@@ -186,10 +185,10 @@ def _in_state(inside: Inside, state: int):
 
 def _last_byte_first(byte, inside: Inside):
     dut = inside.component
-    turned = dut.items.payload.data.word_select(
+    swapped = dut.items.payload.data.word_select(
         (dut.derived.item_bytes - 1 - inside["index"])[: len(inside["index"])], 8
     )
-    return Mux(_in_state(inside, _ITEMS) & dut.items.valid & ~dut.items.payload.end, turned, byte)
+    return Mux(_in_state(inside, _ITEMS) & dut.items.valid & ~dut.items.payload.end, swapped, byte)
 
 
 def _taken_early(ready, inside: Inside):
@@ -219,6 +218,6 @@ _BUGS = (
 _ZONES = Skin(rows=2, columns=4, zone_capacity=2, settle_us=40)
 _CELLS = Skin(rows=2, columns=4, report="cells", settle_us=40)
 CASES = (
-    Case("frames are packed", "2x4, 2 zones", partial(frames_are_packed, skin=_ZONES), 2, _BUGS, bug_clocks=20),
-    Case("frames are packed", "2x4, cells", partial(frames_are_packed, skin=_CELLS), 2),
+    ProofCase("frames are packed", "2x4, 2 zones", partial(frames_are_packed, skin=_ZONES), 2, _BUGS, bug_clocks=20),
+    ProofCase("frames are packed", "2x4, cells", partial(frames_are_packed, skin=_CELLS), 2),
 )

@@ -6,16 +6,28 @@ from typing import Literal
 from amaranth.hdl import Cat, Mux, Signal, Value
 
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.frame_clock import RETRY_BIT
-from contactfpga_hdl.scan.pins import released_levels
+from contactfpga_hdl.scan.pins import moves_sample, released_levels
 from contactfpga_hdl.scan.precharge import LOOKS, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.settled import at_settle_time
+
+
+def at_settle_time(proof: Proof, inside: Inside, derived: Derived, slot: Value | None = None) -> None:
+    """Samples stay at the end of the settle time; ``slot``: the clock within a slot of a raster scan."""
+    if not moves_sample(derived):
+        return
+    settle = derived.settle_clocks
+    part = "cycle." if derived.skin.reads_rows else ""
+    clock, following = inside[f"{part}sample_clock"], inside[f"{part}next_sample_clock"]
+    proof.lemma((clock == settle) & (following == settle) & ~inside[f"{part}early"])
+    if slot is not None:
+        proof.lemma(inside["sample_due"] == ((slot == settle) | (slot == settle + 1)))
+
 
 Diodes = Literal["col2row", "row2col"]
 _RETRY = 1 << RETRY_BIT
@@ -249,12 +261,13 @@ _REVERSAL_BUGS = (
     Bug("driven on", ReversalScanner, "pins__columns_drive", lambda columns, inside: columns | inside["cycle.due"][0]),
 )  # fmt: skip
 CASES = (
-    Case("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2, _RASTER_BUGS, 24),
-    Case("columns and rows apart", "raster, 3 rows, row2col", partial(raster, diodes="row2col"), 2),
-    Case("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS, 30),
-    Case("a column that reads pressed for 8 clocks is driven on", "3 columns", kept, 2, _KEPT_BUGS, 80),
-    Case("a stuck column is let go", "raster, 3x2",
-         lambda proof: column_let_go(proof, Scanner(raster_of("col2row"))), 2, _STUCK_BUGS, 40),
-    Case("a stuck column is let go", "reversal, 2x2",
-         lambda proof: column_let_go(proof, ReversalScanner(reversal_of("row2col"))), 2, _REVERSAL_BUGS),
+    ProofCase("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2,
+              _RASTER_BUGS, 24),
+    ProofCase("columns and rows apart", "raster, 3 rows, row2col", partial(raster, diodes="row2col"), 2),
+    ProofCase("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS, 30),
+    ProofCase("a column that reads pressed for 8 clocks is driven on", "3 columns", kept, 2, _KEPT_BUGS, 80),
+    ProofCase("a stuck column is let go", "raster, 3x2",
+              lambda proof: column_let_go(proof, Scanner(raster_of("col2row"))), 2, _STUCK_BUGS, 40),
+    ProofCase("a stuck column is let go", "reversal, 2x2",
+              lambda proof: column_let_go(proof, ReversalScanner(reversal_of("row2col"))), 2, _REVERSAL_BUGS),
 )  # fmt: skip

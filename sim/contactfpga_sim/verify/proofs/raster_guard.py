@@ -9,12 +9,10 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.guard import LineFaults
 from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
-from contactfpga_sim.verify.proofs.precharge import level_lemmas
+from contactfpga_sim.verify.proofs.precharge import at_settle_time, level_lemmas
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.settled import at_settle_time
 
 Diodes = Literal["col2row", "row2col"]
 ROWS, COLUMNS = 3, 2
@@ -107,6 +105,8 @@ _BUGS = (
     Bug("the tag does not say so", Scanner, "at_end", lambda *_: 0),
 )  # fmt: skip
 CASES = (
-    Case("silent lines are told", "3x2, guard lines, col2row", partial(lines_told, diodes="col2row"), 2, _BUGS, 44),
-    Case("silent lines are told", "3x2, guard lines, row2col", partial(lines_told, diodes="row2col"), 2),
+    ProofCase(
+        "silent lines are told", "3x2, guard lines, col2row", partial(lines_told, diodes="col2row"), 2, _BUGS, 44
+    ),
+    ProofCase("silent lines are told", "3x2, guard lines, row2col", partial(lines_told, diodes="row2col"), 2),
 )

@@ -9,8 +9,7 @@ from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import Walk, place_of
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import mask_of_first_cluster, rows_into, skin_of
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -188,10 +187,10 @@ _CLOSED_BUGS = (
 _SPECIFICATION_BUGS = (Bug("zones of one row do not merge", RowStep, "next_reach_2", lambda reach, _: reach & 0b100),)
 
 
-def _case(columns: int, connectivity: int, clocks: int, rows: int = 4, closed: bool = False, **options) -> Case:
+def _case(columns: int, connectivity: int, clocks: int, rows: int = 4, closed: bool = False, **options) -> ProofCase:
     build = partial(records_are_the_zones, columns=columns, connectivity=connectivity, rows=rows, closed=closed)
     size = f"{columns} columns, {rows} rows, {connectivity}-connected{', closed' * closed}"
-    return Case("records are the zones", size, build, clocks, **options)
+    return ProofCase("records are the zones", size, build, clocks, **options)
 
 
 CASES = (
@@ -208,15 +207,15 @@ CASES = (
     _case(3, 8, 8, rows=2, closed=True, campaign=True, bugs=_CLOSED_BUGS, bug_clocks=14),
     _case(3, 4, 9, rows=2, closed=True, campaign=True),
     *(
-        Case("rows find the zones", f"3x3, {connectivity}-connected, closed",
-             partial(rows_find_the_zones, rows=3, columns=3, connectivity=connectivity, closed=True), 1,
-             bounded=True, campaign=True)
+        ProofCase("rows find the zones", f"3x3, {connectivity}-connected, closed",
+                  partial(rows_find_the_zones, rows=3, columns=3, connectivity=connectivity, closed=True), 1,
+                  bounded=True, campaign=True)
         for connectivity in (8, 4)
     ),
     *(
-        Case("rows find the zones", f"{rows}x{columns}, {connectivity}-connected",
-             partial(rows_find_the_zones, rows=rows, columns=columns, connectivity=connectivity), 1, bugs,
-             bug_clocks=1, bounded=True, campaign=columns == 4)
+        ProofCase("rows find the zones", f"{rows}x{columns}, {connectivity}-connected",
+                  partial(rows_find_the_zones, rows=rows, columns=columns, connectivity=connectivity), 1, bugs,
+                  bug_clocks=1, bounded=True, campaign=columns == 4)
         for rows, columns, bugs in ((3, 3, _SPECIFICATION_BUGS), (3, 4, ()))
         for connectivity in (8, 4)
     ),

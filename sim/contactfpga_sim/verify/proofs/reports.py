@@ -1,4 +1,4 @@
-"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and a frame that waits goes between."""
+"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and each lets a waiting frame pass."""
 
 from functools import partial
 from unittest import mock
@@ -10,8 +10,7 @@ from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
 from contactfpga_hdl.link.faults import Reporter, report_of
 from contactfpga_hdl.link.link import Link
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -140,6 +139,8 @@ _BUGS = (
     Bug("the last digit is left out", Link, "end", lambda end, inside: end - inside["take_report"]),
 )
 CASES = (
-    Case("reports are true", "1x1, guard lines", partial(reports_are_true, skin=_sheet(1, 1)), 8, _BUGS, bug_clocks=36),
-    Case("reports are true", "2x3, guard lines", partial(reports_are_true, skin=_sheet(2, 3)), 8, campaign=True),
+    ProofCase(
+        "reports are true", "1x1, guard lines", partial(reports_are_true, skin=_sheet(1, 1)), 8, _BUGS, bug_clocks=36
+    ),
+    ProofCase("reports are true", "2x3, guard lines", partial(reports_are_true, skin=_sheet(2, 3)), 8, campaign=True),
 )

@@ -11,11 +11,9 @@ from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
-from contactfpga_sim.verify.proofs.precharge import apart
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
+from contactfpga_sim.verify.proofs.precharge import apart, at_settle_time
 from contactfpga_sim.verify.proofs.proof import Proof
-from contactfpga_sim.verify.proofs.settled import at_settle_time
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
 SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
@@ -218,15 +216,15 @@ _LASTS_BUGS = (
         lambda listens, inside: listens & (inside["clock"] != 0)),
 )  # fmt: skip
 CASES = (
-    Case("pins never meet", "3x2, col2row", partial(pins, rows=3, columns=2, diodes="col2row"), 2, _PIN_BUGS, 16),
-    Case("pins never meet", "3x2, row2col", partial(pins, rows=3, columns=2, diodes="row2col"), 2),
-    Case("pins never meet", "2x1, shortest times",
-         partial(pins, rows=2, columns=1, **SHORT), 2),
-    Case("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
-    Case("times of a line reversal", "3x2, shortest times, row2col",
-         partial(lasts, rows=3, columns=2, diodes="row2col", **SHORT), 2),
-    Case("times of a line reversal", "3x2, long precharge",
-         partial(lasts, rows=3, columns=2, precharge_us=12), 2),
-    Case("times of a line reversal", "3x2, long release",
-         partial(lasts, rows=3, columns=2, **(LONG | {"release_us": 20})), 2),
+    ProofCase("pins never meet", "3x2, col2row", partial(pins, rows=3, columns=2, diodes="col2row"), 2, _PIN_BUGS, 16),
+    ProofCase("pins never meet", "3x2, row2col", partial(pins, rows=3, columns=2, diodes="row2col"), 2),
+    ProofCase("pins never meet", "2x1, shortest times",
+              partial(pins, rows=2, columns=1, **SHORT), 2),
+    ProofCase("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
+    ProofCase("times of a line reversal", "3x2, shortest times, row2col",
+              partial(lasts, rows=3, columns=2, diodes="row2col", **SHORT), 2),
+    ProofCase("times of a line reversal", "3x2, long precharge",
+              partial(lasts, rows=3, columns=2, precharge_us=12), 2),
+    ProofCase("times of a line reversal", "3x2, long release",
+              partial(lasts, rows=3, columns=2, **(LONG | {"release_us": 20})), 2),
 )  # fmt: skip

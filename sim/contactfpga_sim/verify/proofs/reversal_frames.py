@@ -9,8 +9,7 @@ from amaranth.hdl import Const, Mux, Signal, Value
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_rows import AllRows, DrivenRows
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
 from contactfpga_sim.verify.proofs.streams import offers_stay
@@ -230,11 +229,11 @@ _CELLS_BUGS = (
     Bug("others before it is read", AllRows, "rest", lambda rest, inside: rest | inside["strobe"]),
 )  # fmt: skip
 CASES = (
-    Case("frames of a line reversal", "3x2, col2row",
-         partial(frames, rows=3, columns=2, diodes="col2row", mask=((1, 0),)), 2, _FRAME_BUGS, 30),
-    Case("frames of a line reversal", "3x2, row2col, debounced",
-         partial(frames, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
-    Case("frames of a line reversal", "8x2", partial(frames, rows=8, columns=2), 2),
-    Case("frames of a line reversal", "3x2, cells",
-         partial(frames, rows=3, columns=2, diodes="row2col", report="cells"), 2, _CELLS_BUGS, 30),
+    ProofCase("frames of a line reversal", "3x2, col2row",
+              partial(frames, rows=3, columns=2, diodes="col2row", mask=((1, 0),)), 2, _FRAME_BUGS, 30),
+    ProofCase("frames of a line reversal", "3x2, row2col, debounced",
+              partial(frames, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
+    ProofCase("frames of a line reversal", "8x2", partial(frames, rows=8, columns=2), 2),
+    ProofCase("frames of a line reversal", "3x2, cells",
+              partial(frames, rows=3, columns=2, diodes="row2col", report="cells"), 2, _CELLS_BUGS, 30),
 )  # fmt: skip

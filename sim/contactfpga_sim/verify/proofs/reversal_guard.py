@@ -8,8 +8,7 @@ from amaranth.hdl import Const, Mux, Signal, Value
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_guard import Checks
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.precharge import apart
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
@@ -93,7 +92,7 @@ def whole(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, but for one row and one column that are whole, see ``Lines``; and what the stages after do.
 
     Claimed: these two are never told as open. After the last row of a frame there is a check before the next frame
-    begins, and checks of columns and rows come in turn.
+    begins, and checks of columns and rows alternate.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     lines, inside, m = Lines(sheet), sheet.inside, proof.m
@@ -167,10 +166,10 @@ _WHOLE_BUGS = (
     Bug("rows only", Checks, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
 )  # fmt: skip
 CASES = (
-    Case("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
-    Case("pins never meet", "2x1, guard lines, row2col, shortest times",
-         partial(pins, rows=2, columns=1, diodes="row2col", **SHORT), 2),
-    Case("whole lines are not told", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
-    Case("whole lines are not told", "2x1, row2col, shortest times, debounced",
+    ProofCase("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
+    ProofCase("pins never meet", "2x1, guard lines, row2col, shortest times",
+              partial(pins, rows=2, columns=1, diodes="row2col", **SHORT), 2),
+    ProofCase("whole lines are not told", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
+    ProofCase("whole lines are not told", "2x1, row2col, shortest times, debounced",
          partial(whole, rows=2, columns=1, diodes="row2col", debounce="sym_defer_pk", **SHORT), 2, _WHOLE_BUGS, 40),
 )  # fmt: skip

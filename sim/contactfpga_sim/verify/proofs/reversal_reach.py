@@ -7,8 +7,7 @@ from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import CHARGE, LISTEN, SELECT, Sheet, skin_of
 from contactfpga_sim.verify.proofs.reversal_frames import Frames, keep_frames, waits_to_be_taken
@@ -110,10 +109,10 @@ _CLOSED_BUGS = (
         lambda rows, inside: Mux(inside["clock"] == inside.component.derived.settle_clocks - 1, 0, rows)),
 )  # fmt: skip
 CASES = (
-    Case("a closed switch is reported", "3x2, col2row",
-         partial(closed, rows=3, columns=2, diodes="col2row", mask=((1, 0),), project_us=1), 2, _CLOSED_BUGS, 24),
-    Case("a closed switch is reported", "3x2, row2col, debounced",
-         partial(closed, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
-    Case("a closed switch is reported", "2x3, cells", partial(closed, rows=2, columns=3, report="cells"), 2),
-    Case("a closed switch is reported", "8x4", partial(closed, rows=8, columns=4), 2),
+    ProofCase("a closed switch is reported", "3x2, col2row",
+              partial(closed, rows=3, columns=2, diodes="col2row", mask=((1, 0),), project_us=1), 2, _CLOSED_BUGS, 24),
+    ProofCase("a closed switch is reported", "3x2, row2col, debounced",
+              partial(closed, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
+    ProofCase("a closed switch is reported", "2x3, cells", partial(closed, rows=2, columns=3, report="cells"), 2),
+    ProofCase("a closed switch is reported", "8x4", partial(closed, rows=8, columns=4), 2),
 )  # fmt: skip

@@ -9,8 +9,7 @@ from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_rows import Contact
 from contactfpga_hdl.util.bits import popcount
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import CHARGE, GAP, LISTEN, LONG, SELECT, SHORT, Sheet, skin_of
@@ -236,17 +235,18 @@ _CONTACT_BUGS = (
     Bug("of row 0 alone", ReversalScanner, "wakes", lambda _, inside: _wakes_alone(inside)),
 )  # fmt: skip
 CASES = (
-    Case("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **SHORT), 2, _NEXT_BUGS, 32),
-    Case("the next frame in time", "3x2, debounced",
-         partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
-    Case("the next frame in time", "8x2, long times",
-         partial(next_frame, rows=8, columns=2, **LONG), 2),
-    Case("the next frame in time", "3x2, long precharge",
-         partial(next_frame, rows=3, columns=2, precharge_us=12), 2),
-    Case("reported within two frames", "2x2", partial(in_two_frames, rows=2, columns=2, **SHORT), 2, _TWO_BUGS, 54),
-    Case("reported within two frames", "3x2, debounced",
-         partial(in_two_frames, rows=3, columns=2, debounce="sym_defer_pk"), 2),
-    Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
-    Case("contact in three clocks", "3x2, shortest times, row2col",
-         partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
+    ProofCase("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **SHORT), 2, _NEXT_BUGS, 32),
+    ProofCase("the next frame in time", "3x2, debounced",
+              partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
+    ProofCase("the next frame in time", "8x2, long times",
+              partial(next_frame, rows=8, columns=2, **LONG), 2),
+    ProofCase("the next frame in time", "3x2, long precharge",
+              partial(next_frame, rows=3, columns=2, precharge_us=12), 2),
+    ProofCase("reported within two frames", "2x2", partial(in_two_frames, rows=2, columns=2, **SHORT), 2,
+              _TWO_BUGS, 54),
+    ProofCase("reported within two frames", "3x2, debounced",
+              partial(in_two_frames, rows=3, columns=2, debounce="sym_defer_pk"), 2),
+    ProofCase("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
+    ProofCase("contact in three clocks", "3x2, shortest times, row2col",
+              partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
 )  # fmt: skip

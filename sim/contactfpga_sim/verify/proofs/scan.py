@@ -8,8 +8,7 @@ from amaranth.hdl import Cat, Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -103,8 +102,8 @@ _OFFER_BUGS = (
     Bug("unmasked", Scanner, "pressed", lambda _, inside: inside["read"]),
 )
 CASES = (
-    Case("one row at a time", "4 rows, col2row", partial(one_row_at_a_time, diodes="col2row"), 2, _DRIVE_BUGS, 80),
-    Case("one row at a time", "4 rows, row2col", partial(one_row_at_a_time, diodes="row2col"), 2),
-    Case("each sample once", "4x2, col2row", partial(each_sample_once, diodes="col2row"), 2, _OFFER_BUGS, 160),
-    Case("each sample once", "4x2, row2col", partial(each_sample_once, diodes="row2col"), 2),
+    ProofCase("one row at a time", "4 rows, col2row", partial(one_row_at_a_time, diodes="col2row"), 2, _DRIVE_BUGS, 80),
+    ProofCase("one row at a time", "4 rows, row2col", partial(one_row_at_a_time, diodes="row2col"), 2),
+    ProofCase("each sample once", "4x2, col2row", partial(each_sample_once, diodes="col2row"), 2, _OFFER_BUGS, 160),
+    ProofCase("each sample once", "4x2, row2col", partial(each_sample_once, diodes="row2col"), 2),
 )

@@ -7,8 +7,7 @@ from amaranth.hdl import Cat, Const, Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.self_test import SEEN, SelfTest
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.precharge import apart
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
@@ -121,7 +120,7 @@ def pin_lemmas(tested: Tested) -> None:
 
 def shown(proof: Proof, **changes: Any) -> None:
     """Free as above. Claimed: a slot that goes out is what the pins showed in the last clock in which its line was
-    driven; it stays as it is until it is taken; and numbers come in turn."""
+    driven; it stays as it is until it is taken; and numbers come in order."""
     tested = Tested(proof, **changes)
     m, sheet, skin = proof.m, tested.sheet, tested.sheet.skin
     slots, number = sheet.dut.slots, sheet.inside["test.number"]
@@ -182,8 +181,8 @@ _SHOWN_BUGS = (
     Bug("a slot is skipped", SelfTest, "number", lambda number, inside: number + inside["over"]),
 )  # fmt: skip
 CASES = (
-    Case("one line is driven alone", "2x2, col2row", partial(one_line, rows=2, columns=2), 2, _BUGS, 30),
-    Case("one line is driven alone", "2x1, row2col, shortest times",
-         partial(one_line, rows=2, columns=1, diodes="row2col", **SHORT), 2),
-    Case("slots are what the pins showed", "2x2", partial(shown, rows=2, columns=2, **SHORT), 2, _SHOWN_BUGS, 40),
+    ProofCase("one line is driven alone", "2x2, col2row", partial(one_line, rows=2, columns=2), 2, _BUGS, 30),
+    ProofCase("one line is driven alone", "2x1, row2col, shortest times",
+              partial(one_line, rows=2, columns=1, diodes="row2col", **SHORT), 2),
+    ProofCase("slots are what the pins showed", "2x2", partial(shown, rows=2, columns=2, **SHORT), 2, _SHOWN_BUGS, 40),
 )  # fmt: skip

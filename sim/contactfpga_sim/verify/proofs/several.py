@@ -10,8 +10,7 @@ from contactfpga.wire import protocol
 from contactfpga.wire.numbered import SheetPlace
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.several import RoundRobin
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
@@ -89,9 +88,9 @@ _PACKET_BUGS = (
     Bug("kept for the next packet", Link, "holds", lambda holds, inside: holds | ~inside["idle"]),
 )  # fmt: skip
 CASES = (
-    Case("grants go round", "2 sheets", partial(grants_go_round, sheets=2), 2, _GRANT_BUGS),
-    Case("grants go round", "16 sheets", partial(grants_go_round, sheets=16), 2),
-    Case(
+    ProofCase("grants go round", "2 sheets", partial(grants_go_round, sheets=2), 2, _GRANT_BUGS),
+    ProofCase("grants go round", "16 sheets", partial(grants_go_round, sheets=16), 2),
+    ProofCase(
         "packets of several sheets are whole",
         "1x2, hello of 3 bytes",
         partial(packets_are_whole, hello=bytes([0, 2, 0x40, *[0x80] * 3, 0])),
@@ -99,7 +98,7 @@ CASES = (
         _PACKET_BUGS,
         bug_clocks=28,
     ),
-    Case(
+    ProofCase(
         "packets of several sheets are whole",
         "1x2",
         partial(packets_are_whole, hello=protocol.encode_hello(_SKIN, place=_PLACE)),

@@ -13,8 +13,7 @@ from contactfpga_hdl.report.audit import Audit
 from contactfpga_hdl.report.backlog import Queue
 from contactfpga_hdl.report.bitmap import Bitmap
 from contactfpga_hdl.report.divide import Divider
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -296,14 +295,14 @@ _DIVIDE_BUGS = (
         lambda _, inside: inside.component.records.payload.zone.sum_x >> inside.component.derived.cell_bits - 1),
 )  # fmt: skip
 CASES = (
-    Case("debounce hands on each row", "3 columns, sym_defer_pk", partial(debounce, method="sym_defer_pk"), 10,
-         _DEBOUNCE_BUGS, bug_clocks=20),
-    Case("audit passes each record", "4 columns, 2 zones", audit, 2, _AUDIT_BUGS),
-    Case("bitmap passes each row", "3x4", bitmap, 2, _BITMAP_BUGS),
-    Case("backlog keeps each item", "4 items", partial(backlog, depth=4), 3, _BACKLOG_BUGS, bug_clocks=14),
-    Case("backlog keeps each item", "16 items", partial(backlog, depth=16), 3),
+    ProofCase("debounce hands on each row", "3 columns, sym_defer_pk", partial(debounce, method="sym_defer_pk"), 10,
+              _DEBOUNCE_BUGS, bug_clocks=20),
+    ProofCase("audit passes each record", "4 columns, 2 zones", audit, 2, _AUDIT_BUGS),
+    ProofCase("bitmap passes each row", "3x4", bitmap, 2, _BITMAP_BUGS),
+    ProofCase("backlog keeps each item", "4 items", partial(backlog, depth=4), 3, _BACKLOG_BUGS, bug_clocks=14),
+    ProofCase("backlog keeps each item", "16 items", partial(backlog, depth=16), 3),
     *(
-    Case("zones are divided", f"{rows}x{columns}, {bits} fraction bit{'s' * (bits != 1)}",
-         partial(zones_are_divided, rows=rows, columns=columns, bits=bits), 2, bugs, bug_clocks=16)
+    ProofCase("zones are divided", f"{rows}x{columns}, {bits} fraction bit{'s' * (bits != 1)}",
+              partial(zones_are_divided, rows=rows, columns=columns, bits=bits), 2, bugs, bug_clocks=16)
     for rows, columns, bits, bugs in ((3, 4, 2, _DIVIDE_BUGS), (2, 2, 1, ()), (5, 1, 0, ()))),
 )  # fmt: skip

@@ -6,8 +6,7 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal
 
 from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.uart import Transmitter
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -108,11 +107,11 @@ _PULSE_BUGS = (
         lambda low, inside: Mux(inside["low"] == 15, 0, low)),
 )  # fmt: skip
 CASES = (
-    Case("UART framing", "4 clocks per bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
-    Case("UART framing", "5 clocks per bit", partial(framing, bit_clocks=5), 2),
-    Case("UART framing", "104 clocks per bit", partial(framing, bit_clocks=104), 2),
-    Case(
+    ProofCase("UART framing", "4 clocks per bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
+    ProofCase("UART framing", "5 clocks per bit", partial(framing, bit_clocks=5), 2),
+    ProofCase("UART framing", "104 clocks per bit", partial(framing, bit_clocks=104), 2),
+    ProofCase(
         "pulses by their length", "2 clocks a bit", partial(read_by_length, bit_clocks=2), 4, _PULSE_BUGS, bug_clocks=24
     ),
-    Case("pulses by their length", "3 clocks a bit", partial(read_by_length, bit_clocks=3), 4),
+    ProofCase("pulses by their length", "3 clocks a bit", partial(read_by_length, bit_clocks=3), 4),
 )

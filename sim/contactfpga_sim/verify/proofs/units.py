@@ -8,8 +8,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.units.ads131m08 import BITS, CLOCKS, LEVELS, Ads131m08
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.watch import Settings, Watch
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _FAST = Skin(units=3, converter_v=5.0)
@@ -19,7 +18,7 @@ _SLOWEST = Skin(units=2, clock_hz=1_000_000, baud=250_000, settle_us=100)
 def conversions(proof: Proof, skin: Skin) -> None:
     """Free: what the converter answers.
 
-    Claimed: one conversion follows the other, of the units in turn, each with 19 clocks while the converter is selected
+    Claimed: one conversion follows the other, of unit after unit, each with 19 clocks while the converter is selected
     and none while it is not, which lasts two levels. No level of the clock is shorter than it has to be, nor is the
     pause between selection and clock. Start, single-ended and channel bits are there a level before each rising edge,
     and do not change while the clock is high. A reading is what the pin was in the clock before the last twelve rising
@@ -198,8 +197,8 @@ def frames(proof: Proof, skin: Skin) -> None:
 
     Claimed: the converter's own clock has no level that is shorter than it has to be, nor has the SPI clock, nor the
     pause between selection and clock. The SPI clock runs while the converter is selected, and each selection has 240
-    clocks. A reading is what the pin was in the clocks before the last 24 falling edges, with its highest bit turned
-    over, and is there three clocks after the last one.
+    clocks. A reading is what the pin was in the clocks before the last 24 falling edges, with its highest bit
+    inverted, and is there three clocks after the last one.
     """
     m = proof.m
     dut = Ads131m08(skin)
@@ -291,9 +290,9 @@ _PACED_BUGS = (
     Bug("a pace too fast", Ads131m08, "pins__spi_pace", lambda level, inside: level ^ inside["level"][0]),
 )  # fmt: skip
 CASES = (
-    Case("conversions of an MCP3208", "3 units, 12 MHz, 5 V", partial(conversions, skin=_FAST), 4),
-    Case("conversions of an MCP3208", "2 units, 1 MHz", partial(conversions, skin=_SLOWEST), 4, _SPI_BUGS, 50),
-    Case("thresholds of units", "3 units", partial(thresholds, skin=_FAST), 4, _WATCH_BUGS, 8),
-    Case("frames of an ADS131M08", "2 units, 1 MHz", partial(frames, skin=_PACED_SLOW), 6),
-    Case("frames of an ADS131M08", "3 units, 48 MHz", partial(frames, skin=_PACED_FAST), 6, _PACED_BUGS, 20),
+    ProofCase("conversions of an MCP3208", "3 units, 12 MHz, 5 V", partial(conversions, skin=_FAST), 4),
+    ProofCase("conversions of an MCP3208", "2 units, 1 MHz", partial(conversions, skin=_SLOWEST), 4, _SPI_BUGS, 50),
+    ProofCase("thresholds of units", "3 units", partial(thresholds, skin=_FAST), 4, _WATCH_BUGS, 8),
+    ProofCase("frames of an ADS131M08", "2 units, 1 MHz", partial(frames, skin=_PACED_SLOW), 6),
+    ProofCase("frames of an ADS131M08", "3 units, 48 MHz", partial(frames, skin=_PACED_FAST), 6, _PACED_BUGS, 20),
 )

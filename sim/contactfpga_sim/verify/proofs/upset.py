@@ -7,8 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.frame_clock import FrameClock
 from contactfpga_hdl.scan.pins import DirectRows
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.verify.proofs.bugs import Bug
-from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 SKINS = {
@@ -37,15 +36,15 @@ _ROW = Bug("a row flips", DirectRows, "selected",
 
 def _bugs(scan: str) -> tuple[Bug, ...]:
     def time(bit: int) -> Bug:
-        return Bug(f"bit {bit} of the time turns", FrameClock, "time",
+        return Bug(f"bit {bit} of the time flips", FrameClock, "time",
             lambda time, inside: time ^ inside.component.request << bit)  # fmt: skip
 
-    slot = Bug("a bit of the slot's row turns", Scanner, "following",
+    slot = Bug("a bit of the slot's row flips", Scanner, "following",
         lambda rows, inside: rows ^ inside.component.request << 1)  # fmt: skip
     return (time(0), time(7), *{"raster": (slot, _ROW), "adaptive": (_ROW,), "reversal": ()}[scan])
 
 
 CASES = tuple(
-    Case("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, _bugs(scan))
+    ProofCase("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, _bugs(scan))
     for scan in SKINS
 )

@@ -16,7 +16,7 @@ from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.arm.case import Case
-    from contactfpga_sim.lab.arm.sweep import Point, Task
+    from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 EXTRA = "sim"
 
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _contact(args: argparse.Namespace, case: Case) -> int:
     from contactfpga.tools.console import tables
-    from contactfpga_sim.lab.arm import report, run_pictures
+    from contactfpga_sim.lab.arm import pictures, report
 
     skin = Skin.load(args.skin) if args.skin else None
     folder = None if args.json else outputs.folder(args.output)
@@ -63,7 +63,7 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
     tables.show(report.table(found, args.case == "paper"), title=title)
     for note in report.NOTES if args.case == "paper" else ():
         terminal.say(note)
-    for path in run_pictures.pictures(found, folder):
+    for path in pictures.pictures(found, folder):
         print(path)
     return 0
 
@@ -98,30 +98,30 @@ def _pushes(args: argparse.Namespace, case: Case) -> int:
 
 
 def _charts(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga_sim.lab.arm import latency_charts, sweep
+    from contactfpga_sim.lab.arm import pictures, sweep
     from contactfpga_sim.lab.pool import executor, progress
 
-    latency_charts.check(case)
+    pictures.check(case)
     folder = outputs.folder(args.output)
-    tasks = latency_charts.plan(case)
-    so_far: dict[Task, Point] = {}
+    tasks = pictures.plan(case)
+    so_far: dict[SweepTask, SweepPoint] = {}
     try:
         with executor(args.jobs, args.dask) as workers, progress() as step:
             found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
     except KeyboardInterrupt:
         raise Interruption(_kept(so_far, len(tasks.all), folder)) from None
-    print(latency_charts.write_csv(found, folder / "arm-charts.csv"), flush=True)
-    for path in latency_charts.draw(case, tasks, found, folder):
+    print(pictures.write_csv(found, folder / "arm-charts.csv"), flush=True)
+    for path in pictures.draw(case, tasks, found, folder):
         print(path)
     return 0
 
 
-def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
+def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
     """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
-    from contactfpga_sim.lab.arm import latency_charts
+    from contactfpga_sim.lab.arm import pictures
 
     again = "run the same command again to go on from there"
     if not found:
         return f"interrupted before the first of {of} runs was finished; {again}"
-    path = latency_charts.write_csv(found, folder / "arm-charts-so-far.csv")
+    path = pictures.write_csv(found, folder / "arm-charts-so-far.csv")
     return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.flips import campaign, summary
-    from contactfpga_sim.lab.flips.designs import DESIGNS
+    from contactfpga_sim.lab.flips.campaign import DESIGNS
 
     names = flags.known("--design", args.design, list(DESIGNS))
     folder = outputs.folder(args.output)

@@ -1,4 +1,4 @@
-// Lines that are joined and diodes that are bridged; see contactfpga_sim/model/sheet/shorts.py.
+// Lines that are joined and diodes that are bridged; see contactfpga_sim/model/sheet/matrix.py.
 #pragma once
 
 #include "shift.h"

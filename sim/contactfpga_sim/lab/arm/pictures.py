@@ -1,4 +1,4 @@
-"""What latency costs: force, speed and thickness against it, drawn and as numbers."""
+"""Pictures of a run, after the paper's Figs. 6 and 7, and what latency costs: force, speed and thickness against it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
@@ -18,7 +19,67 @@ from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm import sweep
 from contactfpga_sim.lab.arm.case import Case, CaseError
-from contactfpga_sim.lab.arm.sweep import Point, Task
+from contactfpga_sim.lab.arm.run import RunRecord
+from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
+
+LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": style.BLACK, "linestyle": style.DASHES[0], "linewidth": 1.5},
+    {"color": style.VERMILLION, "linestyle": style.DASHES[1], "linewidth": 1.5},
+    {"color": style.BLUE, "linestyle": style.DASHES[2], "linewidth": 1.5},
+    {"color": style.SKY, "linestyle": style.DASHES[0], "linewidth": 3.0},
+    {"color": style.ORANGE, "linestyle": style.DASHES[1], "linewidth": 1.5},
+    {"color": style.GREEN, "linestyle": style.DASHES[3], "linewidth": 1.5},
+)
+"""Of the runs: one that takes the same course as another is seen beneath it."""
+
+DRAWN = {"speed": ("speed_rad_s", "angular speed, rad/s"), "torque": ("sensor_nm", "torque between motor and arm, Nm")}
+NAMES = {"speed": "arm-fig6-speed", "torque": "arm-fig7-torque"}
+FROM_S, TO_S = -5e-3, 40e-3
+"""What the enlarged part shows."""
+
+
+def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
+    """Both pictures in each format into ``folder``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(style.SETTINGS):
+        figures = {name: course(found, *DRAWN[name]) for name in DRAWN}
+        return [
+            style.save(figure, folder / f"{NAMES[name]}.{end}") for name, figure in figures.items() for end in suffixes
+        ]
+
+
+def course(found: dict[str, RunRecord], field: str, label: str) -> Figure:
+    """A quantity over time, around the contact above and whole below."""
+    figure = style.new(6.4)
+    near, whole = figure.subplots(2, 1, sharey=True)
+    for look, (name, result) in zip(LOOKS, found.items()):
+        time, values = 1e3 * result.course["time_s"], result.course[field]
+        for place in (near, whole):
+            place.plot(time, values, label=name, **look)
+            _mark(place, result, field, look["color"])
+    for place in (near, whole):
+        place.axhline(0, color=style.SOFT, linewidth=0.8)
+        place.grid()
+        place.set_ylabel(label)
+    near.set_xlim(1e3 * FROM_S, 1e3 * TO_S)
+    near.set_title("around the contact", loc="left")
+    whole.set_xlim(left=1e3 * FROM_S)
+    whole.set_title("the whole run", loc="left")
+    whole.set_xlabel("time from the touch, ms")
+    lines = [line for line in near.get_lines() if line.get_label() in found]
+    keys = {"a switch closes": "o", "the controller reacts": "x"}
+    marks = [Line2D([], [], color=style.SOFT, marker=mark, linestyle="", fillstyle="none") for mark in keys.values()]
+    names = [*(line.get_label() for line in lines), *keys]
+    figure.legend(lines + marks, names, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _mark(place: Any, result: RunRecord, field: str, color: str) -> None:
+    for seconds, mark in ((result.outcome.closes_s, "o"), (result.outcome.reacts_s, "x")):
+        if seconds is not None:
+            at = int(result.course["time_s"].searchsorted(seconds - 1e-9))
+            place.plot(1e3 * seconds, result.course[field][at], mark, color=color, ms=6, fillstyle="none", zorder=3)
+
 
 PAPER_S = 6e-3
 LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))
@@ -36,14 +97,14 @@ TICKS_MS = (0.01, 0.1, 1, 10)
 class Plan:
     """Every task by what it is drawn as."""
 
-    force: tuple[Task, ...]
-    limited: tuple[Task, ...]
-    sheet: dict[str, tuple[Task, ...]]
-    speed: dict[str, tuple[Task, ...]]
-    thick: dict[float, tuple[Task, ...]]
+    force: tuple[SweepTask, ...]
+    limited: tuple[SweepTask, ...]
+    sheet: dict[str, tuple[SweepTask, ...]]
+    speed: dict[str, tuple[SweepTask, ...]]
+    thick: dict[float, tuple[SweepTask, ...]]
 
     @property
-    def all(self) -> list[Task]:
+    def all(self) -> list[SweepTask]:
         """All of them."""
         groups = [self.force, self.limited, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
         return [task for group in groups for task in group]
@@ -60,15 +121,15 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
         return alone.but(link={"speed_m_s": speed}, foam={"base_n_m": 1e-3})
 
     return Plan(
-        force=tuple(Task(alone, latency_s=latency) for latency in latencies),
-        limited=tuple(Task(case, latency_s=latency) for latency in latencies),
-        sheet={way: tuple(Task(case.but(run={"lead_s": lead}), way) for lead in leads) for way in ("uart", "pin")},
+        force=tuple(SweepTask(alone, latency_s=latency) for latency in latencies),
+        limited=tuple(SweepTask(case, latency_s=latency) for latency in latencies),
+        sheet={way: tuple(SweepTask(case.but(run={"lead_s": lead}), way) for lead in leads) for way in ("uart", "pin")},
         speed={
-            name: tuple(Task(moving(speed), latency_s=latency) for speed in speeds)
+            name: tuple(SweepTask(moving(speed), latency_s=latency) for speed in speeds)
             for name, latency in by_speed.items()
         },
         thick={
-            speed: tuple(Task(moving(speed), latency_s=latency, thickness=True) for latency in latencies)
+            speed: tuple(SweepTask(moving(speed), latency_s=latency, thickness=True) for latency in latencies)
             for speed in THICK_SPEEDS_M_S
         },
     )
@@ -83,7 +144,7 @@ def check(case: Case) -> None:
 
 
 def draw(
-    case: Case, tasks: Plan, found: dict[Task, Point], folder: Path, suffixes: Sequence[str] = ("png", "svg")
+    case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path, suffixes: Sequence[str] = ("png", "svg")
 ) -> list[Path]:
     """The three charts in each format."""
     with matplotlib.rc_context(style.SETTINGS):
@@ -116,7 +177,7 @@ def _latencies(place: Any, case: Case) -> None:
     place.set_ylim(bottom=0)
 
 
-def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+def _force(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "force, N")
     late = [1e3 * task.latency_s for task in tasks.force]
     free: tuple[dict[str, Any], ...] = ({"color": style.SKY, "lw": 3}, {"color": style.GRAY, "lw": 3})
@@ -138,7 +199,7 @@ def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     return figure
 
 
-def _speed(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+def _speed(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
     figure, place = _axes("force limit, N", "speed, m/s")
     for name, group in tasks.speed.items():
         speeds = np.array([task.case.link.speed_m_s for task in group])
@@ -155,7 +216,7 @@ def _speed(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     return figure
 
 
-def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+def _thickness(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "thinnest foam that is not pressed flat, mm")
     for color, (speed, group) in zip((style.SKY, style.BLACK, style.ORANGE), tasks.thick.items()):
         thick = [1e3 * found[task].thickness_m for task in group]
@@ -166,9 +227,9 @@ def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     return figure
 
 
-def write_csv(found: dict[Task, Point], path: Path) -> Path:
+def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
     """All numbers, a line per run, in SI units."""
-    names = [field.name for field in dataclasses.fields(Point)]
+    names = [field.name for field in dataclasses.fields(SweepPoint)]
     with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])

@@ -1,1 +1,0 @@
-"""Labellers of others on our bench."""

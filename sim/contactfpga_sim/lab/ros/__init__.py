@@ -1,1 +1,0 @@
-"""Messages to nodes of ROS 2."""

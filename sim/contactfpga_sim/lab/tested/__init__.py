@@ -1,1 +1,0 @@
-"""Changes of the gateware's source that the default tests notice."""
