@@ -67,6 +67,8 @@ class Kind:
     """From its upper edge."""
     angle_deg: Range | Track = Range(0.0, 0.0)
     force_n: Range | Track = Range(10.0, 10.0)
+    approach_mm_s: Range | None = None
+    """Speed with which it comes in from the touch at 0 s until it has its force; None: it has it at once."""
     speed_mm_s: Range = Range(0.0, 0.0)
     heading_deg: Range = Range(0.0, 360.0)
 
@@ -138,7 +140,7 @@ def _kind(where: str, given: Any) -> Kind:
         "angle_deg": (-3600.0, 3600.0),
         "force_n": (0.0, 1e6),
     }
-    fixed = {"speed_mm_s": (0.0, MAX_MM), "heading_deg": (-3600.0, 3600.0)}
+    fixed = {"approach_mm_s": (1.0, MAX_MM), "speed_mm_s": (0.0, MAX_MM), "heading_deg": (-3600.0, 3600.0)}
     for name, ends in moving.items():
         if name in values:
             values[name] = _value(f"{where}: {name}", values[name], *ends)
@@ -147,6 +149,8 @@ def _kind(where: str, given: Any) -> Kind:
             values[name] = _range(f"{where}: {name}", values[name], *ends)
     if "speed_mm_s" in values and any(isinstance(values.get(name), Track) for name in ("x_mm", "y_mm")):
         raise SceneFileError(f"{where} has speed_mm_s and a track; leave one of them out")
+    if "approach_mm_s" in values and isinstance(values.get("force_n"), Track):
+        raise SceneFileError(f"{where} has approach_mm_s and a force over time; leave one of them out")
     return Kind(shape, sizes, **values)
 
 

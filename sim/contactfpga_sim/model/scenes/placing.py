@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Track, Value
+from contactfpga_sim.model.scenes.contacts import Contact, GrowingPatch, M, Shape, Track, Value, approaching
 from contactfpga_sim.model.scenes.cylinder import on_all_turns
 from contactfpga_sim.model.scenes.families import TRIES, Random, place
 from contactfpga_sim.model.scenes.file import Kind, Range, SceneFile, SceneFileError
@@ -22,7 +22,8 @@ PLACES = 10
 
 
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
-    """Scene ``number`` of a file on a sheet, and the instant in s at which it is looked at.
+    """Scene ``number`` of a file on a sheet, and the instant in s at which it is looked at: not before all forces that
+    rise with an approach have risen.
 
     Depends on what the file says, the number, and the sheet's pitch and size. Raises SceneFileError where contacts
     cannot be as far apart as the file asks.
@@ -30,7 +31,8 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
         if (contacts := _apart(rng, file, skin)) is not None:
-            return Scene(contacts), float(rng.uniform(0, file.seconds))
+            scene = Scene(contacts)
+            return scene, max(scene.settled_s, float(rng.uniform(0, file.seconds)))
     left, right, top, bottom = (end / M for end in sheet(skin))
     assert file.gap_mm is not None
     raise SceneFileError(
@@ -60,8 +62,9 @@ def _start(contact: Contact) -> Shape:
     x, y, angle = (
         value(0.0) if callable(value) else value for value in (contact.x_mm, contact.y_mm, contact.angle_deg)
     )
-    assert not callable(contact.shape)
-    return tuple(part.placed(x * M, y * M, math.radians(angle)) for part in contact.shape)
+    shape = contact.shape.shape if isinstance(contact.shape, GrowingPatch) else contact.shape
+    assert not callable(shape)
+    return tuple(part.placed(x * M, y * M, math.radians(angle)) for part in shape)
 
 
 def _drawn(rng: Random, file: SceneFile, kind: Kind, skin: Skin) -> Contact:
@@ -71,13 +74,14 @@ def _drawn(rng: Random, file: SceneFile, kind: Kind, skin: Skin) -> Contact:
     x, y = place(rng, skin, turned)
     speed, heading = kind.speed_mm_s.draw(rng), math.radians(kind.heading_deg.draw(rng))
     left, _, top, _ = (end / M for end in sheet(skin))
-    return Contact(
+    drawn = Contact(
         shape=shape,
         x_mm=_along(rng, kind.x_mm, left, x, speed * math.cos(heading), file.seconds),
         y_mm=_along(rng, kind.y_mm, top, y, speed * math.sin(heading), file.seconds),
         angle_deg=angle,
         force_n=force,
     )
+    return drawn if kind.approach_mm_s is None else approaching(drawn, kind.approach_mm_s.draw(rng))
 
 
 def _value(rng: Random, value: Range | Track) -> Value:
