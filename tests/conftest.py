@@ -3,6 +3,7 @@
 What only some computers have is imported where it is used: the tests in host.txt also run on Windows, without Amaranth.
 """
 
+import contextlib
 import os
 import random
 from collections import Counter
@@ -11,6 +12,12 @@ import pytest
 
 from contactfpga.driver import driver
 from contactfpga.skin import Skin
+
+with contextlib.suppress(ImportError):
+    from hypothesis import settings
+
+    settings.register_profile("busy", deadline=None)  # a test must also pass on a busy machine
+    settings.load_profile("busy")
 
 
 @pytest.fixture(scope="session")

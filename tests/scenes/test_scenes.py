@@ -8,11 +8,12 @@ import pytest
 from sample import sample
 from scipy import ndimage
 
-from contactfpga.design.cover import Ball, Cover, Switch
+from contactfpga.design.cover import Ball, Cap, Cover, Switch
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes import scene as scenes
 from contactfpga_sim.model.scenes.contacts import Contact, Swing, Track
+from contactfpga_sim.model.scenes.families import placements, touches
 from contactfpga_sim.model.scenes.recordings import DEFAULT_HZ, Recording
 from contactfpga_sim.model.scenes.scene import Scene
 from contactfpga_sim.model.scenes.shapes import SHAPES, variants
@@ -23,6 +24,11 @@ RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 
 def zones(cells, connectivity=8):
     return ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)[1]
+
+
+def small_face(force_n):
+    """A switch that closes at the stress of the paper's with this force, with a face that is 0.8 mm wide."""
+    return Switch(force_n * 0.64 / 12.6, 0.64e-6)
 
 
 @pytest.mark.parametrize("sheet", [(16, 16), (8, 32), (64, 64), (3, 5), (1, 9), (9, 1), (1, 1)])
@@ -222,7 +228,7 @@ def test_zones_of_a_pair_need_a_free_column():
 @pytest.mark.parametrize("model", ["patch", "point", "hertz", "bonded"])
 def test_moved_by_one_pitch_the_cells_move_by_one_switch(model):
     skin = sheet_of(3.0, 4.0, size=24)
-    cover = Cover(model, switch=Switch(0.1))
+    cover = Cover(model, switch=small_face(0.1))
     shape = contacts.palm(0.4)
     here = one(shape, 30.3, 41.7, angle_deg=25.0, force_n=20.0).pressed(0.0, skin, cover)
     for columns, rows in ((1, 0), (0, 1), (-3, 2)):
@@ -235,7 +241,7 @@ def test_moved_by_one_pitch_the_cells_move_by_one_switch(model):
 @pytest.mark.parametrize("model", ["patch", "point", "hertz", "bonded"])
 def test_symmetric_contacts_press_symmetric_cells(model):
     skin = sheet_of(2.0, size=33)
-    cover = Cover(model, switch=Switch(0.1))
+    cover = Cover(model, switch=small_face(0.1))
     for shape in (contacts.disc(13.1), contacts.ellipse(20.1, 7.3), contacts.edge(30.3, 8.3)):
         cells = one(shape, 32, 32, force_n=60.0).pressed(0.0, skin, cover)
         assert np.array_equal(cells, cells[::-1])
@@ -315,13 +321,18 @@ def test_more_force_closes_more_switches_and_a_thicker_cover_fewer():
     skin = sheet_of(1.0)
     for model in ("point", "hertz", "bonded"):
         counts = [
-            int(one(contacts.disc(5), 24, 24, force_n=force).pressed(0.0, skin, Cover(model, switch=Switch(0.2))).sum())
+            int(
+                one(contacts.disc(5), 24, 24, force_n=force)
+                .pressed(0.0, skin, Cover(model, switch=small_face(0.2)))
+                .sum()
+            )
             for force in (0.5, 2, 5, 20)
         ]
         assert counts == sorted(counts)
         assert counts[0] == 0 < counts[2] < counts[3]
     thin, thick = (
-        one(contacts.disc(5), 24, 24, force_n=8.0).pressed(0.0, skin, Cover("bonded", z)) for z in (2e-3, 9e-3)
+        one(contacts.disc(5), 24, 24, force_n=8.0).pressed(0.0, skin, Cover("bonded", z, small_face(1.0)))
+        for z in (2e-3, 9e-3)
     )
     assert thin.sum() > 0 == thick.sum()
 
@@ -345,3 +356,34 @@ def test_the_truth_on_a_sheet_ends_half_a_pitch_beyond_its_switches():
     assert contact.area_mm2 == pytest.approx(8 * 5 * 6)
     assert (contact.x_mm, contact.y_mm) == pytest.approx((17.5, 20))
     assert one(contacts.disc(3), -5.6, 0).truth(0.0, skin).count == 0
+
+
+@pytest.mark.parametrize("family", ["bumper", "fingers", "pair", "palm", "edge"])
+def test_a_touch_ends_as_the_scene_that_it_rises_to(family):
+    for still, touch in zip(placements(family, 5, 3, Skin()), touches(family, 5, 3, Skin()), strict=True):
+        assert 0 < touch.settled_s < 2.0
+        assert touch.loads(0.0) == []
+        assert touch.truth(touch.settled_s) == still.truth(0.0)
+        forces = [sum(load.force_n for load in touch.loads(share * touch.settled_s)) for share in (0.1, 0.5, 0.9, 2)]
+        assert forces == sorted(forces)
+        assert forces[-1] == pytest.approx(sum(load.force_n for load in still.loads(0.0)))
+
+
+def test_a_round_body_sinks_in_as_hertz_says():
+    """The patch of a ball of this radius and modulus, at each moment of its approach; and how long that takes."""
+    touch = contacts.approaching(Contact(shape=contacts.disc(6.0), x_mm=50.0, y_mm=50.0, force_n=8.0), 100.0)
+    ball = Ball(4 * contacts.BODY_PA * 6e-3**3 / (3 * 8.0), contacts.BODY_PA)
+    assert touch.force_n.seconds == pytest.approx(ball.indentation_m(8.0) / 0.1)
+    for share in (0.1, 0.4, 1.0):
+        load = touch.load(share * touch.force_n.seconds)
+        assert load.parts[0].half_x_m == pytest.approx(ball.patch_m(load.force_n))
+        assert ball.indentation_m(load.force_n) == pytest.approx(share * ball.indentation_m(8.0))
+
+
+def test_a_switch_with_hysteresis_remembers():
+    """A finger that comes and goes: the switch closes at 0.5 N on its cap and opens at 0.4 N."""
+    force = contacts.Track((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
+    finger = Scene((Contact(shape=contacts.disc(3.0), x_mm=50.0, y_mm=50.0, force_n=force),))
+    cover = Cover("frictionless", 1e-3, Switch(0.5, hysteresis=0.2), cap=Cap(9e-3), cut=True)
+    cells = finger.on(Skin(), cover)
+    assert [int(cells(t).sum()) for t in (0.45, 0.55, 1.0, 1.55, 1.65)] == [0, 1, 1, 1, 0]

@@ -6,14 +6,17 @@ corrected where they are misprinted. K. L. Johnson, "Contact mechanics" (1985), 
 """
 
 from contactfpga.design.cover.answer import CoverError, NoSolution
+from contactfpga.design.cover.cells import Cells, cells_of
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.press import MODELS, Cover, Load, load_cover
+from contactfpga.design.cover.press import MODELS, Cap, Cover, Load, load_cover
 
 __all__ = [
     "MODELS",
     "Ball",
+    "Cap",
+    "Cells",
     "Cover",
     "CoverError",
     "Ellipse",
@@ -22,5 +25,6 @@ __all__ = [
     "Part",
     "Rectangle",
     "Switch",
+    "cells_of",
     "load_cover",
 ]

@@ -63,6 +63,9 @@ class Part(Protocol):
     def placed(self, x_m: float, y_m: float, angle_rad: float) -> Self:
         """The same turned about the origin, and then moved."""
 
+    def density(self, x_m: Floats, y_m: Floats) -> Floats:
+        """Its pressure at these points, which broadcast, for a force of 1 N: in 1/m2, 0 outside."""
+
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
         """Point forces that stand for its pressure: x, y in m and shares of the force that add up to 1.
 
@@ -156,6 +159,10 @@ class Ellipse(_Shape):
     def kinks_m(self) -> tuple[float, ...]:
         return ()
 
+    def density(self, x_m: Floats, y_m: Floats) -> Floats:
+        u, v = self._own(x_m, y_m)
+        return np.asarray(1.5 / self.area_m2 * np.sqrt(np.maximum(0.0, 1 - u * u - v * v)))
+
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
         ratio = max(self.half_x_m, self.half_y_m) / fineness_m
         nodes, weights = _gauss(4 + math.ceil(4 * ratio))
@@ -208,6 +215,9 @@ class Rectangle(_Shape):
     def kinks_m(self) -> tuple[float, ...]:
         corners = self._sheet(np.array([1.0, 1, -1, -1]), np.array([1.0, -1, 1, -1]))[1]
         return tuple(float(corner) for corner in np.sort(corners)[1:3])
+
+    def density(self, x_m: Floats, y_m: Floats) -> Floats:
+        return np.where(self.contains(x_m, y_m), 1 / self.area_m2, 0.0)
 
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
         u, u_weights = _gauss(6 + math.ceil(7 * self.half_x_m / fineness_m))

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactfpga.design.cover import medium
-from contactfpga.design.cover.answer import NoSolution, not_negative, positive
+from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,10 +19,24 @@ class Switch:
     """Force that closes it, in N."""
     area_m2: float = 12.6e-6
     """Area of its face in m2."""
+    travel_m: float = 0.0
+    """How far it gives way before it closes, in m, evenly with the force; 0: it is rigid."""
+    spread: float = 0.0
+    """Standard deviation of the closing force from switch to switch, as a share of it; drawn within three of them."""
+    hysteresis: float = 0.0
+    """It opens when the force falls by this share below the one that closes it."""
+    preload_n: float = 0.0
+    """Force in N with which it is pressed though nothing touches."""
 
     def __post_init__(self) -> None:
         positive("force_n", self.force_n, "N")
         positive("area_m2", self.area_m2, "m2")
+        not_negative("travel_m", self.travel_m, "m")
+        for name, most in (("spread", 0.3), ("hysteresis", 0.99)):
+            if not 0 <= not_negative(name, getattr(self, name), "") <= most:
+                raise CoverError(f"{name} is {getattr(self, name):g}; it must lie between 0 and {most:g}")
+        if not_negative("preload_n", self.preload_n, "N") >= self.force_n:
+            raise CoverError(f"preload_n is {self.preload_n:g}; the switch closes at {self.force_n:g} N, preload less")
 
     @property
     def closing_pa(self) -> float:

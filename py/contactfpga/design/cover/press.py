@@ -24,6 +24,13 @@ MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
 ``hertz``: each part's pressure acts on a half-space.
 ``bonded``, ``frictionless``: each part's pressure acts on a layer on a rigid base, glued or sliding."""
 
+SHEAR = 6 / 5
+"""Deflection of a strip that shears, over that by its mean shear stress (Timoshenko)."""
+
+GIVES = 0.75
+"""Thicknesses of foam by which a strip between two caps is longer than the gap, as the foam on the caps gives way, too:
+fitted to the boundary-element solution in ``tests/cover`` for caps of 0.6 to 0.9 of the pitch under 2 and 5 mm."""
+
 GRID = 16
 """A switch's face is looked at in this many by this many points where a share of it has to be covered."""
 
@@ -48,6 +55,24 @@ class Load:
 
 
 @dataclasses.dataclass(frozen=True)
+class Cap:
+    """A rigid square plate on each switch."""
+
+    side_m: float
+    """In m; at most the pitch."""
+    proud: bool = True
+    """It stands above what lies between the caps, so that the foam rests on caps alone; False: it is flush with it."""
+    mass_kg: float = 0.0
+    """Of one cap."""
+
+    def __post_init__(self) -> None:
+        positive("side_m", self.side_m, "m")
+        not_negative("mass_kg", self.mass_kg, "kg")
+        if not isinstance(self.proud, bool):
+            raise CoverError(f"proud is {shown(self.proud)}; it must be true or false")
+
+
+@dataclasses.dataclass(frozen=True)
 class Cover:
     """The cover and the switches below it."""
 
@@ -59,17 +84,76 @@ class Cover:
     """What has to be closed; ``patch`` without ``share`` does not look at it."""
     share: float | None = None
     """With ``patch``: the part of the switch's face, a square, that must lie under the contact; None: its middle."""
+    cap: Cap | None = None
+    """On each switch; None: the foam presses the switch's own face, flush with what lies around it."""
+    cut: bool = False
+    """The foam is cut between the caps."""
+    modulus_pa: float = 3.45e5
+    """Young's modulus of the foam in Pa; what gives way under proud caps depends on it."""
+    poisson: float = 0.3
+    """Poisson's ratio of the foam, likewise."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise CoverError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
         positive("thickness_m", self.thickness_m, "m")
+        positive("modulus_pa", self.modulus_pa, "Pa")
+        if not is_finite(self.poisson) or not -1 < self.poisson <= 0.5:
+            raise CoverError(f"poisson is {shown(self.poisson)}; it must lie above -1 and not above 0.5")
+        if not isinstance(self.cut, bool):
+            raise CoverError(f"cut is {shown(self.cut)}; it must be true or false")
+        self._check_caps()
         if self.share is None:
             return
         if self.model != "patch":
             raise CoverError(f"share is {self.share}; the model {self.model!r} goes by stress, leave it out")
         if not is_finite(self.share) or not 0 < self.share <= 1:
             raise CoverError(f"share is {shown(self.share)}; it must lie above 0 and not above 1")
+
+    def _check_caps(self) -> None:
+        if self.model in ("patch", "point"):
+            for name in ("cap", "cut"):
+                if getattr(self, name):
+                    raise CoverError(f"the model {self.model!r} knows no {name}; take one of {', '.join(MODELS[2:])}")
+        if self.cut and self.cap is None:
+            raise CoverError("cut is true; foam is cut between caps, give [cover.cap] as well")
+        if self.switch.travel_m and not (self.cap and self.cap.proud):
+            raise CoverError(f"travel_m is {self.switch.travel_m:g}; only a switch under a proud cap may give way")
+
+    @property
+    def within(self) -> str:
+        """Its name in :data:`contactfpga.design.cover.medium.MEDIA`."""
+        return self.model if self.model in medium.MEDIA else "halfspace"
+
+    @property
+    def side_m(self) -> float:
+        """Side in m of the square that takes the foam's stress."""
+        return self.cap.side_m if self.cap else math.sqrt(self.switch.area_m2)
+
+    @property
+    def area_m2(self) -> float:
+        """Of that square."""
+        return self.side_m**2
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether a cap that sinks loads its neighbors."""
+        return bool(self.switch.travel_m and not self.cut)
+
+    def width_m(self, pitch_m: float) -> float:
+        """Width in m of the foam that one switch carries."""
+        return pitch_m if self.cap and self.cap.proud else self.side_m
+
+    def strip_pa(self, pitch_m: float) -> float:
+        """Stiffness in Pa of the foam between two proud caps ``pitch_m`` apart: N/m per m of the strip's width.
+
+        A strip of the length l = gap + :data:`GIVES` h, clamped at both ends:
+        1/K = 6/5 l/(G h) + l^3 (1 - nu^2)/(E h^3).
+        """
+        long = (pitch_m - self.side_m) / self.thickness_m + GIVES
+        shear = self.modulus_pa / (2 * (1 + self.poisson))
+        plate = self.modulus_pa / (1 - self.poisson**2)
+        return 1 / (SHEAR * long / shear + long**3 / plate)
 
     def closed(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Bool: which of the switches at these places, in m, are closed; ``x_m`` and ``y_m`` broadcast."""
@@ -97,8 +181,7 @@ class Cover:
             return point.stress_pa(force_n, np.hypot(x - part.x_m, y - part.y_m), self.thickness_m)
         if self.model == "hertz" and isinstance(part, Ellipse) and part.half_x_m == part.half_y_m:
             return hertz.stress_pa(force_n, part.half_x_m, np.hypot(x - part.x_m, y - part.y_m), self.thickness_m)
-        within = "halfspace" if self.model == "hertz" else self.model
-        return _superposed(part, force_n, self.thickness_m, within, x, y)
+        return _superposed(part, force_n, self.thickness_m, self.within, x, y)
 
     def _covered(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         parts = [part for load in loads for part in load.parts]
@@ -144,16 +227,20 @@ def load_cover(path: str | Path) -> Cover | None:
 
 
 def read_cover(values: Any) -> Cover:
-    """The cover that a TOML table describes; its keys are the fields of :class:`Cover`, with a table ``switch``."""
+    """The cover that a TOML table describes; its keys are the fields of :class:`Cover`, with tables ``switch`` and
+    ``cap``."""
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
-    if "switch" in given:
-        given["switch"] = Switch(**tomlfile.fields_of(Switch, "cover.switch", given["switch"], CoverError))
+    for name, kind in (("switch", Switch), ("cap", Cap)):
+        if name in given:
+            given[name] = kind(**tomlfile.fields_of(kind, f"cover.{name}", given[name], CoverError))
     cover = Cover(**given)
-    if not MIN_LENGTH_M <= cover.thickness_m <= MAX_LENGTH_M:
-        raise CoverError(
-            f"thickness_m in [cover] is {cover.thickness_m:g}; it must be a length in m, at most {MAX_LENGTH_M:g}; "
-            f"5 mm is 0.005, and the least is {MIN_LENGTH_M:g}"
-        )
+    lengths = {"thickness_m": cover.thickness_m} | ({"side_m": cover.cap.side_m} if cover.cap else {})
+    for name, length in lengths.items():
+        if not MIN_LENGTH_M <= length <= MAX_LENGTH_M:
+            raise CoverError(
+                f"{name} in [cover] is {length:g}; it must be a length in m, at most {MAX_LENGTH_M:g}; "
+                f"5 mm is 0.005, and the least is {MIN_LENGTH_M:g}"
+            )
     for name, value, unit in (("force_n", cover.switch.force_n, "N"), ("area_m2", cover.switch.area_m2, "m2")):
         if not 1e-9 <= value <= 1e6:
             raise CoverError(f"{name} in [cover.switch] is {value:g}; it must lie between 1e-09 and 1e+06 {unit}")
@@ -163,8 +250,9 @@ def read_cover(values: Any) -> Cover:
 def write_cover(cover: Cover) -> str:
     """The TOML tables that :func:`read_cover` reads back."""
     values = dataclasses.asdict(cover)
-    switch = values.pop("switch")
-    return "\n[cover]\n" + _lines(values) + "\n[cover.switch]\n" + _lines(switch)
+    parts = {name: part for name in ("cap", "switch") if (part := values.pop(name)) is not None}
+    tables = "".join(f"\n[cover.{name}]\n" + _lines(part) for name, part in parts.items())
+    return "\n[cover]\n" + _lines(values) + tables
 
 
 def _lines(values: dict[str, Any]) -> str:

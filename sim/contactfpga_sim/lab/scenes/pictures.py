@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga import picture_style as style
-from contactfpga.design.cover import Cover, Ellipse, Part
+from contactfpga.design.cover import Cover, Ellipse, Part, Switch
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
@@ -50,8 +50,12 @@ def panels() -> list[Panel]:
     ]
     close = _square(18, 2.5)
     pair = Scene(contacts.pair(7.0, 6.0, 21.0, 21.5, 30.0, force_n=20.0))
+    switch = Switch(0.32, 4e-6)  # closes at the stress of the paper's, whose face is wider than this pitch
     names = {"patch": "patch", "point": "point force", "hertz": "patch's pressure", "bonded": "bonded layer"}
-    return drawn + [Panel(text, "20 N each, pitch 2.5 mm", pair, close, Cover(model)) for model, text in names.items()]
+    return drawn + [
+        Panel(text, "20 N each, pitch 2.5 mm", pair, close, Cover(model, switch=switch))
+        for model, text in names.items()
+    ]
 
 
 def _square(size: int, pitch_mm: float) -> Skin:

@@ -154,6 +154,60 @@ class ChangingPatch:
         return (Ellipse(radius, radius),)
 
 
+BODY_PA = 2e5
+"""Effective modulus E* in Pa of what touches, a fingertip on soft foam, by which it sinks in: chosen, not measured."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rise:
+    """A force that rises from a touch at 0 s on and then stays: force_n (t / seconds)^(3/2), as that of a round body
+    that sinks in at an even speed (Hertz)."""
+
+    force_n: float
+    seconds: float
+
+    def __call__(self, seconds: float) -> float:
+        return self.force_n * min(1.0, max(0.0, seconds) / self.seconds) ** 1.5
+
+
+@dataclasses.dataclass(frozen=True)
+class GrowingPatch:
+    """The shape of a contact whose force is a :class:`Rise`: round parts grow as the force's cube root (Hertz), those
+    of flat bodies are there at once."""
+
+    shape: Shape
+    seconds: float
+
+    def __call__(self, seconds: float) -> Shape:
+        share = math.sqrt(min(1.0, max(1e-6, seconds / self.seconds)))
+        return tuple(_shrunk(part, share) if isinstance(part, Ellipse) else part for part in self.shape)
+
+
+def _shrunk(part: Ellipse, share: float) -> Ellipse:
+    return dataclasses.replace(part, half_x_m=part.half_x_m * share, half_y_m=part.half_y_m * share)
+
+
+def approaching(contact: Contact, speed_mm_s: float) -> Contact:
+    """The same contact, of fixed shape and force, touching at 0 s and coming in at this speed until it has its force.
+
+    It then has sunk in by delta = 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5),
+    with E* = :data:`BODY_PA`; of several parts the deepest counts.
+    """
+    if callable(contact.shape) or callable(contact.force_n):
+        raise ValueError("the contact has a force or a shape of its own over time; it cannot approach as well")
+    shares = Load(contact.shape, contact.force_n).shares()
+    seconds = max(_depth_m(part, force) for part, force in shares) / (speed_mm_s * M)
+    return dataclasses.replace(
+        contact, shape=GrowingPatch(contact.shape, seconds), force_n=Rise(contact.force_n, seconds)
+    )
+
+
+def _depth_m(part: Part, force_n: float) -> float:
+    if isinstance(part, Ellipse):
+        return 0.75 * force_n / (BODY_PA * math.sqrt(part.half_x_m * part.half_y_m))
+    return force_n / (2 * BODY_PA * math.sqrt(part.area_m2 / math.pi))
+
+
 def pressed_ball(ball: Ball, force_n: Value, x_mm: Value, y_mm: Value) -> Contact:
     """A ball whose patch grows with the force on it."""
     return Contact(shape=ChangingPatch(ball, force_n), force_n=force_n, x_mm=x_mm, y_mm=y_mm)

@@ -45,6 +45,22 @@ def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, *
     ]
 
 
+APPROACH_MM_S = (50.0, 250.0)
+"""Speeds with which contacts come in, up to the reduced speed of ISO 10218-1 for a robot beside people: chosen."""
+
+
+def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
+    """The scenes of :func:`placements` with forces that rise: all contacts of a scene touch at 0 s and come in at the
+    same speed, drawn from :data:`APPROACH_MM_S`. From ``settled_s`` on a scene is that of :func:`placements`."""
+    name = zlib.crc32(family.encode())
+    scenes = placements(family, count, seed, skin, first, **options)
+    speeds = (
+        float(np.random.default_rng([name, seed, number, 1]).uniform(*APPROACH_MM_S))
+        for number in range(first, first + count)
+    )
+    return [scene.approaching(speed) for scene, speed in zip(scenes, speeds, strict=True)]
+
+
 def bumper(rng: Random, skin: Skin) -> Scene:
     """One contact of a bumper: an ellipse 16 to 50 mm long, at any angle, 5 to 50 N."""
     long = rng.uniform(8, 25)

@@ -19,7 +19,7 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
-from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Track, Value
+from contactfpga_sim.model.scenes.contacts import Contact, GrowingPatch, M, Shape, Track, Value, approaching
 from contactfpga_sim.model.scenes.families import TRIES, Random, place
 from contactfpga_sim.model.scenes.scene import Scene, around_m, sheet
 from contactfpga_sim.model.scenes.truth import Box, on_all_turns, widths
@@ -73,6 +73,8 @@ class Kind:
     """From its upper edge."""
     angle_deg: Range | Track = Range(0.0, 0.0)
     force_n: Range | Track = Range(10.0, 10.0)
+    approach_mm_s: Range | None = None
+    """Speed with which it comes in from the touch at 0 s until it has its force; None: it has it at once."""
     speed_mm_s: Range = Range(0.0, 0.0)
     heading_deg: Range = Range(0.0, 360.0)
 
@@ -144,7 +146,7 @@ def _kind(where: str, given: Any) -> Kind:
         "angle_deg": (-3600.0, 3600.0),
         "force_n": (0.0, 1e6),
     }
-    fixed = {"speed_mm_s": (0.0, MAX_MM), "heading_deg": (-3600.0, 3600.0)}
+    fixed = {"approach_mm_s": (1.0, MAX_MM), "speed_mm_s": (0.0, MAX_MM), "heading_deg": (-3600.0, 3600.0)}
     for name, ends in moving.items():
         if name in values:
             values[name] = _value(f"{where}: {name}", values[name], *ends)
@@ -153,6 +155,8 @@ def _kind(where: str, given: Any) -> Kind:
             values[name] = _range(f"{where}: {name}", values[name], *ends)
     if "speed_mm_s" in values and any(isinstance(values.get(name), Track) for name in ("x_mm", "y_mm")):
         raise SceneFileError(f"{where} has speed_mm_s and a track; leave one of them out")
+    if "approach_mm_s" in values and isinstance(values.get("force_n"), Track):
+        raise SceneFileError(f"{where} has approach_mm_s and a force over time; leave one of them out")
     return Kind(shape, sizes, **values)
 
 
@@ -227,7 +231,8 @@ PLACES = 10
 
 
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
-    """Scene ``number`` of a file on a sheet, and the instant in s at which it is looked at.
+    """Scene ``number`` of a file on a sheet, and the instant in s at which it is looked at: not before all forces that
+    rise with an approach have risen.
 
     Depends on what the file says, the number, and the sheet's pitch and size. Raises SceneFileError where contacts
     cannot be as far apart as the file asks.
@@ -235,7 +240,8 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
         if (contacts := _apart(rng, file, skin)) is not None:
-            return Scene(contacts), float(rng.uniform(0, file.seconds))
+            scene = Scene(contacts)
+            return scene, max(scene.settled_s, float(rng.uniform(0, file.seconds)))
     left, right, top, bottom = (end / M for end in sheet(skin))
     assert file.gap_mm is not None
     raise SceneFileError(
@@ -265,8 +271,9 @@ def _start(contact: Contact) -> Shape:
     x, y, angle = (
         value(0.0) if callable(value) else value for value in (contact.x_mm, contact.y_mm, contact.angle_deg)
     )
-    assert not callable(contact.shape)
-    return tuple(part.placed(x * M, y * M, math.radians(angle)) for part in contact.shape)
+    shape = contact.shape.shape if isinstance(contact.shape, GrowingPatch) else contact.shape
+    assert not callable(shape)
+    return tuple(part.placed(x * M, y * M, math.radians(angle)) for part in shape)
 
 
 def _drawn(rng: Random, file: SceneFile, kind: Kind, skin: Skin) -> Contact:
@@ -276,13 +283,14 @@ def _drawn(rng: Random, file: SceneFile, kind: Kind, skin: Skin) -> Contact:
     x, y = place(rng, skin, turned)
     speed, heading = kind.speed_mm_s.draw(rng), math.radians(kind.heading_deg.draw(rng))
     left, _, top, _ = (end / M for end in sheet(skin))
-    return Contact(
+    drawn = Contact(
         shape=shape,
         x_mm=_along(rng, kind.x_mm, left, x, speed * math.cos(heading), file.seconds),
         y_mm=_along(rng, kind.y_mm, top, y, speed * math.sin(heading), file.seconds),
         angle_deg=angle,
         force_n=force,
     )
+    return drawn if kind.approach_mm_s is None else approaching(drawn, kind.approach_mm_s.draw(rng))
 
 
 def _value_of(rng: Random, value: Range | Track) -> Value:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.design.cover import Cover, Load
+from contactfpga.design.cover import Cover, Load, cells_of
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import cells, contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Round, Swing
@@ -51,22 +51,48 @@ class Scene:
             return truth_of(parts)
         return truth_around(parts, sheet(skin), around_m(skin)) if skin.closed else truth_of(parts, sheet(skin))
 
-    def pressed(self, seconds: float, skin: Skin, cover: Cover | None = None) -> np.ndarray:
-        """(rows, columns) bool: the switches that are closed at that time. ``cover``: where there
-        is none, those that lie under a contact. ``skin.mask`` plays no part, it is the gateware's."""
-        x = np.arange(skin.columns) * skin.pitch_x_mm * contacts.M
-        y = np.arange(skin.rows) * skin.pitch_y_mm * contacts.M
+    @property
+    def settled_s(self) -> float:
+        """From this time on all forces that rise with an approach have risen; 0 where none does."""
+        rises = (contact.force_n for contact in self.contacts)
+        return max((rise.seconds for rise in rises if isinstance(rise, contacts.Rise)), default=0.0)
+
+    def approaching(self, speed_mm_s: float) -> Scene:
+        """The same scene with all contacts touching at 0 s and coming in at this speed until they have their forces."""
+        return Scene(tuple(contacts.approaching(contact, speed_mm_s) for contact in self.contacts))
+
+    def pressed(
+        self, seconds: float, skin: Skin, cover: Cover | None = None, before: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(rows, columns) bool: the switches that are closed at that time. ``cover``: where there is none, those whose
+        middle lies under a contact, whatever its force: a bare sheet. ``before``: those that were closed until then,
+        for a switch with hysteresis. ``skin.mask`` plays no part, it is the gateware's."""
         loads = self.loads(seconds)
         if skin.closed:
             loads = all_loads(loads, sheet(skin).left, around_m(skin))
-        return (cover or Cover()).closed(loads, x, y[:, None])
+        pitch_x, pitch_y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
+        if cover is not None and cover.model != "patch":
+            return cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y).closed(loads, before)
+        return (cover or Cover()).closed(
+            loads, np.arange(skin.columns) * pitch_x, np.arange(skin.rows)[:, None] * pitch_y
+        )
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
-        """:meth:`pressed` on this sheet as a function of time."""
+        """:meth:`pressed` on this sheet as a function of time. Switches with hysteresis remember the last time they
+        were asked about, so times should rise."""
         if all(contact.still for contact in self.contacts):
             still = self.pressed(0.0, skin, cover)
             return lambda seconds: still
-        return lambda seconds: self.pressed(seconds, skin, cover)
+        if cover is None or not cover.switch.hysteresis:
+            return lambda seconds: self.pressed(seconds, skin, cover)
+        before = np.zeros((skin.rows, skin.columns), bool)
+
+        def remembering(seconds: float) -> np.ndarray:
+            nonlocal before
+            before = self.pressed(seconds, skin, cover, before)
+            return before
+
+        return remembering
 
 
 def sheet(skin: Skin) -> Box:

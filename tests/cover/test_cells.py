@@ -1,0 +1,205 @@
+"""Force on the switches under faces and caps: closed forms, a boundary-element solution, and what must only rise."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from foam import FoamOnCaps
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contactfpga.design.cover import Cap, Cells, Cover, CoverError, Ellipse, Load, Rectangle, Switch, point
+from contactfpga.design.cover.press import read_cover, write_cover
+
+PITCH = 10e-3
+PLACES = {"on a cap": (45.0, 45.0), "between two": (40.0, 45.0), "between four": (40.0, 40.0), "aside": (42.0, 43.0)}
+"""In mm from the sheet's corner, for 8x8 caps."""
+
+
+def cells(cover, count=8, pitch=PITCH, seed=0):
+    return Cells(cover, count, count, pitch, pitch, seed)
+
+
+def finger(x_mm, y_mm, force=2.0, half=(7.0, 6.0)):
+    """At a place in mm from the sheet's corner."""
+    return [Load((Ellipse(half[0] * 1e-3, half[1] * 1e-3, (x_mm - 5) * 1e-3, (y_mm - 5) * 1e-3),), force)]
+
+
+def capped(thickness_mm, side_mm, stiffness=math.inf, proud=True, cut=False):
+    switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
+    return Cover("frictionless", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud), cut=cut)
+
+
+# ---- against the boundary elements
+
+
+@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (4.0, 8.0))])
+def test_flush_faces_take_the_stress_on_them(thickness, side):
+    foam, sheet = FoamOnCaps(thickness, side, proud=False), cells(capped(thickness, side, proud=False))
+    for x, y in PLACES.values():
+        exact = foam.forces(foam.ellipse(x, y, 7, 6, 2.0))
+        assert sheet.forces_n(finger(x, y)) == pytest.approx(exact, abs=0.015)
+
+
+@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 8.0, 9.0))])
+@pytest.mark.parametrize("stiffness", [math.inf, 4.0, 2.0])
+def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):
+    """The largest force, on which it depends whether a touch is felt, is off by at most an eighth."""
+    foam, sheet = FoamOnCaps(thickness, side, stiffness=stiffness), cells(capped(thickness, side, stiffness))
+    for x, y in PLACES.values():
+        exact, found = foam.forces(foam.ellipse(x, y, 7, 6, 2.0)), sheet.forces_n(finger(x, y))
+        assert found.max() == pytest.approx(exact.max(), rel=0.125)
+        assert found.sum() == pytest.approx(2.0, rel=1e-5)
+
+
+def test_a_switch_that_gives_way_beside_a_flush_base_loses_its_force():
+    """Why only proud caps may give way: of what a rigid flush cap takes, one on 4 N/mm keeps less than half."""
+    pressed = [FoamOnCaps(5.0, 8.0, stiffness=k, proud=False) for k in (math.inf, 4.0)]
+    rigid, soft = (foam.forces(foam.ellipse(45, 45, 7, 6, 2.0)).max() for foam in pressed)
+    assert soft < 0.45 * rigid
+
+
+# ---- against closed forms
+
+
+@pytest.mark.parametrize("offset_mm", [0.0, 3.0, 7.0])
+def test_the_point_model_is_the_papers(offset_mm):
+    cover = Cover("point", 5e-3, Switch())
+    found = cells(cover).forces_n([Load((Ellipse(1e-3, 1e-3, 0.03 + offset_mm * 1e-3, 0.03),), 12.0)])
+    stress = point.stress_pa(12.0, offset_mm * 1e-3, 5e-3)
+    assert found[3, 3] == pytest.approx(float(stress) * 12.6e-6, rel=1e-12)
+
+
+@pytest.mark.parametrize("model", ["hertz", "bonded", "frictionless"])
+def test_a_face_takes_the_mean_of_the_stress_on_it(model):
+    """The stress by superposed point forces, on a fine grid of the paper's face."""
+    cover = Cover(model, 5e-3, Switch())
+    load = [Load((Ellipse(7e-3, 5e-3, 0.031, 0.032, 0.3),), 10.0)]
+    found = cells(cover).forces_n(load)
+    inside = (np.arange(16) + 0.5) / 16 - 0.5
+    for row, column in ((3, 3), (3, 4), (2, 3)):
+        x, y = (place * PITCH + inside * cover.side_m for place in (column, row))
+        mean = cover.stress_pa(load, x, y[:, None]).mean()
+        assert found[row, column] == pytest.approx(mean * 12.6e-6, abs=6e-3)
+
+
+def test_cut_foam_hands_each_tile_the_pressure_on_it():
+    """A bar over two tiles and a half, flat: by area; a disc between four caps: a quarter each."""
+    sheet = cells(capped(2.0, 9.0, cut=True))
+    bar = [Load((Rectangle(12.5e-3, 4e-3, 0.0325, 0.03),), 10.0)]
+    assert sheet.forces_n(bar)[3, 2:5] == pytest.approx([2.0, 4.0, 4.0], abs=1e-9)
+    assert sheet.forces_n(finger(40, 40))[3:5, 3:5] == pytest.approx(np.full((2, 2), 0.5), abs=1e-9)
+
+
+def test_the_nearest_proud_cap_takes_a_quarter_at_least_whatever_the_foam():
+    """By symmetry four caps share what lies between them; nothing else can carry it."""
+    for thickness in (1.0, 2.0, 5.0):
+        for side in (6.0, 9.0):
+            assert cells(capped(thickness, side)).forces_n(finger(40, 40)).max() == pytest.approx(0.5, rel=0.06)
+
+
+# ---- what must only rise, and what must not matter
+
+
+@given(st.floats(20, 60), st.floats(20, 60), st.floats(1.0, 6.0), st.booleans(), st.floats(0.0, 3e-4))
+def test_forces_add_up_and_scale(x, y, thickness, cut, travel):
+    cover = Cover("frictionless", thickness * 1e-3, Switch(travel_m=travel), cap=Cap(8e-3), cut=cut)
+    sheet = cells(cover)
+    one, two = finger(x, y, 3.0), finger(80 - y, x, 5.0)
+    assert sheet.forces_n(one + two) == pytest.approx(sheet.forces_n(one) + sheet.forces_n(two), abs=1e-9)
+    assert sheet.forces_n(finger(x, y, 6.0)) == pytest.approx(2 * sheet.forces_n(one), abs=1e-9)
+    assert sheet.forces_n(one).sum() == pytest.approx(3.0, rel=1e-3)
+
+
+def test_more_force_closes_no_fewer_switches_and_thresholds_no_more():
+    closed = [cells(capped(2.0, 8.0)).closed(finger(42, 43, force)) for force in (2, 4, 8, 16, 40)]
+    for fewer, more in itertools.pairwise(closed):
+        assert not (fewer & ~more).any()
+    covers = [Cover("frictionless", 2e-3, Switch(force), cap=Cap(8e-3)) for force in (2, 1, 0.3)]
+    heavy = [cells(cover).closed(finger(42, 43, 9)) for cover in covers]
+    for fewer, more in itertools.pairwise(heavy):
+        assert not (fewer & ~more).any()
+
+
+@pytest.mark.parametrize("swap", [True, False])
+def test_a_sheet_turned_over_its_diagonal_takes_the_forces_turned(swap):
+    cover = capped(3.0, 5.0, 4.0)
+    upright, lying = Cells(cover, 6, 9, 7e-3, 11e-3), Cells(cover, 9, 6, 11e-3, 7e-3)
+    load = Load((Ellipse(8e-3, 5e-3, 0.02, 0.05, 0.4),), 4.0)
+    turned = Load((Ellipse(5e-3, 8e-3, 0.05, 0.02, -0.4),), 4.0)
+    assert lying.forces_n([turned]) == pytest.approx(upright.forces_n([load]).T, abs=1e-9)
+
+
+def test_what_lies_beside_the_sheet_presses_it_no_more_than_what_lies_on_it():
+    sheet = cells(capped(5.0, 8.0))
+    assert sheet.forces_n(finger(-40, 40)).sum() == 0
+    assert 0 < sheet.forces_n(finger(0, 40)).sum() < 2
+
+
+# ---- thresholds
+
+
+def test_closing_forces_are_drawn_once_for_a_seed():
+    cover = Cover("frictionless", 2e-3, Switch(0.4, spread=0.1, preload_n=0.1), cap=Cap(8e-3))
+    one, same, other = (Cells(cover, 40, 40, PITCH, PITCH, seed).thresholds_n for seed in (1, 1, 2))
+    assert (one == same).all()
+    assert (one != other).all()
+    assert one.mean() == pytest.approx(0.3, abs=3 * 0.04 / 40)
+    assert one.std() == pytest.approx(0.04, rel=0.08)
+    assert 0.4 * 0.7 - 0.1 <= one.min() < one.max() <= 0.4 * 1.3 - 0.1
+
+
+def test_a_closed_switch_opens_at_a_lower_force():
+    cover = Cover("frictionless", 2e-3, Switch(0.5, hysteresis=0.2), cap=Cap(8e-3))
+    sheet = cells(cover)
+    peak = sheet.forces_n(finger(45, 45, 1.0)).max()
+    closes, holds, opens = 0.501 / peak, 0.41 / peak, 0.399 / peak
+    before = sheet.closed(finger(45, 45, closes))
+    assert before.sum() == 1
+    assert not sheet.closed(finger(45, 45, holds)).any()
+    assert sheet.closed(finger(45, 45, holds), before).sum() == 1
+    assert not sheet.closed(finger(45, 45, opens), before).any()
+
+
+def test_false_presses_are_those_that_are_drawn():
+    """Expected number against many drawn sheets, with the arm's own acceleration of 1 g on 20 g caps and foam."""
+    cover = Cover("frictionless", 2e-3, Switch(0.5, spread=0.2, preload_n=0.1), cap=Cap(8e-3, mass_kg=0.02))
+    weight = (0.02 + 300 * PITCH**2 * 2e-3) * 9.81
+    drawn = [Cells(cover, 30, 30, PITCH, PITCH, seed).thresholds_n <= weight for seed in range(200)]
+    expected = cells(cover, 30).false_presses(9.81, 300)
+    assert 10 < expected == pytest.approx(np.mean([one.sum() for one in drawn]), rel=0.08)
+    assert cells(Cover("frictionless", cap=Cap(8e-3)), 30).false_presses() == 0
+
+
+# ---- files and refusals
+
+
+def test_a_cover_with_caps_comes_back_from_its_file():
+    import tomllib
+
+    cover = Cover(
+        *("frictionless", 2e-3, Switch(0.4, travel_m=2e-4, spread=0.1, hysteresis=0.2, preload_n=0.05)),
+        cap=Cap(6e-3, mass_kg=1e-4),
+        cut=True,
+    )
+    assert read_cover(tomllib.loads(write_cover(cover))["cover"]) == cover
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: cells(Cover()), r"model is 'patch', which knows no force"),
+        (lambda: cells(capped(2.0, 11.0)), r"a cap is 0.011 m wide; the pitch is 0.01 m, take a smaller one"),
+        (lambda: Cover("hertz", cut=True), r"cut is true; foam is cut between caps, give \[cover.cap\] as well"),
+        (lambda: Cover("point", cap=Cap(8e-3)), r"the model 'point' knows no cap; take one of hertz, bonded"),
+        (lambda: Cover("hertz", switch=Switch(travel_m=1e-4)), r"travel_m is 0.0001; only a switch under a proud cap"),
+        (lambda: Cover("hertz", poisson=0.6), r"poisson is 0.6; it must lie above -1 and not above 0.5"),
+        (lambda: Switch(spread=0.4), r"spread is 0.4; it must lie between 0 and 0.3"),
+        (lambda: Switch(preload_n=1.0), r"preload_n is 1; the switch closes at 1 N, preload less"),
+        (lambda: Cap(0.0), r"side_m is 0.0; it must be a finite number above 0 m"),
+    ],
+)
+def test_what_no_sheet_can_have(make, words):
+    with pytest.raises(CoverError, match=words):
+        make()
