@@ -1,0 +1,48 @@
+"""What lies over the switches in the studies: one cover for each idea of how a touch reaches a switch.
+
+Switches, foam and gaps are parts that one can buy or cut; that they are these is an assumption, nothing was built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from contactfpga.design.cover import Cap, Cover, Switch
+
+GAP_MM = 0.6
+"""Between two caps."""
+
+FOAM_M = 2e-3
+"""Thickness of the foam on caps."""
+
+DOME = Switch(force_n=0.4, travel_m=0.2e-3, spread=0.1, hysteresis=0.2)
+"""A light metal dome."""
+
+
+def bare(pitch_mm: float) -> Cover | None:
+    """No cover and no force: a switch closes when its middle lies under the contact."""
+    return None
+
+
+def paper(pitch_mm: float) -> Cover:
+    """The paper's switch, 1 N on a face of 12.6 mm2, flush under 5 mm of foam that is glued on a rigid base."""
+    return Cover("bonded", 5e-3, Switch())
+
+
+def capped(pitch_mm: float, switch: Switch = DOME) -> Cover:
+    """Proud caps under a whole sheet of foam."""
+    return Cover("frictionless", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3))
+
+
+def tiled(pitch_mm: float, switch: Switch = DOME) -> Cover:
+    """Proud caps, each under a foam tile of its own."""
+    return Cover("frictionless", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3), cut=True)
+
+
+COVERS: dict[str, Callable[[float], Cover | None]] = {
+    "bare": bare,
+    "paper": paper,
+    "caps": capped,
+    "tiles": tiled,
+}
+"""By name: the cover of a sheet with this pitch in mm."""
