@@ -70,7 +70,8 @@ class RoundRobin(wiring.Component):
     to its end; one with nothing to send passes it on in the same clock. So a sheet waits for one packet of each other
     sheet at most.
 
-    holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at while the sheet has the grant.
+    holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at while the sheet has the
+    grant.
     grant (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
     """
 

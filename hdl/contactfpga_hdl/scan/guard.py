@@ -19,8 +19,8 @@ def checked_rows(skin: Skin) -> int:
 
 class LineFaults(wiring.Component):
     """A line that is found faulty is told from the next clock on. It is told no more once a check in a *renewing* round
-    finds it well; that is the first whole round of checks after ``retry`` toggles, so faults that come and go change what
-    is told twice per toggle at most. Lines that are masked whole are not told.
+    finds it well; that is the first whole round of checks after ``retry`` toggles, so faults that come and go change
+    what is told twice per toggle at most. Lines that are masked whole are not told.
 
     rows, columns, stuck (in): lines that a check of this clock finds faulty.
     checks_rows, checks_columns, checks_stuck (in): of which lines there is a check in this clock; of columns it is of

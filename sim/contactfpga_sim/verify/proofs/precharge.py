@@ -72,8 +72,8 @@ def let_go(proof: Proof) -> None:
 
     Claimed: columns are driven a clock after they shall be, but for those that are masked in every row, and those that
     are stuck: they read pressed in each sample of a window, of four that are two clocks apart and all between them. A
-    stuck column is driven throughout the first window that begins after a toggle, and then it is stuck if it read pressed
-    throughout that, too. A guard column that reads pressed in a check is not driven until a toggle.
+    stuck column is driven throughout the first window that begins after a toggle, and then it is stuck if it read
+    pressed throughout that, too. A guard column that reads pressed in a check is not driven until a toggle.
     """
     m = proof.m
     skin = reversal_of("col2row").replace(columns=3, guard=True)
@@ -142,8 +142,8 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
     Claimed: the columns that are driven are those that the rule above leaves; a sample is what they read two clocks
-    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16 toggles
-    at least every 2^16 us. Column 1 is never driven.
+    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16
+    toggles at least every 2^16 us. Column 1 is never driven.
     """
     m, skin = proof.m, dut.skin
     inside = proof.put(dut)

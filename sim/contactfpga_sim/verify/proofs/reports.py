@@ -1,4 +1,4 @@
-"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and each report lets a waiting frame pass."""
+"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and each lets a waiting frame pass."""
 
 from functools import partial
 from unittest import mock
