@@ -40,12 +40,6 @@ def record_layout(derived: Derived) -> data.StructLayout:
     return data.StructLayout({"zone": zone_layout(derived), "end": 1})
 
 
-def barycenter_layout(derived: Derived) -> data.StructLayout:
-    """Area, without the bits above what all areas of the sheet differ in, and barycenter; the bits of a record on the
-    wire with ``report = "barycenter"``."""
-    return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits, strict=True)))
-
-
 def passed_layout(derived: Derived) -> data.StructLayout:
     """What the audit lets through: items, or zones that are still to be divided."""
     return record_layout(derived) if derived.skin.report == "barycenter" else item_layout(derived)

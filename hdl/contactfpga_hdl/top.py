@@ -14,7 +14,6 @@ from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import LINE_BITS, Receiver, Transmitter
-from contactfpga_hdl.payloads import zone_layout
 from contactfpga_hdl.report.audit import Audit
 from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.scan.pins import column_pins, connect_pins, moves_sample, row_pins
@@ -37,9 +36,8 @@ class Top(wiring.Component):
     spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, those at their converter.
     alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
-    With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
-    labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
-    the records, and bytes.
+    With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: see
+    :func:`~contactfpga_hdl.probes.probe_ports`.
 
     Where the scan or the link finds that a register of it flipped by itself, all begins again within two clocks but for
     what sends bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin
@@ -68,19 +66,9 @@ class Top(wiring.Component):
             **({"alive": Out(1)} if skin.alive else {}),
         }
         if probes:
-            ports |= {
-                "row_transfer": Out(1),
-                "row_cells": Out(skin.columns),
-                "row_last": Out(1),
-                "record_transfer": Out(1),
-                "record_data": Out(8 * derived.item_bytes),
-                "record_end": Out(1),
-                "byte_transfer": Out(1),
-                "byte_data": Out(8),
-            }
-            if skin.report == "barycenter":
-                ports["record_data"] = Out(zone_layout(derived).size)
-                ports |= {"item_transfer": Out(1), "item_data": Out(8 * derived.item_bytes), "item_end": Out(1)}
+            from contactfpga_hdl.probes import probe_ports
+
+            ports |= probe_ports(derived)
         super().__init__(ports)
 
     def elaborate(self, platform):
@@ -125,9 +113,8 @@ class Top(wiring.Component):
                 scan.due.eq(link.due),
                 link.time.eq(scan.time),
             ]
-        if self.probes:
-            self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
-            self._probe(m, "byte", link.bytes, data=link.bytes.payload)
+        self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
+        self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
 
     def _connect_sheet(self, m: Module, scan: Any) -> None:
@@ -236,9 +223,8 @@ class Top(wiring.Component):
         wiring.connect(m, label.records, audit.records)
         wiring.connect(m, audit.items, backlog.passed)
         m.d.comb += [audit.taken.eq(rows.valid & rows.ready), audit.row.eq(rows.payload)]
-        if self.probes:
-            record = label.records.payload
-            self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
+        record = label.records.payload
+        self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
         items = self._divided(m, backlog) if self.skin.report == "barycenter" else backlog.waiting
         return items, audit.summary
 
@@ -247,9 +233,8 @@ class Top(wiring.Component):
 
         divide = self._put(m, "divide", Divider(self.skin))
         wiring.connect(m, backlog.waiting, divide.records)
-        if self.probes:
-            item = divide.items.payload
-            self._probe(m, "item", divide.items, data=Mux(item.end, 0, item.data), end=item.end)
+        item = divide.items.payload
+        self._probe(m, "item", divide.items, data=Mux(item.end, 0, item.data), end=item.end)
         return divide.items
 
     def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
@@ -260,15 +245,15 @@ class Top(wiring.Component):
         backlog = self._put(m, "backlog", Backlog(self.skin))
         self._hand_over(m, rows, bitmap.rows, bitmap.free)
         wiring.connect(m, bitmap.items, backlog.passed)
-        if self.probes:
-            item = bitmap.items.payload
-            self._probe(m, "record", bitmap.items, data=item.data, end=item.end)
+        item = bitmap.items.payload
+        self._probe(m, "record", bitmap.items, data=item.data, end=item.end)
         return backlog.waiting, bitmap.summary
 
     def _probe(self, m: Module, name: str, boundary: stream.Interface, **fields: Value) -> None:
-        m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)
-        for field, value in fields.items():
-            m.d.comb += getattr(self, f"{name}_{field}").eq(value)
+        if self.probes:
+            from contactfpga_hdl.probes import connect_probe
+
+            connect_probe(m, self, name, boundary, **fields)
 
 
 def receiver_of(derived: Derived) -> wiring.Component:

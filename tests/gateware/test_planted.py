@@ -19,9 +19,9 @@ GATEWARE = "tests/gateware"
 FORMAL = "tests/proofs/test_formal.py::test_the_claim_holds"
 FAULTS = {
     "readings go out with a report": Fault(
-        "link/link.py",
-        "hello_due | wire.take_report | regions.waits & ~units_next",
-        "hello_due | regions.waits & ~units_next",
+        "link/between.py",
+        "hello_due | self._wire.take_report | frame_waits & ~units_next",
+        "hello_due | frame_waits & ~units_next",
         (f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says",),
     ),
     "a sweep's region is written as it goes out": Fault(

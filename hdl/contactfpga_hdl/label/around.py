@@ -101,6 +101,26 @@ def stored_turns() -> dict[str, int]:
     return {"first_turn": 1, "last_turn": 1}
 
 
+def unwrapped(
+    m: Module, derived: Derived, join: data.View, kept: data.View, found: Value, group: data.View
+) -> data.View:
+    """Add to a ``group`` of the labeller ``run`` what is known of turns, from what was ``kept`` and ``found``; returns
+    what the table keeps of it."""
+    m.submodules.unwrap = unwrap = Unwrap(derived)
+    m.d.comb += [
+        unwrap.kept.eq(kept),
+        unwrap.found.eq(found),
+        unwrap.joins.eq(join.pop | join.load),
+        unwrap.zone.eq(join.load),
+        unwrap.cells.eq(join.run.area),
+        *(getattr(unwrap, name).eq(join[name]) for name in ("down", "turn", "ring")),
+    ]
+    m.d.comb += [group[name].eq(unwrap.group[name]) for name in unwrap.group.shape().members]
+    stored = Signal(kept_layout(derived))
+    m.d.comb += [stored.eq(group), stored.back.eq(group.back & ~join.first_turn)]
+    return stored
+
+
 class Acts(Protocol):
     """What the labeller does in a clock."""
 

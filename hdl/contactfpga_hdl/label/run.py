@@ -95,20 +95,10 @@ class Sum(wiring.Component):
             m.d.comb += group[name].eq((kept[name] + join.run[name]) + before)
         stored = group
         if self.derived.skin.closed:
-            from contactfpga_hdl.label.around import Unwrap
+            from contactfpga_hdl.label.around import unwrapped
 
-            m.submodules.unwrap = unwrap = Unwrap(self.derived)
-            m.d.comb += [
-                unwrap.kept.eq(kept),
-                unwrap.found.eq(Mux(join.pop, stack.top, Mux(join.load, read.data, 0))),
-                unwrap.joins.eq(join.pop | join.load),
-                unwrap.zone.eq(join.load),
-                unwrap.cells.eq(join.run.area),
-                *(getattr(unwrap, name).eq(join[name]) for name in ("down", "turn", "ring")),
-            ]
-            m.d.comb += [group[name].eq(unwrap.group[name]) for name in unwrap.group.shape().members]
-            stored = Signal(moments)
-            m.d.comb += [stored.eq(group), stored.back.eq(group.back & ~join.first_turn)]
+            found = Mux(join.pop, stack.top, Mux(join.load, read.data, 0))
+            stored = unwrapped(m, self.derived, join, kept, found, group)
         with m.If(works):
             m.d.sync += kept.eq(group)
             with m.If(join.closes):

@@ -1,4 +1,6 @@
-"""Whole frames from the packer to the wire, newest first, and hellos, reports of faults and readings between them."""
+"""Whole frames from the packer to the wire, newest first, and hellos between them."""
+
+from typing import TYPE_CHECKING
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import crc, memory, stream, wiring
@@ -8,17 +10,16 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS
 from contactfpga.wire import numbered, protocol
 from contactfpga.wire.numbered import SheetPlace
-from contactfpga.wire.units import plain_bytes
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
 from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout, tag_layout
 from contactfpga_hdl.util.upset import upset_places
 
+if TYPE_CHECKING:
+    from contactfpga_hdl.link.between import Readings, Reports
+
 HELLO_REGION = 3
 """The others hold frames."""
-
-FRAMES_BEFORE_UNITS = 4
-"""As many frames go in a row while readings of units wait."""
 
 STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
@@ -31,10 +32,8 @@ class _Wire:
         self.take_frame = Signal()  # the frame that waits is next
         self.take_hello = Signal()
         self.is_hello = Signal()
-        self.take_report = Signal()
-        self.is_report = Signal()
+        self.take_report = Signal()  # of some Skins only, as units are
         self.take_units = Signal()
-        self.is_units = Signal()
         self.offset = Signal(offset_bits)  # of the byte on offer, in its region
         self.fetches = Signal()  # that byte is read
 
@@ -59,9 +58,8 @@ class Link(wiring.Component):
 
     The hello is fixed but for the digits of its state: each is taken in the clock before its byte is offered.
 
-    A hello goes first, then a report of faults, then a frame; but a frame that waits is next after a report, so that
-    it waits for one at most, and one more per hello. Readings of units go when nothing else waits, and at the latest
-    after :data:`FRAMES_BEFORE_UNITS` frames, so that frames that fill the line do not hold them back.
+    A hello goes before a frame. When reports of faults and readings of units go: see
+    :mod:`contactfpga_hdl.link.between`.
 
     frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
@@ -141,56 +139,20 @@ class Link(wiring.Component):
         with m.If(self._hello_period(m) | self.asked):
             m.d.sync += hello_due.eq(1)
         byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
-        reporter = self._reporter(m, wire) if "faults" in self.signature.members else None
-        if reporter is not None:
-            byte = Mux(wire.is_report, reporter.byte, byte)
-        if self.skin.units:
-            byte = Mux(wire.is_units, self.units.byte, byte)
-            m.d.comb += [self.units.taken.eq(wire.take_units), self.units.place.eq(wire.offset)]
-        self._send(m, wire, regions, hello_due, byte, reporter)
+        others = self._others(m, wire)
+        for other in others:
+            byte = Mux(other.sent, other.byte, byte)
+        self._send(m, wire, regions, hello_due, byte, others)
         return m
 
-    def _reporter(self, m: Module, wire: _Wire) -> wiring.Component:
-        from contactfpga_hdl.link.faults import Reporter
+    def _others(self, m: Module, wire: _Wire) -> "list[Reports | Readings]":
+        """What some Skins send besides: reports before readings."""
+        if not self._optional_ports():
+            return []
+        from contactfpga_hdl.link.between import Readings, Reports
 
-        m.submodules.reporter = reporter = Reporter(self.skin)
-        m.d.comb += [
-            reporter.word.eq(self.faults),
-            reporter.greeted.eq(wire.take_hello),
-            reporter.taken.eq(wire.take_report),
-            reporter.sends.eq(wire.is_report & ~wire.idle),
-            reporter.place.eq(wire.offset),
-            reporter.fetches.eq(wire.fetches),
-        ]
-        if self.skin.self_test:
-            wiring.connect(m, wiring.flipped(self.slots), reporter.slots)
-        return reporter
-
-    def _take_report(
-        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value, reporter: wiring.Component
-    ) -> None:
-        """Before a frame, but not after another report."""
-        m.d.comb += wire.take_report.eq(reporter.due & ~hello_due & ~(wire.is_report & regions.waits))
-        m.d.sync += wire.is_report.eq(wire.take_report)
-        with m.If(wire.take_report):
-            m.d.comb += wire.take_frame.eq(0)
-            m.d.sync += end.eq(reporter.length)
-            m.next = "FETCH"
-
-    def _take_units(self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value) -> None:
-        """Units are sent when nothing else waits, or only a frame after FRAMES_BEFORE_UNITS others."""
-        frames = Signal(range(FRAMES_BEFORE_UNITS + 1))  # since the last ones
-        units_next = frames == FRAMES_BEFORE_UNITS
-        others = hello_due | wire.take_report | regions.waits & ~units_next
-        m.d.comb += wire.take_units.eq(self.units.due & ~others)
-        m.d.sync += wire.is_units.eq(wire.take_units)
-        with m.If(wire.take_frame & ~units_next):
-            m.d.sync += frames.eq(frames + 1)
-        with m.If(wire.take_units):
-            m.d.comb += wire.take_frame.eq(0)
-            m.d.sync += frames.eq(0)
-            m.d.sync += end.eq(1 + plain_bytes(self.skin.units, self.derived.units.converter.bits))
-            m.next = "FETCH"
+        kinds = [Reports] * hasattr(self, "faults") + [Readings] * hasattr(self, "units")
+        return [kind(m, self, wire) for kind in kinds]
 
     def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
         with m.If(wire.take_frame):
@@ -250,7 +212,7 @@ class Link(wiring.Component):
         regions: _Regions,
         hello_due: Value,
         byte: Value,
-        reporter: wiring.Component | None,
+        others: "list[Reports | Readings]",
     ) -> None:
         end = Signal.like(wire.offset)
         seeded = wire.take_frame | wire.take_report | wire.take_units
@@ -284,10 +246,11 @@ class Link(wiring.Component):
                 ]
                 with m.If(either):
                     m.next = "FETCH"
-                if reporter is not None:
-                    self._take_report(m, wire, regions, hello_due, end, reporter)
-                if self.skin.units:
-                    self._take_units(m, wire, regions, hello_due, end)
+                for other in others:
+                    with m.If(other.choose(m, hello_due, regions.waits)):
+                        m.d.comb += wire.take_frame.eq(0)
+                        m.d.sync += other.begin(end)
+                        m.next = "FETCH"
             with m.State("FETCH"):
                 m.d.comb += wire.fetches.eq(1)
                 m.next = "BYTE"

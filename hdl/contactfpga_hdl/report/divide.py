@@ -14,7 +14,14 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.payloads import barycenter_layout, item_layout, record_layout
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.payloads import item_layout, record_layout
+
+
+def barycenter_layout(derived: Derived) -> data.StructLayout:
+    """Area, without the bits above what all areas of the sheet differ in, and barycenter; the bits of a record on the
+    wire with ``report = "barycenter"``."""
+    return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits, strict=True)))
 
 
 class Divider(wiring.Component):

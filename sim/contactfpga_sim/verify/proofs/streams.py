@@ -8,11 +8,11 @@ from amaranth.hdl import Cat, Mux, Signal, Value
 from contactfpga.choices.debounces import DebounceName
 from contactfpga.skin import Skin
 from contactfpga_hdl.debounce.even import Debounce
-from contactfpga_hdl.payloads import barycenter_layout, moments_layout
+from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.report.audit import Audit
 from contactfpga_hdl.report.backlog import Queue
 from contactfpga_hdl.report.bitmap import Bitmap
-from contactfpga_hdl.report.divide import Divider
+from contactfpga_hdl.report.divide import Divider, barycenter_layout
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof

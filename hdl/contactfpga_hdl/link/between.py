@@ -1,0 +1,95 @@
+"""What a link sends between frames for some Skins: reports of faults, and readings of units (docs/protocol.md).
+
+A hello goes first, then a report, then a frame; but a frame that waits is next after a report, so that it waits for one
+at most, and one more per hello. Readings go when nothing else waits, and at the latest after
+:data:`FRAMES_BEFORE_UNITS` frames, so that frames that fill the line do not hold them back.
+"""
+
+from typing import Protocol
+
+from amaranth.hdl import Module, Signal, Value
+from amaranth.lib import wiring
+
+from contactfpga.wire.units import plain_bytes
+from contactfpga_hdl.link.faults import Reporter
+
+FRAMES_BEFORE_UNITS = 4
+"""As many frames go in a row while readings of units wait."""
+
+
+class Wire(Protocol):
+    """The packet on the wire, and the choice of the next one, as the link has them."""
+
+    idle: Signal
+    take_hello: Signal
+    take_frame: Signal
+    take_report: Signal
+    take_units: Signal
+    offset: Signal
+    fetches: Signal
+
+
+class Reports:
+    """Reports of faults, and slots of a self-test, among a link's packets.
+
+    sent: the last packet taken is one of these.
+    byte: the byte of it that is on offer.
+    """
+
+    def __init__(self, m: Module, link: wiring.Component, wire: Wire):
+        self._wire = wire
+        self.sent = Signal(name="is_report")
+        m.submodules.reporter = self._reporter = reporter = Reporter(link.skin)
+        self.byte = reporter.byte
+        m.d.comb += [
+            reporter.word.eq(link.faults),
+            reporter.greeted.eq(wire.take_hello),
+            reporter.taken.eq(wire.take_report),
+            reporter.sends.eq(self.sent & ~wire.idle),
+            reporter.place.eq(wire.offset),
+            reporter.fetches.eq(wire.fetches),
+        ]
+        if link.skin.self_test:
+            wiring.connect(m, wiring.flipped(link.slots), reporter.slots)
+
+    def choose(self, m: Module, hello_due: Value, frame_waits: Value) -> Value:
+        """While the wire is idle: whether a report is next."""
+        taken = self._wire.take_report
+        m.d.comb += taken.eq(self._reporter.due & ~hello_due & ~(self.sent & frame_waits))
+        m.d.sync += self.sent.eq(taken)
+        return taken
+
+    def begin(self, end: Signal) -> list:
+        """Assigned when one is taken; ``end`` is the offset after its last byte."""
+        return [end.eq(self._reporter.length)]
+
+
+class Readings:
+    """Readings of units among a link's packets, one for each sweep.
+
+    sent: the last packet taken is one of these.
+    byte: the byte of it that is on offer.
+    """
+
+    def __init__(self, m: Module, link: wiring.Component, wire: Wire):
+        self._wire = wire
+        self.sent = Signal(name="is_units")
+        self._frames = Signal(range(FRAMES_BEFORE_UNITS + 1), name="frames")  # since the last readings
+        self._due, self.byte = link.units.due, link.units.byte
+        self._length = 1 + plain_bytes(link.skin.units, link.derived.units.converter.bits)
+        m.d.comb += [link.units.taken.eq(wire.take_units), link.units.place.eq(wire.offset)]
+
+    def choose(self, m: Module, hello_due: Value, frame_waits: Value) -> Value:
+        """While the wire is idle: whether readings are next."""
+        taken = self._wire.take_units
+        units_next = self._frames == FRAMES_BEFORE_UNITS
+        others = hello_due | self._wire.take_report | frame_waits & ~units_next
+        m.d.comb += taken.eq(self._due & ~others)
+        m.d.sync += self.sent.eq(taken)
+        with m.If(self._wire.take_frame & ~units_next):
+            m.d.sync += self._frames.eq(self._frames + 1)
+        return taken
+
+    def begin(self, end: Signal) -> list:
+        """Assigned when one is taken; ``end`` is the offset after its last byte."""
+        return [self._frames.eq(0), end.eq(self._length)]
