@@ -48,7 +48,7 @@ COUNTS = {
 @pytest.mark.parametrize("family", FAMILIES)
 def test_scenes_lie_on_the_sheet_and_have_the_contacts_their_family_says(family):
     found = set()
-    for scene in placements(family, 40, 1, FINE):
+    for scene in placements(family, 20, 1, FINE):
         for seconds in (0.0, 0.37):
             truth = scene.truth(seconds, FINE)
             found.add(truth.count)
