@@ -44,6 +44,7 @@ def test_json_and_text_say_the_same(capsys):
     assert answer["circuit"]["line_pf"] == 30
 
 
+@pytest.mark.slow
 def test_the_margin_multiplies_what_the_model_says(capsys):
     _, answer = asked(capsys, "--margin", "3")
     computed = needed(Circuit(), 2, 3).settle.seconds
