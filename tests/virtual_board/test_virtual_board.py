@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from decoded import decoded
+from frames import decoded
 from slow_skin import SHEETS, SLOW
 
 import contactfpga
