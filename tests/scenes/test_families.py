@@ -103,6 +103,7 @@ def test_a_moving_finger_has_its_speed():
         assert np.hypot(after.x_mm - before.x_mm, after.y_mm - before.y_mm) / step == pytest.approx(300, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_families_press_through_any_cover():
     cover = Cover("bonded", switch=Switch(0.05))
     for family in FAMILIES:

@@ -185,5 +185,6 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_pages_set_is_what_the_command_gives(found):
     assert section("arm.md", "set") == tables.set_table(tables.ArmRuns(None, {}, found))
