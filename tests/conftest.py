@@ -6,6 +6,8 @@ What only some computers have is imported where it is used: the tests in host.tx
 import contextlib
 import os
 import random
+import subprocess
+import sys
 from collections import Counter
 
 import pytest
@@ -53,6 +55,17 @@ def run(capsys):
         return status, *capsys.readouterr()
 
     return run
+
+
+@pytest.fixture(scope="session")
+def python():
+    """Runs code in a Python of its own: ``python(code, *arguments)`` returns the process that ended."""
+
+    def python(code, *arguments, timeout=100):
+        command = [sys.executable, "-c", code, *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=timeout)
+
+    return python
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """Boards: pin tables, what cannot be wired, what is generated from them, and the call of the programmer."""
 
+import functools
 import itertools
 from pathlib import Path
 
@@ -16,6 +17,17 @@ from contactfpga_hdl.scan.pins import column_pins, row_pins
 
 ROOT = Path(__file__).resolve().parents[2]
 ICEBREAKER, ICESTICK, ULX3S = BOARDS["icebreaker"], BOARDS["icestick"], BOARDS["ulx3s-85f"]
+
+
+@functools.cache
+def constraints(name):
+    """What place and route gets for a small sheet with `alive`."""
+    board = BOARDS[name]
+    skin = Skin(rows=3, columns=3, alive=True, settle_us=9, clock_hz=board.clock_hz, baud=1_000_000)
+    suffix = board.constraints.partition(".")[2]
+    text = plan_for(board, skin).files[f"contactfpga.{suffix}"]
+    return text if isinstance(text, str) else text.decode()
+
 
 every_board = pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS))
 
@@ -98,10 +110,7 @@ def test_alive_takes_one_pin_which_the_sheet_then_does_not(board):
     assert (len(used), pins["alive"]) == (board.lines + 1, (board.column_side[-1],))
     assert len({*used}) == len(used)
     board.check(skin.replace(clock_hz=board.clock_hz, baud=1_000_000))
-    plan = plan_for(board, skin.replace(rows=3, columns=3, clock_hz=board.clock_hz, baud=1_000_000))
-    suffix = board.constraints.partition(".")[2]
-    text = plan.files[f"contactfpga.{suffix}"]
-    alive = [line for line in (text if isinstance(text, str) else text.decode()).splitlines() if "alive_0" in line]
+    alive = [line for line in constraints(board.name).splitlines() if "alive_0" in line]
     assert connector_sites(board)[board.alive] in alive[0].replace('"', " ").split()
 
 
@@ -114,12 +123,8 @@ def test_guard_lines_follow_the_sheets(board):
 
 @every_board
 def test_crystal_is_the_clock_of_the_platform(board):
-    plan = plan_for(board, board.skin)
-    suffix = board.constraints.partition(".")[2]
-    text = plan.files[f"contactfpga.{suffix}"]
-    text = text if isinstance(text, str) else text.decode()
-    stated = [line.split() for line in text.splitlines() if "frequency" in line.lower()]
-    hertz = [float(words[-1]) * 1e6 if suffix == "pcf" else float(words[-2]) for words in stated]
+    stated = [line.split() for line in constraints(board.name).splitlines() if "frequency" in line.lower()]
+    hertz = [float(words[-1]) * 1e6 if board.constraints.endswith("pcf") else float(words[-2]) for words in stated]
     assert hertz == [board.clock_hz]
 
 

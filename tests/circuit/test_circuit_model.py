@@ -70,6 +70,7 @@ def test_a_junctions_charge_is_the_integral_of_its_capacitance():
         assert np.interp(-2, volts, farads) == pytest.approx(reverse, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_other_direction_is_the_mirror_image():
     circuit = Circuit(low_v=1.0, high_v=2.3)
     one, other = needed(circuit, 2, 3, "col2row"), needed(circuit, 2, 3, "row2col")

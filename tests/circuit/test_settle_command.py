@@ -44,6 +44,7 @@ def test_json_and_text_say_the_same(capsys):
     assert answer["circuit"]["line_pf"] == 30
 
 
+@pytest.mark.slow
 def test_the_margin_multiplies_what_the_model_says(capsys):
     _, answer = asked(capsys, "--margin", "3")
     computed = needed(Circuit(), 2, 3).settle.seconds
@@ -76,6 +77,7 @@ def test_a_sheet_that_cannot_work_says_which_and_what_helps(capsys):
     assert "cannot work: a pressed column comes to" in said
 
 
+@pytest.mark.slow
 def test_the_skins_values_and_times(capsys, tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text('rows = 4\ncolumns = 5\ndiodes = "row2col"\nrelease_us = 1\n[circuit]\nline_pf = 60\n')

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from python_alone import python
 
 from contactfpga.tools import cli, commands
 from contactfpga.tools.commands import study
@@ -78,7 +77,7 @@ def test_every_flag_is_explained_in_a_sentence(name):
     assert re.fullmatch(r"[A-Z].*\.", PARSERS[name].description)
 
 
-def test_the_host_alone_explains_every_command():
+def test_the_host_alone_explains_every_command(python):
     """With none of the extras installed."""
     code = f"""
 import sys
@@ -157,22 +156,27 @@ def test_version(capsys):
     assert capsys.readouterr().out.strip() == "0.2.0"
 
 
-def loaded(code):
-    """Which of the heavy packages ``code`` brings in."""
-    result = python(f"import sys\n{code}\nprint(*sorted(set(sys.modules) & set('{HEAVY}'.split())))")
-    assert result.returncode == 0, result.stderr
-    return result.stdout.splitlines()[-1]
+@pytest.fixture
+def loaded(python):
+    """Which of the heavy packages code brings in: ``loaded(code)``."""
+
+    def loaded(code):
+        result = python(f"import sys\n{code}\nprint(*sorted(set(sys.modules) & set('{HEAVY}'.split())))")
+        assert result.returncode == 0, result.stderr
+        return result.stdout.splitlines()[-1]
+
+    return loaded
 
 
-def test_import_needs_numpy_alone():
+def test_import_needs_numpy_alone(loaded):
     assert loaded("import contactfpga") == ""
 
 
-def test_help_loads_nothing_heavy():
+def test_help_loads_nothing_heavy(loaded):
     assert loaded("from contactfpga.tools import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass") == ""
 
 
-def test_help_loads_no_command():
+def test_help_loads_no_command(python):
     code = "import sys\nfrom contactfpga.tools import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass\n"
     result = python(code + "print(*(name for name in sys.modules if name.startswith('contactfpga')))")
     names = result.stdout.splitlines()[-1].split()
@@ -180,7 +184,7 @@ def test_help_loads_no_command():
     assert len(names) < 30
 
 
-def test_json_needs_no_display(board):
+def test_json_needs_no_display(board, loaded):
     assert (
         loaded(f"from contactfpga.tools import cli\ncli.main(['zones', '--once', '--json', '{board.path}'])")
         == "serialx"
@@ -188,7 +192,7 @@ def test_json_needs_no_display(board):
 
 
 @pytest.mark.slow
-def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
+def test_replay_of_a_built_model_loads_no_tools(tmp_path, run, loaded):
     frames = tmp_path / "frames.npy"
     np.save(frames, np.eye(16, dtype=bool)[None])
     status, out, _ = run("replay", frames, "--json")  # builds the model where it is not built yet

@@ -1,7 +1,6 @@
 """What can go wrong with a command: it says so in a sentence."""
 
 import pytest
-from python_alone import python
 from sample import sample
 
 # ---- what can go wrong
@@ -54,7 +53,7 @@ EXTRAS = [
 
 
 @pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:3]))
-def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):
+def test_a_missing_extra_is_named_with_its_command(python, arguments, module, extra):
     code = f"""
 import sys
 sys.modules[{module!r}] = None  # as if it were not installed

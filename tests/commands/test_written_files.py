@@ -5,7 +5,6 @@ import os
 import resource
 import signal
 import stat
-import subprocess
 import sys
 
 import numpy as np
@@ -151,10 +150,9 @@ def test_a_failure_within_leaves_nothing(tmp_path):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/stdout"), reason="no /dev/stdout here")
-def test_a_pipe_is_written_itself():
+def test_a_pipe_is_written_itself(python):
     code = "from contactfpga.inputs.files import write_text; write_text('/dev/stdout', 'text')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
-    assert done.stdout == "text"
+    assert python(code).stdout == "text"
 
 
 @pytest.mark.parametrize("command", ["plot", "export"])

@@ -84,6 +84,7 @@ def test_random_frames_of_other_sheets_have_scipys_barycenters_rounded(record_pr
 LONG = ("sdh13x6", "feet45x52", "bed64x32", "popu64x27")
 
 
+@pytest.mark.slow  # it shares the board of the slow test above
 @pytest.mark.recordings
 @pytest.mark.parametrize("name", ["dtmf16x16", *(pytest.param(name, marks=pytest.mark.campaign) for name in LONG)])
 def test_recordings_have_scipys_barycenters_rounded(record_property, name):

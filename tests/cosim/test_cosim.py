@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 import pytest
-from decoded import decoded
+from frames import decoded
 from sample import each_choice, sample
 
 from contactfpga.skin import Skin

@@ -7,6 +7,7 @@ import random
 import bench_several
 import numpy as np
 import pytest
+from slow_skin import SHEETS, two_sheets
 
 import contactfpga
 from contactfpga import Skin, examples
@@ -151,8 +152,8 @@ def test_the_compiled_board_agrees_at_the_pins():
         assert talk.stats.damaged.total() == talk.stats.lost == 0
 
 
-def test_the_virtual_board_serves_both_sheets():
-    port, skins = f"sim://?sheets={EXAMPLE}&scene=palm", Several.load(EXAMPLE).skins
+def test_the_virtual_board_serves_both_sheets(tmp_path):
+    port, skins = f"sim://?sheets={two_sheets(tmp_path)}&scene=full", SHEETS
     with contextlib.ExitStack() as stack:
         boards = [stack.enter_context(contactfpga.open(f"{port}#{number}", skin)) for number, skin in enumerate(skins)]
         assert [board.name for board in boards] == ["chest", "back"]

@@ -3,7 +3,6 @@
 import functools
 import json
 import math
-import subprocess
 import sys
 from pathlib import Path
 
@@ -26,14 +25,13 @@ def run(run):
 # ---- commands
 
 
-def test_impact_and_design_need_numpy_alone():
+def test_impact_and_design_need_numpy_alone(python):
     code = (
         "import sys; from contactfpga.tools import cli; "
         f"cli.main(['cover', 'design', {str(FIRST)!r}]); cli.main(['cover', 'sense', '--pitch', '0.01']); "
         "print(*sorted(set(sys.modules) & {'scipy', 'matplotlib', 'rich', 'amaranth', 'contactfpga_sim', 'mpmath'}))"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert run.stdout.splitlines()[-1] == ""
+    assert python(code).stdout.splitlines()[-1] == ""
 
 
 def test_figures_without_matplotlib_name_what_to_install(run, monkeypatch):

@@ -1,8 +1,6 @@
 """The driver on pseudo-terminals: what it reads, and every way a port can go wrong."""
 
 import random
-import subprocess
-import sys
 import time
 
 import pytest
@@ -172,13 +170,13 @@ def test_missing_port_names_the_next_step():
         contactfpga.open("/dev/no_such_port")
 
 
-def test_second_client_is_refused_and_the_first_goes_on(board):
+def test_second_client_is_refused_and_the_first_goes_on(board, python):
     with contactfpga.open(board.path, timeout=LONG) as opened:
         for _ in range(2):  # as a cell of a notebook that is run again
             with pytest.raises(contactfpga.PortBusy, match="is in use: this program opened it already; go on"):
                 contactfpga.open(board.path)
         code = f"import contactfpga; contactfpga.read_zones({board.path!r})"
-        other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+        other = python(code)
         assert "PortBusy" in other.stderr
         assert "another program reads this port; close it first" in other.stderr
         assert opened.read(LONG)[0].area_cells == 4

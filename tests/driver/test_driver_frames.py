@@ -4,8 +4,6 @@ import asyncio
 import collections
 import contextlib
 import gc
-import subprocess
-import sys
 import threading
 import time
 
@@ -264,7 +262,7 @@ def test_the_reader_ends_with_its_board(board):
     assert not readers_of(board)
 
 
-def test_ctrl_c_ends_a_call_that_waits(board):
+def test_ctrl_c_ends_a_call_that_waits(board, python):
     code = f"""
 import signal, threading, time, os, contactfpga
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
@@ -278,7 +276,7 @@ try:
 except KeyboardInterrupt:
     print("interrupted", time.monotonic() - started < 5)
 """
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    result = python(code)
     assert result.stdout.strip() == "interrupted True", result.stderr
 
 

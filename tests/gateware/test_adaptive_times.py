@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from decoded import decoded
+from frames import decoded
 
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import HelloReader

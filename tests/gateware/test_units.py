@@ -12,6 +12,7 @@ from contactfpga import Skin
 from contactfpga_hdl.scan import raster
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.units import Units
+from contactfpga_hdl.units.watch import Watch
 from contactfpga_sim.model.golden import Timeline, guard, predict, units
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.hello import State
@@ -336,3 +337,42 @@ def test_a_board_with_such_a_converter_does_what_the_golden_model_says(hz):
     timeline = Timeline([], [(300, command_bytes)], units=wide_readings(rng, skin, cycles))
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_native.run(skin, timeline, cycles)) > 100
+
+
+SUMS = [[1, 1, 1], [2, -3, 1], [0, 0, -5], [1, -2, 1]]
+"""Of so few bits that thresholds are given in steps of 1."""
+EPOCHS, EPOCH, READ = 200, 32, (8, 14, 20)
+"""How many, of how many clocks; when in each of them a unit is read."""
+
+
+def test_a_sum_is_over_from_its_threshold_on_to_the_last_step(bench):
+    """Zeros, then a threshold of one sum at, or one off, the amount of the readings that come; the others have none."""
+    rng = np.random.default_rng(3)
+    zeros, read = rng.integers(4096, size=(2, EPOCHS, 3))
+    orders, expected, before = {}, [], 0
+    for epoch in range(EPOCHS):
+        place = int(rng.integers(4))
+        amount = abs(int(SUMS[place] @ (read[epoch] - zeros[epoch])))
+        number = max(1, amount + int(rng.integers(-1, 2)))
+        given = [*((ZERO, unit, int(zeros[epoch, unit])) for unit in range(3)), (SUM_THRESHOLD, before, 0)]
+        for cycle, (what, index, value) in enumerate([*given, (SUM_THRESHOLD, place, number)], epoch * EPOCH):
+            orders[cycle] = what, index | value << 3
+        expected.append(int(amount >= number))
+        before = place
+
+    def unit(cycle):
+        return sum(cycle % EPOCH >= start for start in READ[1:])
+
+    dut = Watch(Skin(units=3, unit_sums=SUMS))
+    sim = bench(dut)
+    sim.drive(dut.command, lambda cycle: int(cycle in orders))
+    sim.drive(dut.what, lambda cycle: orders.get(cycle, (0, 0))[0])
+    sim.drive(dut.value, lambda cycle: orders.get(cycle, (0, 0))[1])
+    sim.drive(dut.done, lambda cycle: int(cycle % EPOCH in READ))
+    sim.drive(dut.reading.unit, unit)
+    sim.drive(dut.reading.value, lambda cycle: int(read[cycle // EPOCH % EPOCHS, unit(cycle)]))
+    sim.drive(dut.reading.last, lambda cycle: int(unit(cycle) == 2))
+    over = sim.watch(dut.over)
+    sim.run(EPOCHS * EPOCH)
+    assert over.values[EPOCH - 1 :: EPOCH] == expected
+    assert 40 < sum(expected) < 160

@@ -2,18 +2,18 @@
 
 import math
 import re
-import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cobs import cobs
+from reversal import small, zones
 from zone_oracles import zones_by_image_tools
 
 from contactfpga.choices import labellers
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Widths
 from contactfpga.wire import protocol
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.golden import Timeline, predict
@@ -329,9 +329,10 @@ def test_clocks_agree_with_the_gatewares_table_where_decimals_are_not_exact(mega
             assert mine.hello_slots == theirs.hello_frames * rows
 
 
-def test_golden_model_runs_without_amaranth():
+def test_golden_model_runs_without_amaranth(python):
     code = "import sys, contactfpga_sim.model.golden; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    loaded = python(code).stdout.split()
+    assert "contactfpga_sim.model.golden" in loaded
     assert not [name for name in loaded if name.split(".")[0] in ("amaranth", "contactfpga_hdl")]
 
 
@@ -339,3 +340,19 @@ def test_the_golden_model_asks_a_skin_for_nothing_derived():
     """It computes widths and times itself; the linter sees imports alone."""
     folder = Path(golden.__file__).parent
     assert [path.name for path in folder.rglob("*.py") if re.search(r"\bderived\b", path.read_text())] == []
+
+
+@pytest.mark.parametrize("labeller", labellers.LABELLERS)
+@pytest.mark.parametrize("rows", [(0,), (3,), (0, 3), (1, 5), (0, 1, 4, 5)])
+def test_moments_of_zones_in_rows_that_were_driven_count_the_rows_between(labeller, rows):
+    skin = small(rows=6, columns=3, labeller=labeller)
+    cells = np.zeros((6, 3), bool)
+    cells[list(rows), 1] = True
+    widths = Widths(skin.sheet)
+    records = [data for _, data, end in predict(skin, Timeline([(0, cells, None)]), 400).records if not end]
+    low = widths.area_bits + widths.sum_x_bits
+    found = sorted((data & (1 << widths.area_bits) - 1, data >> low) for data in set(records))
+    if labeller == "single":
+        assert found == [(len(rows), sum(rows))]
+    else:
+        assert found == sorted((area, sum_y) for area, _, sum_y in zones(cells, 8))

@@ -4,7 +4,6 @@ import collections
 import itertools
 import os
 import stat
-import subprocess
 import sys
 import tempfile
 import time
@@ -85,7 +84,7 @@ def runtime(monkeypatch):
         yield Path(folder)
 
 
-def test_by_default_a_board_is_read_through_a_socket_in_a_folder_of_this_user_alone(runtime):
+def test_by_default_a_board_is_read_through_a_socket_in_a_folder_of_this_user_alone(runtime, python):
     with Streaming(SKIN) as board, publish(board.path) as publisher:
         assert publisher.line == f"zenoh://{KEY}"
         folder = runtime / "contactfpga"
@@ -98,7 +97,7 @@ def test_by_default_a_board_is_read_through_a_socket_in_a_folder_of_this_user_al
             connect = f"socket.socket(socket.AF_UNIX).connect({str(folder / 'zenoh.sock')!r})"
             for other, said in ((0, ""), (65534, "PermissionError")):
                 script = f"import os, socket; os.setgroups([]); os.setuid({other}); {connect}"
-                found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+                found = python(script)
                 assert said in found.stderr
                 assert bool(said) == bool(found.returncode)
 

@@ -19,7 +19,8 @@ def test_the_pages_have_examples():
     assert {"README.md", "docs/use.md", "docs/skin.md"} <= set(PAGES)
 
 
-SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md"}  # their examples compile boards of their own
+SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/watch.md"}
+"""Their examples compile boards of their own."""
 
 
 @pytest.mark.parametrize("page", sample(PAGES, quick={*PAGES} - SLOW, slow=SLOW))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import svg_texts
+from sample import sample
 
 from contactfpga import picture_style
 
@@ -34,7 +35,7 @@ def test_words_are_whole(path):
         assert (one.corners.max(axis=0) <= (picture.width, picture.height)).all(), one.text
 
 
-@every_picture
+@pytest.mark.parametrize("path", sample(PICTURES, quick=PICTURES[::8], slow=PICTURES), ids=lambda path: path.stem)
 def test_no_words_lie_on_others(path):
     assert not svg_texts.overlapping(svg_texts.read(path))
 

@@ -1,7 +1,7 @@
 """Messages that only recordings hold are what rosbags makes of the same values."""
 
 import pytest
-import ros_types
+import ros_messages
 
 from contactfpga.driver import mcap
 from contactfpga.tools.recordings import link_recorder, recorder
@@ -12,9 +12,9 @@ NS = 1_700_000_000_123_456_789
 
 def read_back(data, name):
     """The message as rosbags reads it, after a look whether rosbags would write the same bytes."""
-    message = ros_types.store().deserialize_cdr(data, ros_types.full(name))
-    assert bytes(ros_types.store().serialize_cdr(message, ros_types.full(name))) == data
-    return ros_types.plain(message)
+    message = ros_messages.store().deserialize_cdr(data, ros_messages.full(name))
+    assert bytes(ros_messages.store().serialize_cdr(message, ros_messages.full(name))) == data
+    return ros_messages.plain(message)
 
 
 def head(link):

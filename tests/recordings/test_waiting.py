@@ -5,7 +5,7 @@ import re
 import time
 
 import pytest
-import ros_types
+import ros_messages
 from net_processes import Streaming
 from recorded_stream import StreamPort, recorded
 
@@ -53,11 +53,11 @@ def messages(file):
     """Those of its messages, as other programs read them."""
     from mcap.reader import make_reader
 
-    kind = ros_types.full("contactfpga_msgs/Zones")
+    kind = ros_messages.full("contactfpga_msgs/Zones")
     with open(file, "rb") as opened:
         found = make_reader(opened).iter_messages(log_time_order=False)
         return [
-            ros_types.store().deserialize_cdr(message.data, kind).device_time_us
+            ros_messages.store().deserialize_cdr(message.data, kind).device_time_us
             for _, channel, message in found
             if channel.topic.endswith("/zones")
         ]

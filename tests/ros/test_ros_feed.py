@@ -3,7 +3,7 @@
 import types
 
 import pytest
-import ros_types
+import ros_messages
 from ros_messages import hello
 from tracked import SKIN, frame
 
@@ -49,7 +49,7 @@ class Sent(list):
     """(topic, message) of all that was published, as rosbags reads it."""
 
     def __call__(self, topic, data):
-        self.append((topic, ros_types.store().deserialize_cdr(data, ros_types.full(TOPICS[topic].type))))
+        self.append((topic, ros_messages.store().deserialize_cdr(data, ros_messages.full(TOPICS[topic].type))))
 
     def of(self, topic):
         return [message for name, message in self if name == topic]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-import ros_types
+import ros_messages
 from ros_messages import HEAD, hello, samples
 from rosbags.typesys import get_types_from_msg
 from tracked import SKIN, frame
@@ -17,11 +17,11 @@ from contactfpga.robot.ros.types import STANDARD
 
 @pytest.mark.parametrize(("name", "message"), list(samples()), ids=lambda one: one if isinstance(one, str) else "")
 def test_rosbags_reads_what_we_write_and_writes_the_same(name, message):
-    store, full = ros_types.store(), ros_types.full(name)
+    store, full = ros_messages.store(), ros_messages.full(name)
     data = cdr.encode(name, message)
     read = store.deserialize_cdr(data, full)
     assert bytes(store.serialize_cdr(read, full)) == data
-    assert_same(ros_types.plain(read), message)
+    assert_same(ros_messages.plain(read), message)
 
 
 def assert_same(read, meant):
@@ -39,24 +39,24 @@ def assert_same(read, meant):
         assert read == meant
 
 
-@pytest.mark.parametrize("which", ros_types.STORES, ids=lambda which: which.value)
+@pytest.mark.parametrize("which", ros_messages.STORES, ids=lambda which: which.value)
 def test_hashes_are_those_of_rosbags_in_each_distribution(which):
-    store = ros_types.store(which)
-    for name in [*ros_types.OURS, *STANDARD]:
-        assert types.type_hash(name) == store.hash_rihs01(ros_types.full(name)), name
+    store = ros_messages.store(which)
+    for name in [*ros_messages.OURS, *STANDARD]:
+        assert types.type_hash(name) == store.hash_rihs01(ros_messages.full(name)), name
 
 
-@pytest.mark.parametrize("name", ros_types.OURS)
+@pytest.mark.parametrize("name", ros_messages.OURS)
 def test_schemas_hold_all_that_a_reader_needs(name):
     """A recording has the schema alone."""
-    found = get_types_from_msg(types.schema(name), ros_types.full(name))
-    assert set(found) == {ros_types.full(name), *(ros_types.full(one.name) for one in types.needed(name))}
+    found = get_types_from_msg(types.schema(name), ros_messages.full(name))
+    assert set(found) == {ros_messages.full(name), *(ros_messages.full(one.name) for one in types.needed(name))}
 
 
 def test_the_package_builds_every_message_that_there_is():
     listed = (types.messages().parent / "CMakeLists.txt").read_text(encoding="utf-8")
     assert {f"contactfpga_msgs/{line.strip()[5:-5]}" for line in listed.splitlines() if ".msg" in line} == set(
-        ros_types.OURS
+        ros_messages.OURS
     )
 
 

@@ -48,7 +48,7 @@ COUNTS = {
 @pytest.mark.parametrize("family", FAMILIES)
 def test_scenes_lie_on_the_sheet_and_have_the_contacts_their_family_says(family):
     found = set()
-    for scene in placements(family, 40, 1, FINE):
+    for scene in placements(family, 20, 1, FINE):
         for seconds in (0.0, 0.37):
             truth = scene.truth(seconds, FINE)
             found.add(truth.count)
@@ -103,6 +103,7 @@ def test_a_moving_finger_has_its_speed():
         assert np.hypot(after.x_mm - before.x_mm, after.y_mm - before.y_mm) / step == pytest.approx(300, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_families_press_through_any_cover():
     cover = Cover("bonded", switch=Switch(0.05))
     for family in FAMILIES:

@@ -5,11 +5,12 @@ import math
 
 import numpy as np
 import pytest
+import toy_converter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refused_skins import CLOSED, REFUSED, REVERSAL
 
-from contactfpga import Skin, SkinError
+from contactfpga import ContactFPGAError, Skin, SkinError
 
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
 
@@ -145,3 +146,113 @@ def test_the_reference_skin():
 def test_a_skin_does_not_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Skin().rows = 8
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(("changes", "message"), REFUSED, ids=[str(changes) for changes, _ in REFUSED])
+def test_refused_with_value_and_limit(changes, message):
+    with pytest.raises(SkinError) as caught:
+        Skin(**changes)
+    assert str(caught.value) == message
+    assert isinstance(caught.value, ValueError)
+    assert isinstance(caught.value, ContactFPGAError)
+
+
+@pytest.mark.parametrize("field", ["rows", "connectivity", "pitch_x_mm", "clock_hz", "baud", "shift_hz"])
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_that_no_float_holds_are_refused_in_a_short_sentence(field, digits):
+    with pytest.raises(SkinError, match=f"^{field} is ") as caught:
+        Skin(**{field: 10**digits})
+    assert len(str(caught.value)) < 200
+
+
+# ---- capacity
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "connectivity", "capacity"),
+    [
+        (1, 1, 8, 1),
+        (16, 16, 8, 64),
+        (16, 16, 4, 128),
+        (32, 32, 8, 256),
+        (32, 32, 4, 512),
+        (33, 32, 8, 256),
+        (33, 32, 4, 256),
+        (64, 64, 8, 256),
+        (64, 1, 8, 32),
+        (5, 7, 8, 12),
+        (5, 7, 4, 18),
+    ],
+)
+def test_default_capacity(rows, columns, connectivity, capacity):
+    skin = Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG)
+    assert skin.zone_capacity == capacity
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_max_zones_is_what_the_worst_frame_of_a_small_sheet_holds(connectivity):
+    """Every frame of every sheet up to 3x4, labelled by scipy."""
+    ndimage = pytest.importorskip("scipy.ndimage")
+    structure = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
+    for rows in range(1, 4):
+        for columns in range(1, 5):
+            words = np.arange(1 << rows * columns)[:, None] >> np.arange(rows * columns) & 1
+            most = max(ndimage.label(word.reshape(rows, columns), structure)[1] for word in words)
+            assert Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG).max_zones() == most
+
+
+@pytest.mark.parametrize(("size", "connectivity", "capacity"), [(6, 8, 9), (16, 8, 64), (16, 4, 64), (64, 8, 64)])
+def test_default_capacity_where_zones_are_divided(size, connectivity, capacity):
+    skin = Skin(rows=size, columns=size, connectivity=connectivity, report="barycenter", **LONG)
+    assert skin.zone_capacity == capacity
+
+
+def test_replace_gives_a_skin_that_begins_or_ends_to_divide_its_own_capacity():
+    skin = Skin(rows=32, columns=32, **LONG)
+    divided = skin.replace(report="barycenter")
+    assert (skin.zone_capacity, divided.zone_capacity) == (256, 64)
+    assert divided.replace(report="cells") == skin.replace(report="cells")
+    assert skin.replace(zone_capacity=7).replace(report="cells").zone_capacity == 7
+    assert divided.replace(zone_capacity=7).replace(barycenter_bits=2).zone_capacity == 7
+
+
+def test_replace_gives_a_changed_sheet_its_own_capacity():
+    assert Skin(zone_capacity=7).replace(settle_us=6.0).zone_capacity == 7
+    assert Skin(zone_capacity=7).replace(rows=8).zone_capacity == 32
+    assert Skin().replace(rows=8, zone_capacity=3).zone_capacity == 3
+    with pytest.raises(SkinError, match="rows is 65"):
+        Skin().replace(rows=65)
+
+
+# ---- units
+
+
+def test_a_converter_of_ones_own_is_found_and_has_its_own_channels():
+    skin = Skin(units=4, converter="toy_converter:MINE")
+    assert skin.fingerprint != Skin(units=4).fingerprint
+    assert Skin(units=4, converter=toy_converter.MINE) == skin
+    with pytest.raises(SkinError, match="units is 5; MCP3204 has 4 channels"):
+        skin.replace(units=5)
+
+
+def test_a_file_keeps_units(tmp_path):
+    skin = Skin(units=3, unit_sums=((1, -1, 0), (1, 1, 1)), converter_v=5.0)
+    file = tmp_path / "skin.toml"
+    file.write_text(skin.to_toml())
+    assert Skin.load(file) == skin
+    assert Skin.load(file).fingerprint == skin.fingerprint != Skin(units=3).fingerprint
+
+
+@pytest.mark.parametrize(
+    ("clock_hz", "supply_v", "level", "sweep_us"),
+    [(12_000_000, 3.3, 6, 160), (12_000_000, 5.0, 3, 80), (25_000_000, 4.9, 13, 166.4), (1_000_000, 5.0, 1, 320)],
+)
+def test_eight_units_take_80_us_at_5_v_and_160_us_below(clock_hz, supply_v, level, sweep_us):
+    """A level is a whole number of clocks."""
+    skin = Skin(clock_hz=clock_hz, baud=clock_hz // 10, units=8, converter_v=supply_v, settle_us=50.0)
+    units = skin.derived.units
+    assert units.level_clocks == level
+    assert units.sweep_clocks / clock_hz * 1e6 == pytest.approx(sweep_us)

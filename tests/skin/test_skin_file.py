@@ -2,8 +2,6 @@
 
 import dataclasses
 import json
-import subprocess
-import sys
 
 import pytest
 from hypothesis import given, settings
@@ -157,10 +155,9 @@ def test_a_name_and_what_is_written_as_it_is_by_default_change_no_fingerprint():
     assert Skin(rows=8, zone_capacity=32).fingerprint == Skin(rows=8).fingerprint
 
 
-def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written():
+def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written(python):
     code = "from contactfpga import Skin; print(Skin(pitch_x_mm=10, mask=[[2, 1], [0, 3], [2, 1]]).fingerprint.hex())"
-    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert other.stdout.strip() == Skin(pitch_x_mm=10.0, mask=((0, 3), (2, 1))).fingerprint.hex()
+    assert python(code).stdout.strip() == Skin(pitch_x_mm=10.0, mask=((0, 3), (2, 1))).fingerprint.hex()
 
 
 def test_file_with_an_unknown_key(tmp_path):

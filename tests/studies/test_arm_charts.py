@@ -47,6 +47,7 @@ def test_the_naive_speed_is_the_papers_bound_and_no_safe_one():
     assert run(PAPER, "latency", latency_s=6e-3).outcome.peak_force_n > 15
 
 
+@pytest.mark.slow
 def test_the_bounds_hold_for_what_the_gateware_takes(nothing_kept):
     bounds = sweep.bounds_s(PAPER, Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):
@@ -55,6 +56,7 @@ def test_the_bounds_hold_for_what_the_gateware_takes(nothing_kept):
     assert bounds["UART"] > bounds["last byte"] > bounds["pin"]
 
 
+@pytest.mark.slow
 def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
     case = sweep.unlimited(PAPER).but(link={"speed_m_s": 0.4})
     point = sweep.SweepPoint(**sweep.work(SweepTask(case, latency_s=6e-3, thickness=True)))
@@ -81,6 +83,7 @@ def test_charts_of_an_arm_at_rest_are_refused(capsys):
     assert "behavior is 'comply' at 0 m/s" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_arm_needs_no_more_than_the_simulation():
     arm = "contactfpga_sim.lab.arm"
     code = f"import sys, contactfpga.tools.cli, {arm}.pictures; sys.exit('scipy' in sys.modules)"

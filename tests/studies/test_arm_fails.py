@@ -39,6 +39,7 @@ def test_a_contact_halfway_between_four_switches_is_left_to_the_torque_limit():
     assert alone.reason == ""
 
 
+@pytest.mark.slow
 def test_by_the_patchs_pressure_the_switch_closes_at_28_n_which_the_limit_does_not_wait_for():
     """Huber's stress below a Hertz patch of R* = 38 mm, by hand: 3 F / (2 pi (a^2 + z^2)) = 1 N / 12.6 mm^2."""
     wide = PAPER.but(model="hertz", control=UNLIMITED, link={"speed_m_s": 0.3}, run={"duration_s": 0.04})
@@ -112,6 +113,7 @@ def delay_margin_s(case):
     return (math.pi + np.angle(loop(crossover))) / crossover - control.period_s / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("proportional", sample([3.0, 6.0], quick=[6.0]))
 def test_the_speed_loop_oscillates_from_the_latency_on_that_its_phase_margin_says(proportional):
     def swing(delay_periods):
@@ -143,6 +145,7 @@ def test_a_step_that_is_too_long_is_refused_and_would_blow_up():
         assert finite(state)
 
 
+@pytest.mark.slow
 def test_two_contacts_at_once_are_two_zones_and_both_are_left():
     near = {"x_mm": 20.0, "y_mm": 80.0, "lever_m": 0.16}
     two = PAPER.but(touch=({}, near))
@@ -158,6 +161,7 @@ def test_two_contacts_at_once_are_two_zones_and_both_are_left():
     assert outcome.resolved_s < result.events[1][0]
 
 
+@pytest.mark.slow
 def test_the_torque_limit_lets_a_contact_near_the_joint_have_more_force():
     """3 Nm are 15 N at 0.2 m, but 30 N at 0.1 m; the sheet does not care."""
     far, near = ({"x_mm": 85.0, "y_mm": 85.0, "lever_m": lever} for lever in (0.2, 0.1))
@@ -166,6 +170,7 @@ def test_the_torque_limit_lets_a_contact_near_the_joint_have_more_force():
     assert forces[0].reason == forces[1].reason == "torque"
 
 
+@pytest.mark.slow
 def test_a_contact_between_switches_beside_one_on_a_switch_is_not_seen_but_is_left_all_the_same():
     two = PAPER.but(touch=({}, {"x_mm": 25.0, "y_mm": 25.0}))
     outcome = run(two, "uart").outcome

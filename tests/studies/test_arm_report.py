@@ -77,6 +77,7 @@ def test_the_columns_are_what_they_are_called(found):
     assert outcomes[1].zones == 1
 
 
+@pytest.mark.slow
 def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_before):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["study", "arm", "--json"]) == 0
@@ -148,6 +149,7 @@ def test_the_arm_yields_to_a_push_and_returns_and_the_torque_stays_below_the_lim
     assert fastest > 0.2
 
 
+@pytest.mark.slow
 def test_a_slow_push_is_held_by_the_virtual_spring_alone():
     """While it is held: foam force times lever is the spring's torque; the foam takes its part of the way."""
     case = PUSH.but(touch=({"push_m_s": 0.1, "hold_s": 1.0},), run={"duration_s": 0.9})
@@ -183,5 +185,6 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_pages_set_is_what_the_command_gives(found):
     assert section("arm.md", "set") == tables.set_table(tables.ArmRuns(None, {}, found))

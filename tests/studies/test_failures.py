@@ -317,6 +317,7 @@ def test_a_host_may_pause_until_the_systems_buffer_is_full(turn):
     assert between(turn("host", "every frame of `contactfpga.open()`"), line.TTY_BYTES / frame_bytes * scan_ms)
 
 
+@pytest.mark.slow
 def test_lost_is_right_up_to_a_multiple_of_256_before_the_next_hello(turn):
     for outcome in turn("host", "every frame of `contactfpga.open()`").outcomes:
         told = int(outcome.what.partition("says ")[2].split(",")[0])

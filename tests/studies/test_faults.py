@@ -27,12 +27,17 @@ FLAGGED_ANYHOW = {"selected row", "stuck column"}
 NEVER = {"closed switch", "dead switch", "shorted columns", "broken contact"}
 
 
+guarded = pytest.mark.slow
+"""Of tests on the board with guard lines, which no other test compiles."""
+
+
 def one(skin, fault, number=-1):
     """A fault at its last place: a line at the far end."""
     name, hurt = list(compute.places(skin, fault))[number]
     return compute.at(skin, hurt, name)
 
 
+@guarded
 @pytest.mark.parametrize("fault", sorted(GUARDED_TELLS))
 def test_guard_lines_tell_a_dead_line_in_time(fault):
     place = one(GUARDED, fault)
@@ -50,6 +55,7 @@ def test_without_guard_lines_a_dead_line_is_not_told(fault):
     assert place.wrong > 20
 
 
+@guarded
 @pytest.mark.parametrize("fault", sorted(NEVER))
 def test_what_no_line_can_show_is_not_told(fault):
     place = one(GUARDED, fault, 0)
@@ -57,6 +63,7 @@ def test_what_no_line_can_show_is_not_told(fault):
     assert [place.us(by) for by in ("flags", "deadline", "alive")] == [None] * 3
 
 
+@guarded
 def test_a_whole_sheet_is_right_and_tells_nothing():
     place = compute.at(GUARDED, SheetFault())
     assert not place.harmful
@@ -64,6 +71,7 @@ def test_a_whole_sheet_is_right_and_tells_nothing():
     assert place.wrong == 0
 
 
+@guarded
 def test_a_dead_board_stops_frames_and_alive():
     place = one(GUARDED, "dead board")
     assert place.us("deadline") == pytest.approx(trial.DEADLINE_US, abs=trial.STEP_US)
@@ -71,6 +79,7 @@ def test_a_dead_board_stops_frames_and_alive():
     assert one(GUARDED, "broken link").us("alive") is None
 
 
+@guarded
 def test_two_pins_that_fight_are_told_where_the_column_reads_released():
     pressed, released = (one(GUARDED, "shorted rows", number) for number in (0, 1))
     assert pressed.us("flags") is None

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.usefixtures("alone")
 # ---- what is chosen
 
 
+@pytest.mark.slow
 def test_one_contact_needs_single_and_a_second_one_an_exact_labeller(file, shortcuts):
     one = chosen(file(BUMPER), barycenter_mm=8.0)
     two = chosen(file(APART + BUMPER + SECOND), barycenter_mm=8.0)

@@ -95,6 +95,7 @@ def test_a_single_value_tells_nothing_of_the_mean():
     assert words == ["barycenter off by 2.5 mm (0 to inf), limit 5 mm: too few scenes to tell"]
 
 
+@pytest.mark.slow
 def test_a_share_that_so_few_scenes_cannot_show_is_refused():
     for limit in (0.5, 0.05, 0.003):
         need = next(n for n in itertools.count(1) if binomtest(0, n).proportion_ci(method="wilson").high <= limit)

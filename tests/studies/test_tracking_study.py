@@ -116,6 +116,7 @@ def test_the_breaks_are_up_to_date(name):
         assert row in lines
 
 
+@pytest.mark.slow
 def test_breaks_have_their_closed_forms():
     """Gate 20 mm; a speed is believed for 50 ms; a frame shows a place to half a pitch."""
     at_once = breaks.SLIDE.sweep()

@@ -1,9 +1,10 @@
-"""Random frames as a board would send them, and whether the product takes a packet for one."""
+"""Random frames as a board would send them, and what the product reads in bytes: streams, and packets one by one."""
 
 from wire import Wire
 
 from contactfpga.skin.derived import Widths
-from contactfpga.wire import protocol
+from contactfpga.wire import framing, protocol
+from contactfpga.wire.hello import KIND_HELLO
 
 
 def moments(rng, skin, zones):
@@ -47,3 +48,28 @@ def receiver(skin):
         return True
 
     return accepts
+
+
+def decoded(data, skin):
+    """Frames and plain hellos in whole packets; what comes after the last delimiter does not count."""
+    widths, before = Widths(skin.sheet), protocol.check_prefix(skin)
+    frames, hellos = [], []
+    for packet in data[: data.rfind(0) + 1].split(b"\0"):
+        if not packet:
+            continue
+        plain = framing.unseal(packet, before)
+        if framing.kind_of(plain) == KIND_HELLO:
+            hellos.append(plain)
+        else:
+            frames.append(protocol.decode_frame(plain, widths))
+    return frames, hellos
+
+
+def frame_in(packet, skin):
+    assert packet.endswith(b"\0")
+    assert packet.count(b"\0") == 1
+    return protocol.decode_frame(unsealed(packet, skin), Widths(skin.sheet))
+
+
+def unsealed(packet, skin):
+    return protocol.unseal(packet.strip(b"\0"), protocol.check_prefix(skin))

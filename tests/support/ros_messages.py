@@ -1,15 +1,18 @@
-"""Messages of all kinds that we publish, from frames, hellos and tracks."""
+"""Messages of all kinds that we publish, from frames, hellos and tracks; and our types as rosbags knows them, which
+reads and writes them on its own."""
 
 import dataclasses
+import functools
 import random
 
 import numpy as np
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from tracked import SKIN, frame
 
 import contactfpga
 from contactfpga import Skin, Zones
 from contactfpga.driver.conversation import Conversation
-from contactfpga.robot.ros import convert, feed
+from contactfpga.robot.ros import PACKAGE, convert, feed, messages
 from contactfpga.wire.hello import encode_hello
 from contactfpga.wire.protocol import Frame
 
@@ -50,3 +53,33 @@ def samples():
     yield "visualization_msgs/MarkerArray", convert.markers(convert.outline(SKIN.sheet), said[-1].active, HEAD)
     yield "tf2_msgs/TFMessage", convert.transform(HEAD, "skin", (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
     yield "diagnostic_msgs/DiagnosticArray", feed.lost_board("forearm", "unplugged", HEAD)
+
+
+STORES = (Stores.ROS2_JAZZY, Stores.ROS2_KILTED)
+OURS = sorted(f"{PACKAGE}/{path.stem}" for path in messages().glob("*.msg"))
+
+
+def full(name):
+    package, _, short = name.partition("/")
+    return f"{package}/msg/{short}"
+
+
+@functools.cache
+def store(which=Stores.ROS2_KILTED):
+    made = get_typestore(which)
+    for name in OURS:
+        path = messages() / f"{name.partition('/')[2]}.msg"
+        made.register(get_types_from_msg(path.read_text(encoding="utf-8"), full(name)))
+    return made
+
+
+def plain(value):
+    """What rosbags read, as mappings, lists, bytes, numbers and strings."""
+    if hasattr(value, "__msgtype__"):
+        names = [field.name for field in dataclasses.fields(value)]
+        return {name: plain(getattr(value, name)) for name in names if name.islower() and name != "__msgtype__"}
+    if isinstance(value, np.ndarray):
+        return value.tobytes() if value.dtype == np.uint8 else value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    return value

@@ -93,6 +93,7 @@ def test_the_panel_says_how_real_time_is_held(page):
     assert "latency" in str(facts)
 
 
+@pytest.mark.slow  # the example is a large board to compile
 def test_a_sheet_of_several_is_shown():
     """In real time, with its own latency; the mouse does not reach it."""
     file = contactfpga.examples() / "two-sheets.toml"

@@ -133,7 +133,7 @@ def test_a_long_recording_says_how_far_it_is_read(tmp_path, monkeypatch, capsys)
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)
     board = ModelBoard(Skin())
-    data = board.hello() + b"".join(board.frame() for _ in range(3000))
+    data = board.hello() + b"".join(board.frame() for _ in range(500))
     (tmp_path / "long.rec").write_bytes(data)
     for soon_s, lines in ((60.0, 0), (0.0, 2)):
         monkeypatch.setattr(terminal, "SOON_S", soon_s)

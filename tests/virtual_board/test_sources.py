@@ -120,6 +120,7 @@ def test_python_loads_all_gateware_but_that_of_boards(copy, loaded):
     assert there <= set(loaded)
 
 
+@pytest.mark.slow
 def test_each_file_that_python_loads_for_the_gateware_changes_the_key_of_a_board(copy, loaded):
     now, changed = keys(copy, BOARD, loaded)
     assert [str(file) for file, key in changed.items() if key == now] == []

@@ -29,6 +29,7 @@ def wave():
         yield board, units
 
 
+@pytest.mark.slow
 def test_readings_at_a_frames_moment_are_those_of_the_moment(wave):
     """Off by what the wave moves in the 0.2 ms for which the simulation holds a reading."""
     board, units = wave
@@ -43,6 +44,7 @@ def test_readings_at_a_frames_moment_are_those_of_the_moment(wave):
         assert zones.units.saturated == (False, True, False)
 
 
+@pytest.mark.slow
 def test_events_tell_each_sweep_with_its_own_time(wave):
     board, _ = wave
     events = board.events()
@@ -52,6 +54,7 @@ def test_events_tell_each_sweep_with_its_own_time(wave):
     assert all(step % 60 == 0 for step in steps)
 
 
+@pytest.mark.slow
 def test_doctor_names_the_unit_that_reads_only_0(wave):
     board, _ = wave
     found = {finding.sentence: finding.verdict for finding in health.count(board, 0.06, 1.0)}
@@ -59,6 +62,7 @@ def test_doctor_names_the_unit_that_reads_only_0(wave):
     assert found["no threshold is set: the pressure units cannot raise contact"] == "note"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("code", "what"), [(0, "0"), (4095, "full scale (4095)")])
 def test_doctor_names_a_dead_converter(code, what):
     with contactfpga.open(VirtualBoard(SKIN, units=lambda _: [code] * 3), SKIN) as board:
@@ -66,6 +70,7 @@ def test_doctor_names_a_dead_converter(code, what):
     assert f"the converter reads only {what}: look at its supply, its reference and its wires" in sentences
 
 
+@pytest.mark.slow
 def test_commands_set_zeros_and_thresholds():
     with contactfpga.open(VirtualBoard(SKIN, units=lambda _: [2000, 2100, 2200]), SKIN) as board:
         for unit, rest in enumerate((2000, 2100, 2200)):
@@ -104,6 +109,7 @@ def test_a_converter_without_a_model_is_not_taken_for_another():
         VirtualBoard(skin)
 
 
+@pytest.mark.slow
 def test_the_compiled_board_is_the_golden_models_in_every_clock():
     rng = random.Random(5)
     cycles = 60_000

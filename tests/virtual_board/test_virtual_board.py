@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from decoded import decoded
-from slow_skin import SLOW
+from frames import decoded
+from slow_skin import SHEETS, SLOW
 
 import contactfpga
 from contactfpga.errors import ContactFPGAError, MissingTool
@@ -109,10 +109,10 @@ def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
 
 
 def test_several_sheets_share_the_pseudo_terminal():
-    with PtyBoard(Several.load(contactfpga.examples() / "two-sheets.toml"), "full") as board:
+    with PtyBoard(Several(SHEETS), "full") as board:
         with contactfpga.open(f"{board.port}#1", timeout=60) as back:
-            assert (back.sheet.rows, back.sheet.columns) == (12, 24)
-            assert [zone.area_cells for zone in back.read(timeout=60)] == [12 * 24]
+            assert (back.sheet.rows, back.sheet.columns) == (4, 5)
+            assert [zone.area_cells for zone in back.read(timeout=60)] == [4 * 5]
     assert board.failure is None
 
 

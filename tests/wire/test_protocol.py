@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from cobs import cobs
-from decoded import frame_in, unsealed
+from frames import frame_in, unsealed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire import (

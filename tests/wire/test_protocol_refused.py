@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from decoded import frame_in
+from frames import frame_in
 from wire import (
     FINGERPRINT,
     HELLO,

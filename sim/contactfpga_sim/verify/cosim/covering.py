@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -76,14 +76,20 @@ def closed(choices: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
     """A small list of assignments in which every pair of values of two choices occurs; the same for a seed."""
-    names = list(choices)
+    rows = _pairwise(tuple(map(len, choices.values())), seed)
+    return [{name: choices[name][value] for name, value in zip(choices, row, strict=True)} for row in rows]
+
+
+@cache
+def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
+    """The same as indices. Several test files collect the same rows."""
     pick = random.Random(seed)
-    open_pairs = _Open([len(values) for values in choices.values()])
+    open_pairs = _Open(counts)
     rows = []
     while firsts := open_pairs.pairs():
         best = max((_candidate(open_pairs, pick.choice(firsts), pick) for _ in range(20)), key=open_pairs.closed_by)
         open_pairs.close(best)
-        rows.append({name: choices[name][value] for name, value in zip(names, best.values(), strict=True)})
+        rows.append(tuple(best.values()))
     return rows
 
 
