@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from concurrent.futures import Executor
 
 from contactfpga_sim.lab.chart.compute import Point, Task
 from contactfpga_sim.lab.chart.errors import Interval, Quantile
@@ -26,6 +27,12 @@ def least_mm(task: Task) -> Interval | None:
     not known."""
     # HOOK: floor(task.family, task.skin, task.cover, task.count, task.seed).barycenter_mm of chart.floor goes here.
     return None
+
+
+def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
+    """The same points, with the least error that any method can have from their cells."""
+    least = executor.map(least_mm, [point.task for point in points])
+    return [dataclasses.replace(point, least_mm=value) for point, value in zip(points, least, strict=True)]
 
 
 def rivals(families: Sequence[str], count: int, seed: int) -> list[Rival]:

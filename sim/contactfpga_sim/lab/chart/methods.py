@@ -69,7 +69,7 @@ def _methods() -> dict[str, Method]:
 
 def _settings() -> dict[str, Method]:
     """Other ways to find zones, to scan and to send, under tiles at :data:`PITCH_MM`."""
-    debounced = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
+    debounced: dict[str, Any] = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
     ways: list[tuple[str, str, dict[str, Any]]] = [
         ("run", "8-connected", {"connectivity": 8}),
         *((one.title, "", {"labeller": one}) for one in LABELLERS.values() if one.name != "run"),
@@ -90,7 +90,7 @@ def _reversal() -> dict[str, Method]:
         "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
         "clock_hz": 24_000_000, "baud": 12_000_000,
     }  # fmt: skip
-    longer = {"settle_us": 0.8, "project_us": 2.5}
+    longer: dict[str, Any] = {"settle_us": 0.8, "project_us": 2.5}
     return (
         under("tiles", "reversal", PITCH_MM, **fast, **longer)
         | under("tiles", "reversal", 10.0, **fast, settle_us=0.5)
