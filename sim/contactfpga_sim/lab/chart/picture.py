@@ -208,7 +208,12 @@ def legend(points: Sequence[Point], rivals: Sequence[Rival]) -> tuple[list[Line2
     mark: dict[str, Any] = {"linestyle": "", "markersize": 6}
     used = {cover_of(point.task.method) for point in points} | ({"model"} if rivals else set())
     pitches = {point.task.skin.pitch_x_mm for point in points}
-    lines = {name: Line2D([], [], color=color, marker="o", **mark) for name, color in COLORS.items() if name in used}
+    words = {"bare": "bare: touch at once"}
+    lines = {
+        words.get(name, name): Line2D([], [], color=color, marker="o", **mark)
+        for name, color in COLORS.items()
+        if name in used
+    }
     for pitch, shape in markers(points).items():
         if pitch in pitches:
             lines[f"pitch {pitch:g} mm"] = Line2D([], [], color=style.SOFT, marker=shape, **mark)

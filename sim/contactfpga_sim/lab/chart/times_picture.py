@@ -26,6 +26,9 @@ PARTS = {
 """What each line shows, by color."""
 
 
+TITLE = f"{FAMILY}, to the last byte of the first frame with a contact: median, and a line to the 95 % quantile"
+
+
 def save(points: Sequence[Point], path: Path) -> Path:
     """Draw the points of one family; the same ones give the same file."""
     with matplotlib.rc_context(style.SETTINGS):
@@ -50,13 +53,9 @@ def picture(points: Sequence[Point]) -> Figure:
     panel.set_xticks(list(ticks), ticks.values())
     panel.xaxis.set_minor_locator(NullLocator())
     panel.set_xlim(9, 1.3 * NEVER_US)
-    figure.supxlabel(
-        f"{FAMILY}: to the last byte of the first frame with a contact; median, and a line to the 95 % quantile",
-        fontsize=style.NORMAL,
-    )
     panel.grid(axis="x")
     lines = [Line2D([], [], color=color, marker="o", markersize=5) for color in PARTS.values()]
-    figure.legend(lines, list(PARTS), loc="outside lower center", ncols=3)
+    figure.legend(lines, list(PARTS), loc="outside lower center", ncols=3, title=TITLE, title_fontsize=style.SMALL)
     return figure
 
 
