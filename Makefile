@@ -76,7 +76,8 @@ bitstream-replay: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## simulat
 constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/boards.md from the pin tables
 	$(PY) -m contactfpga_hdl.board.constraints
 
-# One study, or all of them.
+# One study, or all of them. Each runs in a process per core, in which BLAS must not start threads of its own.
+pages: export OPENBLAS_NUM_THREADS := 1
 pages: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## make tables and pictures of the pages anew: [NAME=arm QUICK=1 STALE=1] ARGS=--list
 	$(PY) -m contactfpga_sim.lab $(if $(value NAME),$(call quoted,NAME),--all) $(if $(QUICK),--quick) $(if $(STALE),--stale) $(ARGS)
 

@@ -49,9 +49,11 @@ _ALL = (
         "chart",
         title="Speed against accuracy",
         page="chart.md",
-        minutes=30,
+        minutes=25,
         sections={
             "front": Section("tables:front_table"),
+            "families": Section("tables:families_table"),
+            "methods": Section("tables:methods_table"),
             "host": Section("tables:host_table"),
         },
         compute="tables:compute",

@@ -16,17 +16,20 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import kept, size
-from contactfpga_sim.lab.chart import errors, speed
+from contactfpga_sim.lab.chart import errors, times
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
-from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.model.scenes.families import placements
+from contactfpga_sim.lab.chart.times import Raw, Times
+from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 """Those of the chart unless others are asked for."""
 
-PIECE = 125
+PIECE = 100
 """Placements that are worked out together."""
+
+TIMED = 200
+"""So many of the placements are also timed, each as one touch."""
 
 DEVICE = sizes.UP5K
 """For which LUT4 and clock are given."""
@@ -38,13 +41,14 @@ class Task:
 
     method: str
     skin: Skin
+    cover: Cover | None
+    """None: a bare sheet."""
     family: str
     count: int
+    """Placements."""
     seed: int
-    timed: int = 48
-    """Touches whose time is worked out."""
     checked: int = 2
-    """This many of them go through the gateware, too."""
+    """This many of the touches go through the gateware, too."""
 
 
 KINDS = ("total", "labeller", "sensing")
@@ -65,11 +69,13 @@ class Point:
     task: Task
     errors: dict[str, dict[str, Interval]]
     """By kind and metric."""
-    speed: Speed
+    times: Times
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
     """What the host takes to label the cells, where it does; of the machine at hand, so of two runs never the same."""
+    least_mm: Interval | None = None
+    """The least mean error of the barycenter that any method can have from these cells, where it was worked out."""
 
 
 def study(
@@ -86,20 +92,20 @@ def study(
     any other with the same interface, a Dask cluster's for instance.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
-    parts: dict[Task, tuple[list[Future[Found]], Future[dict[str, float]]]] = {
+    parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {
         task: (
             [executor.submit(accuracy, task, first) for first in range(0, task.count, PIECE)],
-            executor.submit(timing, task),
+            [executor.submit(timing, task, first) for first in range(0, min(TIMED, task.count), PIECE)],
         )
         for task in dict.fromkeys(tasks)
     }
     places = {skin: executor.submit(_size, skin) for skin in skins}
     names: dict[Future[Any], str] = {
         **dict.fromkeys((piece for pieces, _ in parts.values() for piece in pieces), "placements"),
-        **dict.fromkeys((time for _, time in parts.values()), "times"),
+        **dict.fromkeys((piece for _, timed in parts.values() for piece in timed), "times"),
         **dict.fromkeys(places.values(), "place and route"),
     }
-    owners = {future: task for task, (pieces, time) in parts.items() for future in (*pieces, time)}
+    owners = {future: task for task, (pieces, timed) in parts.items() for future in (*pieces, *timed)}
     found = {} if so_far is None else so_far
     of = Counter(names.values())
     for future in as_completed(names):
@@ -108,10 +114,11 @@ def study(
         task = owners.get(future)
         if task is None:
             continue
-        pieces, time = parts[task]
-        if time.done() and all(piece.done() for piece in pieces):
+        pieces, timed = parts[task]
+        if all(piece.done() for piece in pieces) and all(piece.done() for piece in timed):
             measured = intervals([piece.result() for piece in pieces])
-            found[task] = Point(task, measured, Speed(**time.result()), None, None)
+            passed = times.summed([piece.result() for piece in timed], task.skin)
+            found[task] = Point(task, measured, passed, None, None)
     return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
 
 
@@ -128,14 +135,26 @@ def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
 
 
 def accuracy(task: Task, first: int) -> Found:
-    """Errors of one piece of a task's placements, by kind and metric."""
+    """Errors of one piece of a task's placements once all forces have risen, by kind and metric."""
 
     def new() -> Found:
-        last = min(first + PIECE, task.count)
-        scenes = placements(task.family, last - first, task.seed, task.skin, first=first)
-        return compared((look(scene, 0.0, task.skin) for scene in scenes), task.skin)
+        scenes = _touches(task, first)
+        return compared((look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
+
+
+def timing(task: Task, first: int) -> Raw:
+    """Times of one piece of a task's touches."""
+
+    def new() -> Raw:
+        return times.measured(_touches(task, first), task.skin, task.cover, first, task.checked)
+
+    return kept.kept("timing", _key(task, "timing", first), new)
+
+
+def _touches(task: Task, first: int) -> list[Scene]:
+    return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, first=first)
 
 
 def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
@@ -160,25 +179,13 @@ def _scene_errors(
     return errors.errors(found, there), errors.errors(found, exact), errors.errors(exact, there)
 
 
-def timing(task: Task) -> dict[str, float]:
-    """The fields of a task's :class:`Speed`."""
-
-    def new() -> dict[str, float]:
-        scenes = placements(task.family, task.timed, task.seed + 1, task.skin)
-        frames = [cells for cells in (scene.pressed(0.0, task.skin) for scene in scenes) if cells.any()]
-        if not frames:
-            return dict.fromkeys((field.name for field in dataclasses.fields(Speed)), math.nan)
-        return dataclasses.asdict(speed.measure(task.skin, frames, task.checked))
-
-    return kept.kept("timing", _key(task, "timing", task.timed), new)
-
-
 def _size(skin: Skin) -> sizes.Size:
     return size.measure(lambda: Top(skin), DEVICE, seeds=1)
 
 
 def _key(task: Task, kind: str, number: int) -> str:
-    return f"{kept.made_by(__name__, task.skin)} {kind} {number} {task.count} {task.seed} {task.checked} {task.family}"
+    parts = (kind, number, task.count, task.seed, task.checked, task.family, task.cover)
+    return f"{kept.made_by(__name__, task.skin)} {' '.join(map(str, parts))}"
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:
@@ -192,3 +199,23 @@ def front(points: Iterable[tuple[float, float]]) -> list[int]:
             best = error
             found.append(index)
     return found
+
+
+def reached_us(point: Point) -> float:
+    """Median from the first touch of the foam to the zones at the host, labelled there if need be."""
+    return point.times.touch_median_us.value + point.host_us
+
+
+def covered(task: Task) -> bool:
+    """Whether there is a cover, so that forces count: all but the bare sheet."""
+    return not times.at_once(task.cover)
+
+
+def to_build(points: Sequence[Point]) -> str:
+    """The method under a cover that miscounts the least share of scenes, in the mean over the families; of several
+    alike the first one."""
+    shares: dict[str, list[float]] = {}
+    for point in points:
+        if covered(point.task):
+            shares.setdefault(point.task.method, []).append(point.errors["total"]["miscounted"].mean)
+    return min(shares, key=lambda method: float(np.mean(shares[method])), default="")

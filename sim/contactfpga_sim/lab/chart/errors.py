@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.stats import binom
 
 from contactfpga.skin import Skin
 from contactfpga_sim.model.golden import label, zones
@@ -120,3 +121,27 @@ def interval(values: Sequence[float]) -> Interval:
         return Interval(mean, max(0.0, center - half), min(1.0, center + half), n)
     half = Z95 * float(known.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
     return Interval(mean, mean - half, mean + half, n)
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantile:
+    """A quantile with the 95 % interval in which that of all values lies that could have been drawn."""
+
+    value: float
+    low: float
+    high: float
+    """Infinite where there are too few values to say."""
+    count: int
+
+
+def quantile(values: Sequence[float], share: float) -> Quantile:
+    """The least value that at least this share of the values does not exceed; infinite values are values, too. The
+    interval is by ranks (binomial), so it holds whatever the distribution."""
+    ordered = sorted(values)
+    n = len(ordered)
+    if not n:
+        return Quantile(math.nan, math.nan, math.nan, 0)
+    lower, upper = (int(binom.ppf(end, n, share)) for end in (0.025, 0.975))
+    low = ordered[lower - 1] if lower else 0.0  # times are not negative
+    high = ordered[upper] if upper < n else math.inf
+    return Quantile(ordered[max(1, math.ceil(share * n - 1e-9)) - 1], low, high, n)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from contactfpga_sim.lab.chart.compute import Point
-from contactfpga_sim.model.scenes.families import placements
+from contactfpga_sim.model.scenes.families import touches
 
 FRAMES, REPEATS = 20, 50
 
@@ -43,6 +43,6 @@ def timed(point: Point) -> Point:
     task = point.task
     if task.skin.report != "cells":
         return point
-    scenes = placements(task.family, FRAMES, task.seed + 2, task.skin)
-    frames = [scene.pressed(0.0, task.skin) for scene in scenes]
+    scenes = touches(task.family, FRAMES, task.seed, task.skin)
+    frames = [scene.pressed(scene.settled_s, task.skin, task.cover) for scene in scenes]
     return dataclasses.replace(point, host_us=label_us(frames, task.skin.connectivity))

@@ -2,54 +2,101 @@
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
+from typing import Any, NamedTuple
 
 from contactfpga.choices.labellers import LABELLERS, Labeller
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
+from contactfpga_sim.lab.covers import COVERS, DOME, tiled
 
 EXTENT_MM = 160.0
 """Width and height of every sheet."""
 
-PITCHES_MM = (5.0, 10.0, 20.0)
+PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
+"""The one under which methods are compared comes first."""
+
+PITCH_MM = PITCHES_MM[0]
+
+THRESHOLDS_N = (0.2, 0.6, 1.0)
+"""Forces that close a switch, beside the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
+
+MOST_ZONES = 32
+"""In a frame of every method, enough for any scene here: for all that 4-connected cells could make, `run` and the
+divider would need longer row times on the finest sheets."""
+
+
+class Method(NamedTuple):
+    """A Skin and what lies over its switches."""
+
+    skin: Skin
+    cover: Cover | None
+    """None: a bare sheet, where a switch closes when its middle lies under a contact, whatever the force."""
 
 
 def sheet(pitch_mm: float, **settings: Any) -> Skin:
-    """A square sheet of :data:`EXTENT_MM` with switches ``pitch_mm`` apart."""
+    """A square sheet of :data:`EXTENT_MM` with switches ``pitch_mm`` apart, 4-connected unless ``settings`` say
+    otherwise."""
     lines = round(EXTENT_MM / pitch_mm)
-    return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **settings)
+    given: dict[str, Any] = {"connectivity": 4, "zone_capacity": MOST_ZONES} | settings
+    return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **given)
 
 
-def by(labeller: Labeller) -> dict[str, Skin]:
-    """A labeller at every pitch."""
-    return {f"{labeller.title}, {pitch:g} mm": sheet(pitch, labeller=labeller) for pitch in PITCHES_MM}
+def under(cover: str, name: str, pitch_mm: float, more: str = "", **settings: Any) -> dict[str, Method]:
+    """One method by its name: ``name`` at a pitch under a cover, one of :data:`contactfpga_sim.lab.covers.COVERS`."""
+    whole = f"{name}, {pitch_mm:g} mm, {cover}" + (f", {more}" if more else "")
+    return {whole: Method(sheet(pitch_mm, **settings), COVERS[cover](pitch_mm))}
 
 
-def _methods() -> dict[str, Skin]:
+def by(labeller: Labeller) -> dict[str, Method]:
+    """A labeller under tiles at every pitch."""
+    found: dict[str, Method] = {}
+    for pitch in PITCHES_MM:
+        found |= under("tiles", labeller.title, pitch, labeller=labeller)
+    return found
+
+
+def _methods() -> dict[str, Method]:
+    methods = by(LABELLERS["run"])
+    for pitch in (PITCH_MM, 10.0):
+        for cover in ("caps", "paper", "bare"):
+            methods |= under(cover, "run", pitch)
+    for force in THRESHOLDS_N:
+        switch = dataclasses.replace(DOME, force_n=force)
+        methods[f"run, {PITCH_MM:g} mm, tiles, {force:g} N"] = Method(sheet(PITCH_MM), tiled(PITCH_MM, switch))
+    return methods | _settings() | _reversal()
+
+
+def _settings() -> dict[str, Method]:
+    """Other ways to find zones, to scan and to send, under tiles at :data:`PITCH_MM`."""
+    debounced: dict[str, Any] = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
+    ways: list[tuple[str, str, dict[str, Any]]] = [
+        ("run", "8-connected", {"connectivity": 8}),
+        *((one.title, "", {"labeller": one}) for one in LABELLERS.values() if one.name != "run"),
+        ("cells", "", {"report": "cells"}),
+        ("barycenter", "", {"report": "barycenter", "barycenter_bits": 4}),
+        ("run", "1 Mbaud", {"baud": 1_000_000}),
+        ("run", "debounced 0.5 ms", debounced),
+    ]
+    found: dict[str, Method] = {}
+    for name, more, settings in ways:
+        found |= under("tiles", name, PITCH_MM, more, **settings)
+    return found | under("tiles", "adaptive", 10.0, scan="adaptive")  # 25 lines would need a longer row time
+
+
+def _reversal() -> dict[str, Method]:
+    """Line reversal, at 24 MHz and 12 Mbaud."""
     fast: dict[str, Any] = {
         "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
         "clock_hz": 24_000_000, "baud": 12_000_000,
     }  # fmt: skip
-    methods = {
-        "reversal, 10 mm": sheet(10.0, settle_us=0.5, **fast),
-        "reversal, 5 mm": sheet(5.0, settle_us=0.8, project_us=2.5, **fast),
-    }
-    for pitch in PITCHES_MM:
-        for labeller in LABELLERS.values():
-            methods[f"{labeller.title}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
-        methods[f"cells, {pitch:g} mm"] = sheet(pitch, report="cells")
-    for pitch, bits in ((5.0, 4), (10.0, 4), (10.0, 1)):
-        name = f"barycenter, {pitch:g} mm" + (f", {bits} bit" if bits == 1 else "")
-        methods[name] = sheet(pitch, report="barycenter", barycenter_bits=bits)
-    for pitch in (10.0, 20.0):
-        methods[f"adaptive, {pitch:g} mm"] = sheet(pitch, scan="adaptive")
-    methods["adaptive, 5 mm, 24 MHz"] = sheet(5.0, scan="adaptive", clock_hz=24_000_000)
-    methods["run, 10 mm, 4-connected"] = sheet(10.0, connectivity=4)
-    methods["run, 10 mm, 1 Mbaud"] = sheet(10.0, baud=1_000_000)
-    methods["run, 10 mm, debounced 0.5 ms"] = sheet(
-        10.0, debounce="sym_defer_pk", debounce_press_us=500.0, debounce_release_us=500.0
+    longer: dict[str, Any] = {"settle_us": 0.8, "project_us": 2.5}
+    return (
+        under("tiles", "reversal", PITCH_MM, **fast, **longer)
+        | under("tiles", "reversal", 10.0, **fast, settle_us=0.5)
+        | under("tiles", "reversal", 5.0, **fast, **longer)
     )
-    return methods
 
 
-METHODS: dict[str, Skin] = _methods()
-"""By name; each one has gateware, and its time comes from the golden model of that gateware."""
+METHODS: dict[str, Method] = _methods()
+"""By name, the plainest first; each one has gateware, and its time comes from the golden model of that gateware."""

@@ -8,15 +8,23 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from contactfpga.inputs.files import replaced
-from contactfpga.skin import Skin
 from contactfpga_sim.lab.chart.compute import KINDS, Point, Task
-from contactfpga_sim.lab.chart.errors import METRICS, Interval
-from contactfpga_sim.lab.chart.methods import METHODS
-from contactfpga_sim.lab.chart.speed import Speed
+from contactfpga_sim.lab.chart.errors import METRICS, Interval, Quantile
+from contactfpga_sim.lab.chart.methods import METHODS, Method
+from contactfpga_sim.lab.chart.times import Times
 
-TIMES = tuple(field.name for field in dataclasses.fields(Speed))
+QUANTILES = ("touch_median_us", "touch_q95_us", "electric_median_us", "electric_q95_us")
 ENDS = ("", "_low", "_high", "_count")
-"""After a metric's name, the fields of its interval."""
+"""After a name, the fields of its interval."""
+ERRORS = tuple(f"{kind}_{name}" for kind in KINDS for name in METRICS)
+SINGLE = ("bytes", "lower_bound_us", "host_us", "luts", "fmax_mhz")
+FIELDS = (
+    *("family", "method", "placements", "seed"),
+    *(name + end for name in (*QUANTILES, "not_felt") for end in ENDS),
+    *SINGLE,
+    *(name + end for name in (*ERRORS, "least_barycenter_mm") for end in ENDS),
+    "command",
+)
 
 
 def command(point: Point) -> str:
@@ -29,40 +37,62 @@ def command(point: Point) -> str:
 
 
 def write(points: Iterable[Point], path: Path) -> None:
-    """Errors with their 95 % intervals, times in us, LUT4 and clock on the UP5K."""
+    """Times in us and errors, each with its 95 % interval, LUT4 and clock on the UP5K."""
     with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        errors = [f"{kind}_{name}{end}" for kind in KINDS for name in METRICS for end in ENDS]
-        head = ("family", "method", "placements", "seed", *TIMES, "host_us", "luts", "fmax_mhz")
-        table.writerow([*head, *errors, "command"])
+        table = csv.DictWriter(file, FIELDS, lineterminator="\n")
+        table.writeheader()
         for point in points:
-            task = point.task
-            times = [f"{value:.1f}" for value in (*dataclasses.astuple(point.speed), point.host_us)]
-            size = ["" if value is None else f"{value:g}" for value in (point.luts, point.fmax_mhz)]
-            found = [
-                f"{value:.6g}"
-                for kind in KINDS
-                for name in METRICS
-                for value in dataclasses.astuple(point.errors[kind][name])
-            ]
-            table.writerow([task.family, task.method, task.count, task.seed, *times, *size, *found, command(point)])
+            table.writerow(_line(point))
 
 
-def read(path: Path, methods: Mapping[str, Skin] = METHODS) -> list[Point]:
-    """What :func:`write` wrote, rounded as it was written; ``methods``: the Skin of each method by its name."""
+def _line(point: Point) -> dict[str, object]:
+    task, times = point.task, point.times
+    line: dict[str, object] = {
+        "family": task.family,
+        "method": task.method,
+        "placements": task.count,
+        "seed": task.seed,
+        "command": command(point),
+        "bytes": f"{times.bytes:.1f}",
+        "lower_bound_us": f"{times.lower_bound_us:.1f}",
+        "host_us": f"{point.host_us:.1f}",
+    }
+    line |= {name: "" if (value := getattr(point, name)) is None else f"{value:g}" for name in SINGLE[3:]}
+    for name in QUANTILES:
+        line |= _fields(name, getattr(times, name), ".1f")
+    for kind in KINDS:
+        for name in METRICS:
+            line |= _fields(f"{kind}_{name}", point.errors[kind][name], ".6g")
+    line |= _fields("not_felt", times.not_felt, ".6g")
+    return line | (_fields("least_barycenter_mm", point.least_mm, ".6g") if point.least_mm else {})
+
+
+def _fields(name: str, found: Interval | Quantile, form: str) -> dict[str, object]:
+    *values, count = dataclasses.astuple(found)
+    return dict(zip((name + end for end in ENDS), (*(format(value, form) for value in values), count), strict=True))
+
+
+def read(path: Path, methods: Mapping[str, Method] = METHODS) -> list[Point]:
+    """What :func:`write` wrote, rounded as it was written; ``methods``: what each one is, by its name."""
     with open(path, newline="", encoding="utf-8") as file:
         return [_point(line, methods) for line in csv.DictReader(file)]
 
 
-def _point(line: dict[str, str], methods: Mapping[str, Skin]) -> Point:
+def _point(line: dict[str, str], methods: Mapping[str, Method]) -> Point:
     method = line["method"]
-    task = Task(method, methods[method], line["family"], int(line["placements"]), int(line["seed"]))
-    errors = {kind: {name: _interval(line, f"{kind}_{name}") for name in METRICS} for kind in KINDS}
+    task = Task(method, *methods[method], line["family"], int(line["placements"]), int(line["seed"]))
+    errors = {kind: {name: Interval(*_values(line, f"{kind}_{name}")) for name in METRICS} for kind in KINDS}
+    times = Times(
+        **{name: Quantile(*_values(line, name)) for name in QUANTILES},
+        not_felt=Interval(*_values(line, "not_felt")),
+        bytes=float(line["bytes"]),
+        lower_bound_us=float(line["lower_bound_us"]),
+    )
     luts, fmax = (float(line[name]) if line[name] else None for name in ("luts", "fmax_mhz"))
-    speed = Speed(*(float(line[name]) for name in TIMES))
-    return Point(task, errors, speed, None if luts is None else int(luts), fmax, float(line["host_us"]))
+    least = Interval(*_values(line, "least_barycenter_mm")) if line["least_barycenter_mm"] else None
+    return Point(task, errors, times, None if luts is None else int(luts), fmax, float(line["host_us"]), least)
 
 
-def _interval(line: dict[str, str], name: str) -> Interval:
-    mean, low, high, count = (float(line[name + end]) for end in ENDS)
-    return Interval(mean, low, high, int(count))
+def _values(line: dict[str, str], name: str) -> tuple[float, float, float, int]:
+    value, low, high, count = (float(line[name + end]) for end in ENDS)
+    return value, low, high, int(count)

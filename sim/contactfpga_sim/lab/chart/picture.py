@@ -14,16 +14,32 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga.choices import labellers, scans
-from contactfpga.skin import Skin
-from contactfpga_sim.lab.chart.compute import Point, front
+from contactfpga_sim.lab.chart.beside import Rival, bits_us
+from contactfpga_sim.lab.chart.compute import Point, covered, front, reached_us, to_build
+from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
+from contactfpga_sim.lab.covers import COVERS
 
-MARKERS = "so^Dvp"
+MARKERS = "sv^oDp"
 """By pitch, the finest first."""
+
+COLORS = {
+    "tiles": style.BLUE,
+    "caps": style.ORANGE,
+    "paper": style.VERMILLION,
+    "bare": style.GRAY,
+    "other covers": style.PURPLE,
+    "model": style.GREEN,
+}
+"""By cover; and for what is no method of ours."""
+
+MISSED = 0.05
+"""From this share of contacts on, a mark is hollow: its error of the barycenter is that of the contacts found."""
 
 LINEAR = 0.01
 """Shares below are drawn on a linear scale, so that 0 has its place; those above in powers of ten."""
+
+SMALL: dict[str, Any] = {"fontsize": style.SMALL}
 
 
 class Metric(NamedTuple):
@@ -39,12 +55,23 @@ class Metric(NamedTuple):
 
 
 LENGTHS_MM = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200)
-TIMES_US = (20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000)
-"""Ticks, as far as an axis reaches."""
+TIMES_US = {
+    50: "50 µs",
+    200: "200 µs",
+    1000: "1 ms",
+    5000: "5 ms",
+    20_000: "20 ms",
+    100_000: "100 ms",
+}
+"""Ticks."""
 
-ENDS_US = (85, 1200)
+NEVER_US = 500_000.0
+"""Where what is not felt at all in the median is drawn."""
+
+ENDS_US = (40.0, 800_000.0)
+ALONG = "first touch of the foam to last byte, median"
+
 METRICS = (
-    Metric("barycenter_mm", "barycenter error, mm", {"value": "log"}, LENGTHS_MM, (0.3, 40), "{:g}".format),
     Metric(
         "miscounted",
         "scenes miscounted",
@@ -53,45 +80,63 @@ METRICS = (
         (-0.002, 1.6),
         lambda share: f"{100 * share:g} %",
     ),
+    Metric("barycenter_mm", "barycenter of found, mm", {"value": "log"}, LENGTHS_MM, (0.4, 40), "{:g}".format),
 )
 
 
-def save(points: Sequence[Point], folder: Path) -> None:
+def save(points: Sequence[Point], folder: Path, rivals: Sequence[Rival] = ()) -> None:
     """``chart.png`` and ``chart.svg`` in a folder; the same points give the same files."""
     with matplotlib.rc_context(style.SETTINGS):
-        figure = picture(points)
+        figure = picture(points, rivals)
         for suffix in ("png", "svg"):
             style.save(figure, folder / f"chart.{suffix}")
 
 
-def picture(points: Sequence[Point]) -> Figure:
-    """All points, with the fronts of each panel."""
+def picture(points: Sequence[Point], rivals: Sequence[Rival] = ()) -> Figure:
+    """All points, a row of panels for each family."""
     families = list(dict.fromkeys(point.task.family for point in points))
-    figure = style.new(1.85 * len(families) + 1.2)
+    figure = style.new(2.2 * len(families) + 1.3)
     panels = figure.subplots(len(families), len(METRICS), sharex=True, sharey="col", squeeze=False)
     for row, family in zip(panels, families, strict=True):
-        some = [point for point in points if point.task.family == family]
         for panel, metric in zip(row, METRICS, strict=True):
-            _axes(panel, points, metric)
-            _panel(panel, some, metric)
-            panel.set_ylabel(metric.label)
+            draw(panel, metric, family, points, rivals)
             panel.set_title(family, loc="left", fontweight="bold")
-    for panel in panels[-1]:
-        panel.set_xlabel("from touch to host, µs (median)")
-    others = dict.fromkeys(filter(None, map(setting, points)))
-    title = f"hollow: another setting ({', '.join(others)})" if others else None
-    figure.legend(*_legend(points), loc="outside lower center", ncols=4, title=title, title_fontsize=style.SMALL)
+    figure.legend(*legend(points, rivals), loc="outside lower center", ncols=4)
     return figure
 
 
-def reached_us(point: Point) -> float:
-    """Median from the touch to the zones at the host, labelled there if need be."""
-    return point.speed.median_us + point.host_us
+def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[Rival]) -> None:
+    """One error of one family, on axes that hold all points."""
+    _axes(panel, points, metric)
+    panel.set_xlabel(ALONG)
+    some = [point for point in points if point.task.family == family]
+    _walls(panel, metric, some, to_build(points))
+    places = [(_along(reached_us(point)), error(point, metric.name)) for point in some]
+    real = [place for point, place in zip(some, places, strict=True) if covered(point.task)]
+    best = front(real)
+    panel.step(*np.array([real[index] for index in best]).reshape(-1, 2).T, where="post", color=style.INK, lw=0.8)
+    for point, place in zip(some, places, strict=True):
+        _mark(panel, point, place, markers(points), metric)
+    for rival in rivals:
+        if rival.family == family:
+            found = rival.errors[metric.name]
+            panel.plot(_along(rival.touch_us.value), found.mean, "X", color=COLORS["model"], markersize=7, zorder=5)
+            panel.text(_along(rival.touch_us.value) * 1.1, found.mean, f"{rival.name}, model", va="center", **SMALL)
 
 
 def error(point: Point, name: str) -> float:
     """Mean of the method's zones against the contacts."""
     return point.errors["total"][name].mean
+
+
+def cover_of(method: str) -> str:
+    """The key of :data:`COLORS` for a method's name."""
+    return next((name for name in COVERS if name in method.split(", ")), "other covers")
+
+
+def hollow(point: Point) -> bool:
+    """Whether many contacts are missed."""
+    return error(point, "missed") > MISSED
 
 
 def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
@@ -101,80 +146,82 @@ def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, fl
     return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)
 
 
-def kind(skin: Skin) -> str:
-    """What a color stands for: the report that is no zone, else the scan that is no raster, else the labeller."""
-    if skin.report != "moments":
-        return skin.report
-    chosen = labellers.find(skin.labeller) if skin.scan == "raster" else scans.find(skin.scan)
-    return chosen.title
-
-
-def setting(point: Point) -> str:
-    """What sets a method apart from the one of the same kind and pitch, such as `24 MHz`."""
-    return point.task.method.partition(" mm, ")[2]
-
-
-def colors(points: Sequence[Point]) -> dict[str, str]:
-    """By kind: those of the built-in methods in their order, then whatever else there is."""
-    kinds = dict.fromkeys(map(kind, (*METHODS.values(), *(point.task.skin for point in points))))
-    return {name: style.PALETTE[index % len(style.PALETTE)] for index, name in enumerate(kinds)}
-
-
 def markers(points: Sequence[Point]) -> dict[float, str]:
     """By pitch in mm."""
-    pitches = {skin.pitch_x_mm for skin in (*METHODS.values(), *(point.task.skin for point in points))}
+    pitches = {skin.pitch_x_mm for skin, _ in METHODS.values()} | {point.task.skin.pitch_x_mm for point in points}
     return {pitch: MARKERS[index % len(MARKERS)] for index, pitch in enumerate(sorted(pitches))}
+
+
+def _along(us: float) -> float:
+    return NEVER_US if math.isinf(us) else us
 
 
 def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
     """Alike for all families."""
+    never = any(math.isinf(reached_us(point)) for point in points)
+    ticks = TIMES_US | ({NEVER_US: "never"} if never else {})
     panel.set_xscale("log")
     panel.set_yscale(**metric.scale)
-    panel.set_xticks(TIMES_US, map(str, TIMES_US))
+    panel.set_xticks(list(ticks), ticks.values())
     panel.set_yticks(metric.ticks)
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: metric.show(value)))
     panel.xaxis.set_minor_locator(NullLocator())
     panel.yaxis.set_minor_locator(NullLocator())
-    panel.set_xlim(*ends(map(reached_us, points), ENDS_US))
+    panel.set_xlim(*ends(map(reached_us, points), (ENDS_US[0], ENDS_US[1] if never else NEVER_US / 2)))
     panel.set_ylim(*ends((error(point, metric.name) for point in points), metric.ends))
     panel.tick_params(labelbottom=True)
+    panel.set_ylabel(metric.label)
     panel.grid()
     if metric.ticks[0] == 0:
         panel.axhline(0, color=style.SOFT, linewidth=0.8)
 
 
-def _panel(panel: Any, points: Sequence[Point], metric: Metric) -> None:
-    places = [(reached_us(point), error(point, metric.name)) for point in points]
-    best = front(places)
-    panel.step(*np.array([places[index] for index in best]).reshape(-1, 2).T, where="post", color=style.INK, lw=0.8)
-    _marks(panel, points, places)
+def _walls(panel: Any, metric: Metric, some: Sequence[Point], method: str) -> None:
+    """The time that the bits need; and the least error that any method can have from the best cells."""
+    wall: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.4, "linestyle": style.DASHES[1], "zorder": 2}
+    if math.isfinite(least := bits_us(some)):
+        panel.axvline(least, **wall)
+    floor = next((point.least_mm for point in some if point.task.method == method), None)
+    if isinstance(floor, Interval) and metric.name == "barycenter_mm":
+        panel.axhline(floor.mean, **wall)
 
 
-def _marks(panel: Any, points: Sequence[Point], places: Sequence[tuple[float, float]]) -> None:
-    """Methods that come out alike lie on one another: each kind is smaller than the one below it."""
-    color, marker = colors(points), markers(points)
-    sizes = {name: 8.5 - 5.0 * index / len(color) for index, name in enumerate(color)}
-    for point, place in zip(points, places, strict=True):
-        name = kind(point.task.skin)
-        panel.plot(
-            *place,
-            marker[point.task.skin.pitch_x_mm],
-            markersize=sizes[name],
-            markerfacecolor=style.CARD if setting(point) else color[name],
-            markeredgecolor=color[name] if setting(point) else style.CARD,
-            markeredgewidth=1.4 if setting(point) else 0.5,
-            zorder=3 + list(color).index(name) / len(color),
-            clip_on=False,
-        )
+def _mark(panel: Any, point: Point, place: tuple[float, float], shapes: dict[float, str], metric: Metric) -> None:
+    found = point.errors["total"][metric.name]
+    color = COLORS[cover_of(point.task.method)]
+    if math.isfinite(found.low) and math.isfinite(found.high):
+        panel.plot([place[0]] * 2, [found.low, found.high], color=color, linewidth=0.8, alpha=0.5, zorder=2.5)
+    panel.plot(
+        *place,
+        shapes[point.task.skin.pitch_x_mm],
+        markersize=5.5,
+        markerfacecolor=style.CARD if hollow(point) else color,
+        markeredgecolor=color if hollow(point) else style.CARD,
+        markeredgewidth=1.2 if hollow(point) else 0.5,
+        zorder=4 if hollow(point) else 3,
+        clip_on=False,
+    )
 
 
-def _legend(points: Sequence[Point]) -> tuple[list[Line2D], list[str]]:
-    used = {kind(point.task.skin) for point in points}
+def legend(points: Sequence[Point], rivals: Sequence[Rival]) -> tuple[list[Line2D], list[str]]:
+    """Lines and words for what is drawn."""
+    mark: dict[str, Any] = {"linestyle": "", "markersize": 6}
+    used = {cover_of(point.task.method) for point in points} | ({"model"} if rivals else set())
     pitches = {point.task.skin.pitch_x_mm for point in points}
-    mark: dict[str, Any] = {"linestyle": "", "markersize": 7, "markeredgecolor": style.CARD}
-    lines = {name: Line2D([], [], color=color, marker="o", **mark) for name, color in colors(points).items()}
-    shapes = {pitch: Line2D([], [], color=style.GRAY, marker=shape, **mark) for pitch, shape in markers(points).items()}
-    shown = {name: line for name, line in lines.items() if name in used}
-    shown |= {f"pitch {pitch:g} mm": line for pitch, line in shapes.items() if pitch in pitches}
-    shown["nothing is better in both"] = Line2D([], [], color=style.INK, linewidth=0.8)
-    return list(shown.values()), list(shown)
+    words = {"bare": "bare: touch at once"}
+    lines = {
+        words.get(name, name): Line2D([], [], color=color, marker="o", **mark)
+        for name, color in COLORS.items()
+        if name in used
+    }
+    for pitch, shape in markers(points).items():
+        if pitch in pitches:
+            lines[f"pitch {pitch:g} mm"] = Line2D([], [], color=style.SOFT, marker=shape, **mark)
+    lines[f"over {100 * MISSED:g} % of contacts missed"] = Line2D(
+        [], [], color=style.SOFT, marker="o", mfc=style.CARD, **mark
+    )
+    lines["under a cover, not beaten in both"] = Line2D([], [], color=style.INK, linewidth=0.8)
+    lines["walls: bits of a frame, least error"] = Line2D(
+        [], [], color=style.GREEN, linewidth=1.4, linestyle=style.DASHES[1]
+    )
+    return list(lines.values()), list(lines)

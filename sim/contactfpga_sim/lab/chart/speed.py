@@ -10,13 +10,14 @@ import bisect
 import dataclasses
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from contactfpga.skin import Skin
+from contactfpga.wire.protocol import Frame
 from contactfpga_sim.model.board.receiver import ReceivedFrame, frames_in
-from contactfpga_sim.model.golden import Timeline, Trace, beginnings, predict, requests
+from contactfpga_sim.model.golden import Timeline, beginnings, predict, requests
 from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 
@@ -111,32 +112,41 @@ def touch_cycle(skin: Skin, share: float) -> int:
     return int((math.ceil(WARM_US * skin.clock_hz / 1e6 / scan) + share) * scan)
 
 
-def last_byte(skin: Skin, trace: Trace, cells: int) -> tuple[int, int] | None:
-    """Cycle in which the stop bit ends of the first frame that holds this many cells, and the frame's bytes; None where
-    the trace ends before."""
-    for got in frames_in(skin, trace.bytes):
-        if got.frame.cells == cells:
-            return got.last + 10 * skin.derived.bit_clocks, got.size
-    return None
-
-
 def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> tuple[int, int]:
-    """Clocks from the touch to the end of the frame's last byte, and the frame's bytes.
+    """Clocks from the touch to the end of the last byte of the first frame with all of these (R, C) bool cells, which
+    close at once after ``share`` of a scan, and the frame's bytes.
 
     With ``check`` the compiled gateware goes through the same; raises
     :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where it does anything else.
     """
+    whole = int(cells.sum())
+    return _until(skin, [(0, cells)], share, lambda frame: frame.cells == whole, check)
+
+
+def first_report(
+    skin: Skin, pieces: Sequence[tuple[int, np.ndarray]], share: float, check: bool = False
+) -> tuple[int, int]:
+    """The same to the first frame with any cell. ``pieces``: from so many clocks after the touch on, these (R, C) bool
+    cells are closed; clocks rise from 0."""
+    return _until(skin, pieces, share, lambda frame: frame.cells > 0, check)
+
+
+def _until(
+    skin: Skin, pieces: Sequence[tuple[int, np.ndarray]], share: float, wanted: Callable[[Frame], bool], check: bool
+) -> tuple[int, int]:
     start = touch_cycle(skin, share)
-    timeline = Timeline([(start, cells, None)])
+    timeline = Timeline([(start + clocks, cells, None) for clocks, cells in pieces])
     cycles = start
     while cycles < start + MOST_SCANS * skin.derived.frame_clocks:
         cycles = start + 2 * max(cycles - start, 2 * skin.derived.frame_clocks)
         trace = predict(skin, timeline, cycles)
-        if found := last_byte(skin, trace, int(cells.sum())):
-            if check:
-                compare(trace, bench_native.run(skin, timeline, cycles))
-            return found[0] - start, found[1]
-    raise RuntimeError(f"no frame with all {int(cells.sum())} cells came in {cycles - start} clocks")
+        for got in frames_in(skin, trace.bytes):
+            end = got.last + 10 * skin.derived.bit_clocks
+            if wanted(got.frame) and end <= cycles:
+                if check:
+                    compare(trace, bench_native.run(skin, timeline, cycles))
+                return end - start, got.size
+    raise RuntimeError(f"no frame of the touch came in {cycles - start} clocks")
 
 
 def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import bisect
+import math
 from pathlib import Path
 
 import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.chart import front_picture, host, numbers, picture, speed
-from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, front, study
+from contactfpga_sim.lab.chart import beside, front_picture, host, numbers, picture, speed, times_picture
+from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, covered, front, reached_us, study, to_build
+from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
 
 NUMBERS = Path("docs/chart/chart.csv")
 """Of the chart that the page shows."""
 
-PLACEMENTS = 1000
+PLACEMENTS = 400
 """Scenes of each point."""
 
 SHEETS = (16, 32, 64)
@@ -24,48 +26,104 @@ SHEETS = (16, 32, 64)
 
 def compute() -> list[Point]:
     """Every point of the chart, as the file of its numbers has it."""
-    tasks = [Task(method, skin, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for method, skin in METHODS.items()]
+    tasks = [
+        Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
+    ]
     with pool.executor() as executor, pool.progress() as step:
-        points = [host.timed(point) for point in study(tasks, executor, True, step)]
-    numbers.write(points, NUMBERS)
+        points = beside.bounded(study(tasks, executor, True, step), executor)
+    numbers.write(map(host.timed, points), NUMBERS)
     return numbers.read(NUMBERS)
 
 
 def draw(folder: Path, points: list[Point]) -> list[Path]:
-    """The chart, and the README's picture."""
+    """The chart, its times, and the README's picture."""
     chart, small = folder.parent / "chart", folder / "front.svg"
-    picture.save(points, chart)
-    front_picture.save(points, small)
-    return [chart / "chart.svg", small]
+    rivals = beside.rivals(FAMILIES_DRAWN, PLACEMENTS, 0)
+    picture.save(points, chart, rivals)
+    times_picture.save(points, chart / "times.svg")
+    front_picture.save(points, small, rivals)
+    return [chart / "chart.svg", chart / "times.svg", small]
+
+
+HEAD = (
+    "touch of the foam to last byte, median / 95 %",
+    "not felt",
+    "electronics alone",
+    "miscounted",
+    "missed",
+    "barycenter of found",
+    "area of found",
+)
+"""Of a point's cells."""
 
 
 def front_table(points: list[Point]) -> str:
-    """The methods of each family that no other beats in the time and in the share of scenes miscounted."""
-    head = ("family", "method", "touch to zones, median / worst", "miscounted", "barycenter", "area", "LUT4")
-    lines: list[str] = []
+    """What to build by all families; then for each family the methods under a cover that no other beats in the time and
+    in the share of scenes miscounted."""
+    lines = []
+    method = to_build(points)
     for family in dict.fromkeys(point.task.family for point in points):
-        some = [point for point in points if point.task.family == family]
-        best = front(
-            [(point.speed.median_us + point.host_us, point.errors["total"]["miscounted"].mean) for point in some]
-        )
-        lines += [_line(some[index]) for index in best]
-    return writer.table(head, lines)
+        some = [point for point in points if point.task.family == family and covered(point.task)]
+        best = front([(reached_us(point), point.errors["total"]["miscounted"].mean) for point in some])
+        shown = [point for point in some if point.task.method == method]
+        shown += [some[index] for index in best if some[index] not in shown]
+        lines += [writer.line((family, _name(point, method), *_cells(point))) for point in shown]
+    return writer.table(("family", "method", *HEAD), lines)
 
 
-def _line(point: Point) -> str:
-    found = point.errors["total"]
-    count, place, area = found["miscounted"], found["barycenter_mm"], found["area"]
-    times = (point.speed.median_us + point.host_us, point.speed.worst_us + point.host_us)
-    cells = (
-        point.task.family,
-        point.task.method,
-        "{:.0f} / {:.0f} us".format(*times),
-        f"{100 * count.mean:.1f} % ({100 * count.low:.1f} to {100 * count.high:.1f})",
-        f"{place.mean:.2f} mm",
-        f"{100 * area.mean:.0f} %",
-        f"{point.luts:,}" if point.luts else "",
+def methods_table(points: list[Point]) -> str:
+    """Every method of one family."""
+    method = to_build(points)
+    some = [point for point in points if point.task.family == front_picture.FAMILY]
+    lines = [
+        writer.line((_name(point, method), *_cells(point), f"{point.luts:,}" if point.luts else "")) for point in some
+    ]
+    return writer.table(("method", *HEAD, "LUT4"), lines)
+
+
+def families_table(points: list[Point]) -> str:
+    """Scenes miscounted and contacts missed by family; methods with the same cells that find the same share the line of
+    the first."""
+    families = list(dict.fromkeys(point.task.family for point in points))
+    by = {(point.task.method, point.task.family): point for point in points}
+    lines: dict[object, str] = {}
+    for method in dict.fromkeys(point.task.method for point in points):
+        some = [by[method, family] for family in families]
+        found = [point.errors["total"] for point in some]
+        shares = [f"{_percent(one['miscounted'])}; {100 * one['missed'].mean:.1f} %" for one in found]
+        alike = (some[0].task.skin.pitch_x_mm, some[0].task.cover, *shares)
+        lines.setdefault(alike, writer.line((_name(some[0], to_build(points)), *shares)))
+    return writer.table(("miscounted; missed", *families), lines.values())
+
+
+def _name(point: Point, build: str) -> str:
+    return f"**{point.task.method}**" if point.task.method == build else point.task.method
+
+
+def _cells(point: Point) -> tuple[str, ...]:
+    """For :data:`HEAD`."""
+    found, times = point.errors["total"], point.times
+    electric = [f"{one.value + point.host_us:.0f}" for one in (times.electric_median_us, times.electric_q95_us)]
+    touch = " / ".join(_ms(one.value + point.host_us) for one in (times.touch_median_us, times.touch_q95_us))
+    return (
+        f"{touch} ({_ms(times.touch_q95_us.low)} to {_ms(times.touch_q95_us.high)})"
+        if covered(point.task)
+        else "at once",
+        f"{100 * times.not_felt.mean:.0f} %",
+        f"{' / '.join(electric)} us",
+        _percent(found["miscounted"]),
+        f"{100 * found['missed'].mean:.1f} %",
+        f"{found['barycenter_mm'].mean:.2f} mm",
+        f"{100 * found['area'].mean:.0f} %",
     )
-    return writer.line(cells)
+
+
+def _ms(us: float) -> str:
+    return "never" if math.isinf(us) else f"{us / 1e3:.1f} ms"
+
+
+def _percent(share: Interval) -> str:
+    return f"{100 * share.mean:.1f} % ({100 * share.low:.1f} to {100 * share.high:.1f})"
 
 
 def host_table() -> str:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga.choices import labellers
-from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.chart.compute import Point, Task
+    from contactfpga_sim.lab.chart.methods import Method
 
 EXTRA = "chart"
 
@@ -23,8 +23,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     own = "Add this labeller, module:attribute of your own, to the methods; can be repeated."
     parser.add_argument("--labeller", action="append", metavar="NAME", help=own)
     parser.add_argument("--family", action="append", metavar="NAME", help="Use only these scenes; can be repeated.")
-    count, usual = numbers.whole(1, 1_000_000), "Number of scenes per point (default: 1000)."
-    parser.add_argument("--placements", type=count, default=1000, metavar="N", help=usual)
+    count, usual = numbers.whole(1, 1_000_000), "Number of scenes per point (default: 400)."
+    parser.add_argument("--placements", type=count, default=400, metavar="N", help=usual)
     parser.add_argument("--seed", type=numbers.SEED, default=0, help="Seed of the placements (default: 0).")
     flags.workers(parser)
     parser.add_argument("--no-size", action="store_true", help="Leave out place and route.")
@@ -34,23 +34,27 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     from contactfpga_sim.lab import pool
-    from contactfpga_sim.lab.chart import host, picture
+    from contactfpga_sim.lab.chart import beside, host, picture, times_picture
     from contactfpga_sim.lab.chart import numbers as table
     from contactfpga_sim.lab.chart.compute import study
+    from contactfpga_sim.lab.chart.methods import Method
 
     tasks = _tasks(args)
     folder = outputs.folder(args.output)
     so_far: dict[Task, Point] = {}
     try:
         with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
-            points = [host.timed(point) for point in study(tasks, executor, not args.no_size, step, so_far)]
+            points = beside.bounded(study(tasks, executor, not args.no_size, step, so_far), executor)
     except KeyboardInterrupt:
         raise Interruption(_kept([so_far[task] for task in tasks if task in so_far], len(tasks), folder)) from None
     path = folder / "chart.csv"
-    table.write(points, path)
+    table.write(map(host.timed, points), path)
     print(path, flush=True)
-    picture.save(table.read(path, {task.method: task.skin for task in tasks}), folder)
-    for name in ("chart.png", "chart.svg"):
+    points = table.read(path, {task.method: Method(task.skin, task.cover) for task in tasks})
+    families = list(dict.fromkeys(task.family for task in tasks))
+    picture.save(points, folder, beside.rivals(families, args.placements, args.seed))
+    times_picture.save(points, folder / "times.svg")
+    for name in ("chart.png", "chart.svg", "times.svg"):
         print(folder / name)
     return 0
 
@@ -60,21 +64,21 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
     from contactfpga_sim.lab.chart.methods import METHODS
     from contactfpga_sim.model.scenes.families import FAMILIES
 
-    skins = METHODS | _own(args)
-    methods = flags.known("--method", args.method, list(skins))
+    known = METHODS | _own(args)
+    methods = flags.known("--method", args.method, list(known))
     flags.known("--family", args.family, list(FAMILIES))
     return [
-        Task(method, skins[method], family, args.placements, args.seed)
+        Task(method, *known[method], family, args.placements, args.seed)
         for family in args.family or FAMILIES_DRAWN
         for method in methods
     ]
 
 
-def _own(args: argparse.Namespace) -> dict[str, Skin]:
+def _own(args: argparse.Namespace) -> dict[str, Method]:
     """The methods of the labellers that are not built in."""
     from contactfpga_sim.lab.chart.methods import by
 
-    return {name: skin for one in args.labeller or () for name, skin in by(labellers.find(one)).items()}
+    return {name: method for one in args.labeller or () for name, method in by(labellers.find(one)).items()}
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
