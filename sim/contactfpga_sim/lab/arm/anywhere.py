@@ -154,7 +154,7 @@ def worst_text(halves: Sequence[Peaks]) -> str:
     values = np.sort(np.concatenate([half.force_n for half in halves]))
     n = len(values)
     middle, half = n * QUANTILE, 1.96 * math.sqrt(n * QUANTILE * (1 - QUANTILE))
-    ranks = [min(n - 1, max(0, math.ceil(rank) - 1)) for rank in (middle, middle - half, middle + half + 1)]
+    ranks = [min(n - 1, max(0, math.ceil(rank) - 1)) for rank in (middle, middle - half, middle + half)]
     value, low, high = values[ranks]
     return f"95 %: {value:.1f} ({low:.1f} to {high:.1f})"
 

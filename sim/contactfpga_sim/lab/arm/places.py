@@ -64,14 +64,17 @@ def check(case: Case) -> None:
         raise CaseError("touches anywhere need a case with one touch, behavior 'reverse' and a speed; take --places 0")
 
 
+_GOLDEN = 1.32471795724
+"""Root of x^3 = x + 1: points that move on by its powers fill a square evenly (Roberts)."""
+
+
 def evenly(count: int, seed: int) -> Floats:
-    """(count, 4) numbers from 0 to 1 that fill the space evenly: Roberts' sequence, moved by a seed."""
-    root = 1.5
-    for _ in range(60):
-        root = (1 + root) ** (1 / 5)
-    steps = root ** -np.arange(1.0, 5.0)
-    found: Floats = (np.random.default_rng(seed).random(4) + np.outer(np.arange(count), steps)) % 1
-    return found
+    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, each other one takes ``count`` even shares of
+    its range in an order of its own."""
+    rng = np.random.default_rng(seed)
+    square = (rng.random(2) + np.outer(np.arange(count), [1 / _GOLDEN, 1 / _GOLDEN**2])) % 1
+    orders = np.stack([rng.permutation(count) for _ in range(4)], axis=1)
+    return np.hstack([square, (orders + rng.random(orders.shape)) / count])
 
 
 def batches(case: Case, skin: Skin, ways: tuple[Latencies, ...], count: int) -> list[Batch]:
@@ -100,8 +103,11 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
     step = _step_s(case)
     phases = round(case.control.period_s / step)
     found: list[list[tuple[float, float, bool]]] = [[] for _ in batch.ways]
-    for x, y, phase, late in evenly(batch.count, batch.seed).tolist():
-        place = {"x_mm": _place_mm(x, skin.columns, skin.pitch_x_mm), "y_mm": _place_mm(y, skin.rows, skin.pitch_y_mm)}
+    for x, y, phase, late, column, row in evenly(batch.count, batch.seed).tolist():
+        place = {
+            "x_mm": _place_mm(x, column, skin.columns, skin.pitch_x_mm),
+            "y_mm": _place_mm(y, row, skin.rows, skin.pitch_y_mm),
+        }
         times = {
             "step_s": step,
             "lead_s": case.control.period_s + math.floor(phase * phases) * step,
@@ -116,9 +122,12 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
     return found
 
 
-def _place_mm(share: float, count: int, pitch_mm: float) -> float:
-    span = min(SPAN, count - 1) or 0.5
-    return ((count - 1 - math.floor(span)) // 2 + share * span) * pitch_mm
+def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
+    """In one of the middle cells of a side, a pitch wide, by shares from 0 to 1."""
+    span = min(SPAN, count - 1)
+    if not span:
+        return 0.5 * inside * pitch_mm
+    return ((count - 1 - span) // 2 + math.floor(cell * span) + inside) * pitch_mm
 
 
 def _step_s(case: Case) -> float:

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 EXTRA = "sim"
 
+PLACES = 60
+"""Touches anywhere where the user does not say how many."""
+
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
@@ -30,9 +33,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--latency", type=late, default=6.0, metavar="MS", help=usual)
     many, places = (
         numbers.whole(0, 10_000),
-        "Touches anywhere on the sheet (default: 60; 0: only the case's own place).",
+        "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place).",
     )
-    parser.add_argument("--places", type=many, default=60, metavar="N", help=places)
+    parser.add_argument("--places", type=many, metavar="N", help=places)
     parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin).")
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
     charts = "Draw force, safe speed and thickness against latency instead."
@@ -62,7 +65,8 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
     skin = Skin.load(args.skin) if args.skin else None
     folder = None if args.json else outputs.folder(args.output)
     late = f"{args.latency:g} ms"
-    touched = _anywhere(args, case, skin or Skin()) if args.places else None
+    count = args.places if args.places is not None else PLACES * (len(case.touch) == 1)
+    touched = _anywhere(args, case, skin or Skin(), count) if count else None
     if folder is not None and touched is not None:
         tables.show(anywhere.lines(case, touched, late), title=f"Case {args.case}: touches anywhere on the sheet")
     found = report.columns(case, args.case, 1e-3 * args.latency, skin)
@@ -81,14 +85,14 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
     return 0
 
 
-def _anywhere(args: argparse.Namespace, case: Case, skin: Skin) -> anywhere.Found:
+def _anywhere(args: argparse.Namespace, case: Case, skin: Skin, count: int) -> anywhere.Found:
     from contactfpga_sim.lab.arm import anywhere, places
     from contactfpga_sim.lab.pool import executor, progress
 
     places.check(case)
     ways = anywhere.ways(case, skin, 1e-3 * args.latency)
     with executor(args.jobs, args.dask) as workers, progress() as step:
-        return anywhere.touched(places.batches(case, skin, ways, args.places), workers, step)
+        return anywhere.touched(places.batches(case, skin, ways, count), workers, step)
 
 
 def _units(args: argparse.Namespace, case: Case) -> int:
