@@ -86,7 +86,7 @@ def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(pictures, "pictures", refused)
     monkeypatch.setattr(report, "columns", lambda *_: {})
     monkeypatch.setattr(report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
-    assert cli.main(["study", "arm", "--output", str(tmp_path)]) == 1
+    assert cli.main(["study", "arm", "--places", "0", "--output", str(tmp_path)]) == 1
     assert "18.91" in capsys.readouterr().out
 
 

@@ -39,7 +39,7 @@ COMMANDS = {
     "wire": ["wire", "--once", "FILES/cells"],
     "doctor": ["doctor", "--seconds", "0.01", "sim://"],
     "replay": ["replay", "FILES/frames.npy"],
-    "arm": ["study", "arm", "--output", "FILES/arm"],
+    "arm": ["study", "arm", "--places", "4", "--output", "FILES/arm"],
     "push": ["study", "arm", "--case", "push"],
     "an error": ["zones", "sim://?scene=no_such_scene_of_this_name"],
     "help": ["--help"],

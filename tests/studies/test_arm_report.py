@@ -37,7 +37,7 @@ def ran_before(found, monkeypatch):
 @pytest.mark.slow
 def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_before, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    assert cli.main(["study", "arm", "--output", str(tmp_path)]) == 0
+    assert cli.main(["study", "arm", "--places", "0", "--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     full = next(line for line in lines if line.startswith("speed stays positive"))  # has a cell in every column
     ends = [cell.end() for cell in re.finditer(r"\S+(?: \S+)*", full)]
@@ -80,7 +80,7 @@ def test_the_columns_are_what_they_are_called(found):
 @pytest.mark.slow
 def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_before):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["study", "arm", "--json"]) == 0
+    assert cli.main(["study", "arm", "--json", "--places", "0"]) == 0
     known = json.loads(capsys.readouterr().out)
     assert known["runs"] == {name: dataclasses.asdict(result.outcome) for name, result in ran_before.items()}
     for field, printed in known["paper"].items():
@@ -93,7 +93,7 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
 def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsys, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('like = "paper"\n[link]\nspeed_m_s = 0.1\n')
-    assert cli.main(["study", "arm", "--case", str(path), "--json", "--latency", "3"]) == 0
+    assert cli.main(["study", "arm", "--case", str(path), "--json", "--latency", "3", "--places", "0"]) == 0
     known = json.loads(capsys.readouterr().out)
     assert "paper" not in known
     assert list(known["runs"]) == ["3 ms", "UART", "pin", "limit alone"]
@@ -107,6 +107,11 @@ def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsy
         ('like = "paper"\n[arm]\n', "unknown part 'arm'"),
         ('like = "paper"\n[foam]\nthick = 1\n', "unknown key 'thick' in [foam]"),
         ('like = "paper"\n[foam]\nthickness_m = -1.0\n', "thickness_m is -1.0"),
+        ('like = "paper"\n[foam]\ncut = true\n', "the model 'point' knows no cut"),
+        ('like = "paper"\nmodel = "hertz"\n[foam]\ncut = true\n', "give [cover.cap] as well"),
+        ('like = "paper"\nmodel = "hertz"\n[switch]\ntravel_m = 1e-4\n', "only a switch under a proud cap"),
+        ('like = "paper"\nmodel = "hertz"\n[cap]\nside_m = 0.011\n', "a cap is 0.011 m wide; the pitch is 0.01 m"),
+        ('like = "paper"\n[cap]\nside = 1\n', "unknown key 'side' in [cap]"),
         ('like = "paper"\n[foam]\npoisson = 0.7\n', "poisson is 0.7"),
         ('like = "paper"\n[control]\nbehavior = "flee"\n', "behavior is 'flee'; it must be one of reverse, comply"),
         (
@@ -182,9 +187,6 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
     assert "torque limit" in said
 
 
-PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
-
-
 @pytest.mark.slow
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert section("arm.md", "set") == tables.set_table(tables.ArmRuns(None, {}, found))
+    assert section("arm.md", "set") == tables.set_table(tables.ArmRuns(None, {}, found, {}))

@@ -26,10 +26,10 @@ def below(force, x_mm, y_mm, depth_mm=5.0):
     return stress
 
 
-def test_the_stress_of_two_touches_is_the_sum_of_9_at_every_switch():
+def test_two_touches_press_each_switch_by_the_sum_of_9_over_its_face():
     case = PAPER.but(touch=({"x_mm": 33.0, "y_mm": 41.0}, {"x_mm": 90.0, "y_mm": 16.0}))
-    found = Switches(case, SKIN).stress_pa((7.0, 12.0))
-    assert found == pytest.approx(below(7.0, 33.0, 41.0) + below(12.0, 90.0, 16.0), rel=1e-12)
+    found = Switches(case, SKIN).forces_n((7.0, 12.0))
+    assert found == pytest.approx(12.6e-6 * (below(7.0, 33.0, 41.0) + below(12.0, 90.0, 16.0)), rel=1e-12)
 
 
 def test_every_switch_closes_at_its_stress_and_opens_a_fifth_below():

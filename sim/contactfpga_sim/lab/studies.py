@@ -9,8 +9,11 @@ _ALL = (
         "arm",
         title="A robot arm that meets a person",
         page="arm.md",
-        minutes=3,
+        minutes=12,
         sections={
+            "matters": Section("tables:matters_text"),
+            "places": Section("tables:places_table"),
+            "effects": Section("tables:effects_table"),
             "set": Section("tables:set_table"),
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),

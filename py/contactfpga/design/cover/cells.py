@@ -70,10 +70,14 @@ class Cells:
     def closed(self, loads: Sequence[Load], before: np.ndarray | None = None) -> np.ndarray:
         """(rows, columns) bool: the switches that are closed; ``before``: those that were until now, which open only
         when the force falls below the closing force by the switch's hysteresis."""
+        return self.closed_by(self.forces_n(loads), before)
+
+    def closed_by(self, forces_n: Floats, before: np.ndarray | None = None) -> np.ndarray:
+        """As :meth:`closed`, by the (rows, columns) forces on the switches in N."""
         thresholds = self.thresholds_n
         if before is not None and self.cover.switch.hysteresis:
             thresholds = np.where(before, thresholds * (1 - self.cover.switch.hysteresis), thresholds)
-        found: np.ndarray = self.forces_n(loads) >= thresholds
+        found: np.ndarray = forces_n >= thresholds
         return found
 
     def false_presses(self, acceleration_m_s2: float = 0.0, foam_kg_m3: float = 0.0) -> float:

@@ -7,14 +7,14 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from contactfpga.design.cover import Cover
+from contactfpga.design.cover import Cap, Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 from contactfpga_sim.lab.arm.parts import BEHAVIORS, ArmLink, Contacts, Control, Foam, Motor, Run, Touch, Usb
 
 _CASES = Path(__file__).parent / "cases"
-MODELS = ("point", "hertz")
+MODELS = ("point", "hertz", "bonded", "frictionless")
 MAX_STEPS = 1_000_000
 """In a run."""
 STEPS_A_TIME_CONSTANT = 4
@@ -38,11 +38,15 @@ class Case:
     usb: Usb = dataclasses.field(default_factory=Usb)
     run: Run = dataclasses.field(default_factory=Run)
     model: str = "point"
-    """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`)."""
+    """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`). In all but
+    ``point`` it presses as wide as Hertz's patch of the foam's R*."""
+    cap: Cap | None = None
+    """On each switch; None: the foam presses the switches' own faces, flush with what lies around them."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)
         _one_of("model", self.model, MODELS)
+        _ = self.cover  # refuses what no cover can be
         if not self.touch:
             raise CaseError("touch is empty; the arm must run into at least one thing")
         if self.control.sensor_nm < self.control.torque_limit_nm:
@@ -57,15 +61,17 @@ class Case:
             )
         if (steps := (self.run.lead_s + self.run.duration_s) / self.run.step_s) > MAX_STEPS:
             raise CaseError(f"lead_s + duration_s is {steps:.3g} times step_s; it must be at most {MAX_STEPS:,} times")
+        part = self.run.step_s
         for name, whole in (("period_s", self.control.period_s), ("lead_s", self.run.lead_s)):
-            part = self.run.step_s if name == "period_s" else self.control.period_s
             if abs(whole / part - round(whole / part)) > 1e-6 or round(whole / part) < 1:
                 raise CaseError(f"{name} is {whole:g}; it must be a whole number of times {part:g} s")
 
     @functools.cached_property
     def cover(self) -> Cover:
         """What presses on the switches."""
-        return Cover(self.model, self.foam.thickness_m, self.switch.switch)
+        foam = self.foam
+        known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa, "poisson": foam.poisson}
+        return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
 
     def but(self, **changes: Any) -> Case:
         """The same with other values: ``case.but(link={"speed_m_s": 0.4}, touch=({"x_mm": 85.0},))``."""
@@ -74,7 +80,9 @@ class Case:
             old = getattr(self, name)
             if name == "touch":
                 change = tuple(one if isinstance(one, Touch) else dataclasses.replace(old[0], **one) for one in change)
-            new[name] = dataclasses.replace(old, **change) if isinstance(change, dict) else change
+            if isinstance(change, dict):
+                change = Cap(**change) if old is None else dataclasses.replace(old, **change)
+            new[name] = change
         return dataclasses.replace(self, **new)
 
     @classmethod
@@ -90,6 +98,7 @@ _PARTS = {
     "control": Control,
     "foam": Foam,
     "switch": Contacts,
+    "cap": Cap,
     "usb": Usb,
     "run": Run,
 }

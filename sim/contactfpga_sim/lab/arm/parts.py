@@ -20,7 +20,7 @@ class _Checked:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
-            if isinstance(field.default, str) or (value is None and field.default is None):
+            if isinstance(field.default, (str, bool)) or (value is None and field.default is None):
                 continue
             check = not_negative if field.name in self._zero else positive
             number = check(field.name, value, "")
@@ -126,6 +126,8 @@ class Foam(_Checked):
     """In s/m, after Hunt and Crossley; 0: nothing is lost."""
     base_n_m: float = 1e6
     """What comes on top from the indentation on at which the foam is pressed flat, its thickness, in N/m."""
+    cut: bool = False
+    """It is cut into tiles between the caps; the plant's spring is that of whole foam all the same."""
     _zero = ("damping",)
 
     @functools.cached_property
@@ -143,21 +145,24 @@ class Foam(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Contacts(_Checked):
-    """How a switch behaves besides closing at its stress."""
+    """The switches below the cover; what is not said here is as in :class:`contactfpga.design.cover.Switch`."""
 
     force_n: float
     area_m2: float
+    travel_m: float = 0.0
+    spread: float = 0.0
     hysteresis: float = 0.2
-    """It opens at this share below its closing stress."""
+    preload_n: float = 0.0
     bounce_s: float = 0.0
     """How long it bounces after closing and after opening."""
     bounce_period_s: float = 0.4e-3
     """Open and closed again, while it bounces."""
-    _zero = ("hysteresis", "bounce_s")
+    _zero = ("travel_m", "spread", "hysteresis", "preload_n", "bounce_s")
 
-    @property
+    @functools.cached_property
     def switch(self) -> Switch:
-        return Switch(self.force_n, self.area_m2)
+        """What closes, without its bounce."""
+        return Switch(self.force_n, self.area_m2, self.travel_m, self.spread, self.hysteresis, self.preload_n)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,6 +224,6 @@ class Run(_Checked):
     step_s: float = 10e-6
     """Of the integrator, and between two looks of gateware and plant at each other, in s."""
     lead_s: float = 20e-3
-    """From the board's power-up to the touch; a whole number of controller periods."""
+    """From power-up, when the controller samples first, to the touch; a whole number of steps."""
     duration_s: float = 0.25
     """From the touch to the end, at most."""

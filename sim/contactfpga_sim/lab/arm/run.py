@@ -100,13 +100,20 @@ class RunRecord:
 
 
 def run(
-    case: Case, way: str = "uart", *, latency_s: float = 6e-3, skin: Skin | None = None, faults: Faults | None = None
+    case: Case,
+    way: str = "uart",
+    *,
+    latency_s: float = 6e-3,
+    skin: Skin | None = None,
+    faults: Faults | None = None,
+    to_peak: bool = False,
 ) -> RunRecord:
     """Let the arm run into what it touches.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
-    the sheet, by default the reference Skin, with units where the way needs them. The first run of a Skin by ``pin``,
-    ``uart``, ``force`` or ``both`` compiles its gateware.
+    the sheet, by default the reference Skin, with units where the way needs them; ``to_peak``: end once the force has
+    fallen to half of its peak after the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both``
+    compiles its gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")
@@ -126,7 +133,7 @@ def run(
     try:
         if way == "uart":
             _host(world)
-        while not _over(world):
+        while not _over(world) and not (to_peak and _past_peak(world)):
             world.step()
     finally:
         world.close()
@@ -162,6 +169,10 @@ def _over(world: World) -> bool:
     events = world.controller.events
     resting = bool(events) and events[-1][1] in ("resting", "stopped")
     return resting and world.time_s - events[-1][0] > STAY_S and _slow(world, world.course[-1])
+
+
+def _past_peak(world: World) -> bool:
+    return bool(world.controller.events) and world.course[-1].force_n < world.peak_n / 2
 
 
 def _slow(world: World, moment: CourseStep) -> bool:

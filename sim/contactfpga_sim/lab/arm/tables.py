@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.arm import comply, pictures, report, sweep
+from contactfpga_sim.lab.arm import anywhere, comply, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord, run
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
@@ -30,6 +30,8 @@ class ArmRuns(NamedTuple):
     points: dict[SweepTask, SweepPoint]
     columns: dict[str, RunRecord]
     """The paper's experiment by way to the controller."""
+    anywhere: dict[anywhere.Geometry, anywhere.Found]
+    """Touches anywhere, by what the sheet is built of."""
 
 
 def compute() -> ArmRuns:
@@ -38,7 +40,8 @@ def compute() -> ArmRuns:
     plan = pictures.plan(case)
     with executor() as workers, progress() as step:
         points = dict(zip(plan.all, sweep.sweep(plan.all, workers, step)))
-    return ArmRuns(plan, points, report.columns(case, "paper", pictures.PAPER_S))
+        touched = anywhere.many(anywhere.study(), workers, step)
+    return ArmRuns(plan, points, report.columns(case, "paper", pictures.PAPER_S), touched)
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
@@ -75,6 +78,21 @@ FAILURES = (
     Failure("that, by pin", {}, "pin", Faults(board_dies_s=8e-3)),
     Failure("host dies in the contact", {}, faults=Faults(host_dies_s=8e-3)),
 )
+
+
+def matters_text(found: ArmRuns) -> str:
+    """What matters most, in a sentence."""
+    return anywhere.matters(found.anywhere)
+
+
+def places_table(found: ArmRuns) -> str:
+    """Peak force over touches anywhere, by what the sheet is built of."""
+    return writer.table_of(anywhere.geometry_lines(found.anywhere))
+
+
+def effects_table(found: ArmRuns) -> str:
+    """What each part of the sheet takes from the mean peak force, changed alone."""
+    return writer.table_of(anywhere.effect_lines(found.anywhere))
 
 
 def set_table(found: ArmRuns) -> str:

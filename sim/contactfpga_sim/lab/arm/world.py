@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design.cover import Ball, Ellipse, Load, elastic
+from contactfpga.design.cover import Ball, Cells, Ellipse, Load, cells_of, elastic
 from contactfpga.skin import Skin
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.control import Controller, SensorReadings
-from contactfpga_sim.lab.arm.parts import Usb
+from contactfpga_sim.lab.arm.parts import Touch, Usb
 from contactfpga_sim.lab.arm.plant import Plant, finite
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
@@ -24,42 +25,41 @@ _MM = 1e-3
 _PATCH_M = 1e-3
 """Radius of a patch where the model does not look at it."""
 
+_FINE = 1.1
+"""Ratio of the forces at which a wide patch is looked at; between two, what each newton presses goes straight."""
+
+_LEAST_N = 0.01
+
 
 class Switches:
     """The (rows, columns) switches of a sheet under the case's cover."""
 
     def __init__(self, case: Case, skin: Skin):
-        self._cover = case.cover
-        self._closing = case.switch.switch.closing_pa
-        self._opening = self._closing * (1 - case.switch.hysteresis)
+        pitches = (skin.pitch_x_mm * _MM, skin.pitch_y_mm * _MM)
+        self._cells = cells_of(case.cover, skin.rows, skin.columns, *pitches)
         self._bounce_s, self._period_s = case.switch.bounce_s, case.switch.bounce_period_s
         self._touches = case.touch
         foam = case.foam
         self._ball = Ball(foam.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, foam.poisson))
-        self._x = np.arange(skin.columns) * skin.pitch_x_mm * _MM
-        self._y = (np.arange(skin.rows) * skin.pitch_y_mm * _MM)[:, None]
-        self._per_newton = [self._under(number, 1.0) for number in range(len(case.touch))]
         self._made = np.zeros((skin.rows, skin.columns), bool)
         self._since = np.full(self._made.shape, -np.inf)
         self._any = False
         self._closed = self._made
         self._bounces_until = -np.inf
 
-    def stress_pa(self, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) normal stress in Pa below the forces of the touches."""
-        stress = np.zeros(self._made.shape)
-        for number, force in enumerate(forces_n):
+    def forces_n(self, forces_n: Sequence[float]) -> np.ndarray:
+        """(rows, columns) force in N on each switch below the forces of the touches."""
+        found = np.zeros(self._made.shape)
+        for touch, force in zip(self._touches, forces_n):
             if force > 0:
-                point = self._cover.model == "point"  # in which stress is proportional to force
-                stress += force * self._per_newton[number] if point else self._under(number, force)
-        return stress
+                found += force * self._per_newton(touch, force)
+        return found
 
     def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
         """(rows, columns) bool: which are closed at a moment; moments come in order. The same array as long as nothing
         changes."""
         if any(forces_n) or self._any:
-            stress = self.stress_pa(forces_n)
-            made = np.where(self._made, stress > self._opening, stress >= self._closing)
+            made = self._cells.closed_by(self.forces_n(forces_n), self._made)
             changed = made != self._made
             if changed.any():
                 self._since[changed] = seconds
@@ -80,11 +80,23 @@ class Switches:
         found: np.ndarray = self._made ^ (bouncing & (half_periods % 2 == 1))
         return found
 
-    def _under(self, number: int, force_n: float) -> np.ndarray:
-        touch = self._touches[number]
-        radius = _PATCH_M if self._cover.model == "point" else self._ball.patch_m(force_n)
-        part = Ellipse(radius, radius, touch.x_mm * _MM, touch.y_mm * _MM)
-        return self._cover.stress_pa([Load((part,), force_n)], self._x, self._y)
+    def _per_newton(self, touch: Touch, force_n: float) -> np.ndarray:
+        """Of a touch that presses by this much."""
+        if self._cells.cover.model == "point":  # where it does not depend on the force
+            return pressed(self._cells, touch.x_mm, touch.y_mm, _PATCH_M)
+        place = max(0.0, math.log(force_n / _LEAST_N) / math.log(_FINE))
+        below = math.floor(place)
+        lower, upper = (self._ball.patch_m(_LEAST_N * _FINE**number) for number in (below, below + 1))
+        one, other = (pressed(self._cells, touch.x_mm, touch.y_mm, radius) for radius in (lower, upper))
+        found: np.ndarray = one + (place - below) * (other - one)
+        return found
+
+
+@functools.lru_cache(maxsize=2048)
+def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarray:
+    """(rows, columns) share of a force that comes to each switch, from a round patch of this radius on the cover."""
+    part = Ellipse(radius_m, radius_m, x_mm * _MM, y_mm * _MM)
+    return cells.forces_n([Load((part,), 1.0)])
 
 
 THRESHOLD_N = 2.0
@@ -204,6 +216,8 @@ class World:
         """What the host said: when it came to the controller, and the number of zones."""
         self.detected_s: float | None = None
         """When the first contact was known to the controller's input."""
+        self.peak_n = 0.0
+        """The largest force so far."""
         self._way, self._latency_s = way, latency_s
         self._plant = Plant(case)
         self._switches = Switches(case, skin)
@@ -267,6 +281,7 @@ class World:
             sensed = SensorReadings(theta, omega, torque, self._level, self._alive(now))
             self._wanted = self.controller.sample(now, sensed)
         total, deepest = sum(forces.contact_n), max(forces.indentation_m)
+        self.peak_n = max(self.peak_n, total)
         self.course.append(
             CourseStep(
                 now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), self._closed, self._level

@@ -15,10 +15,14 @@ from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
+    from contactfpga_sim.lab.arm import anywhere
     from contactfpga_sim.lab.arm.case import Case
     from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 EXTRA = "sim"
+
+PLACES = 60
+"""Touches anywhere where the user does not say how many."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +31,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", default="paper", metavar="NAME", help=case)
     late, usual = numbers.number(0, 10_000, "ms"), "Latency from the switch to the controller (default: the paper's 6)."
     parser.add_argument("--latency", type=late, default=6.0, metavar="MS", help=usual)
+    many, places = (
+        numbers.whole(0, 10_000),
+        "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place).",
+    )
+    parser.add_argument("--places", type=many, metavar="N", help=places)
     parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin).")
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
     charts = "Draw force, safe speed and thickness against latency instead."
@@ -51,13 +60,21 @@ def run(args: argparse.Namespace) -> int:
 
 def _contact(args: argparse.Namespace, case: Case) -> int:
     from contactfpga.tools.console import tables
-    from contactfpga_sim.lab.arm import pictures, report
+    from contactfpga_sim.lab.arm import anywhere, pictures, report
 
     skin = Skin.load(args.skin) if args.skin else None
     folder = None if args.json else outputs.folder(args.output)
+    late = f"{args.latency:g} ms"
+    count = args.places if args.places is not None else PLACES * (len(case.touch) == 1)
+    touched = _anywhere(args, case, skin or Skin(), count) if count else None
+    if folder is not None and touched is not None:
+        tables.show(anywhere.lines(case, touched, late), title=f"Case {args.case}: touches anywhere on the sheet")
     found = report.columns(case, args.case, 1e-3 * args.latency, skin)
     if folder is None:
-        print(json.dumps(report.as_json(found, args.case), indent=2))
+        known = report.as_json(found, args.case)
+        if touched is not None:
+            known["anywhere"] = anywhere.as_json(touched, late)
+        print(json.dumps(known, indent=2))
         return 0
     title = f"Case {args.case}: time counts from the touch, {case.link.speed_m_s:g} m/s"
     tables.show(report.table(found, args.case == "paper"), title=title)
@@ -66,6 +83,16 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
     for path in pictures.pictures(found, folder):
         print(path)
     return 0
+
+
+def _anywhere(args: argparse.Namespace, case: Case, skin: Skin, count: int) -> anywhere.Found:
+    from contactfpga_sim.lab.arm import anywhere, places
+    from contactfpga_sim.lab.pool import executor, progress
+
+    places.check(case)
+    ways = anywhere.ways(case, skin, 1e-3 * args.latency)
+    with executor(args.jobs, args.dask) as workers, progress() as step:
+        return anywhere.touched(places.batches(case, skin, ways, count), workers, step)
 
 
 def _units(args: argparse.Namespace, case: Case) -> int:

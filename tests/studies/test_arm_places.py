@@ -1,0 +1,200 @@
+"""Touches of the arm anywhere on the sheet, and which part of the sheet takes how many newtons."""
+
+import itertools
+import json
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from arm_oracle import STIFFNESS, paper_set
+from scipy.optimize import brentq
+from scipy.stats import binom
+
+from contactfpga.design.cover import Ball, cells_of
+from contactfpga.skin import Skin
+from contactfpga.tools import cli
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.arm import anywhere, places
+from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geometry
+from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.places import Peaks
+from contactfpga_sim.lab.arm.run import run
+from contactfpga_sim.lab.arm.world import Switches, pressed
+
+RUN = {"step_s": 25e-6, "lead_s": 0.25e-3, "duration_s": 0.03}
+RIGID = {"spread": 0.0, "travel_m": 0.0}
+
+
+def tiled(pitch_mm=6.4):
+    return Skin(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
+
+
+def tile_closes_n(x_mm, y_mm, pitch_mm, threshold_n):
+    """Force at which Hertz's pressure on the square tile around (0, 0) mm adds up to the threshold, point by point."""
+    middles = (np.arange(600) + 0.5) / 600 * pitch_mm - pitch_mm / 2
+    r2 = 1e-6 * np.add.outer((middles - y_mm) ** 2, (middles - x_mm) ** 2)
+
+    def above(force):
+        a2 = (0.75 * force * 0.038 / (0.75 * STIFFNESS / math.sqrt(0.038))) ** (2 / 3)
+        pressure = 1.5 * force / (math.pi * a2) * np.sqrt(np.maximum(0.0, 1 - r2 / a2))
+        return pressure.sum() * (1e-3 * pitch_mm / 600) ** 2 - threshold_n
+
+    return brentq(above, threshold_n / 2, 40.0)
+
+
+@pytest.mark.parametrize(("x_mm", "y_mm"), [(0.0, 0.0), (2.0, 1.3), (3.1, 3.1)])
+def test_a_touch_off_a_switch_under_tiles_against_a_second_integration(x_mm, y_mm):
+    case = BEST.case().but(switch=RIGID, touch=({"x_mm": 7 * 6.4 + x_mm, "y_mm": 7 * 6.4 + y_mm},), run=RUN)
+    found = run(case, "latency", latency_s=2.1e-3, skin=tiled())
+    closing = tile_closes_n(x_mm, y_mm, 6.4, 0.4)
+    assert found.course["force_n"][found.course["closed"].argmax()] == pytest.approx(closing, rel=0.05)
+    again = paper_set(force_to_close=closing, latency=2.1e-3)
+    assert found.outcome.closes_s == pytest.approx(again.closes_s, abs=50e-6)
+    assert found.outcome.reacts_s == pytest.approx(again.reacts_s, abs=1e-9)
+    assert found.outcome.peak_force_n == pytest.approx(again.peak_force_n, rel=2e-3)
+
+
+@pytest.mark.parametrize("face", ["flush, point force", "buttons", "tiles"])
+def test_a_lower_threshold_raises_no_touchs_peak(face):
+    forces = []
+    for threshold in (1.0, 0.4, 0.2):
+        case = Geometry(face, 10.0, threshold, 5.0).case()
+        (found,) = places._touched(places.Batch(case, Skin(), ((0.8e-3,),), 4, 0))
+        forces.append([force for force, _, _ in found])
+    assert all((np.array(lower) <= np.array(higher) + 1e-9).all() for higher, lower in itertools.pairwise(forces))
+    assert np.mean(forces[2]) < np.mean(forces[0]) - 0.5
+
+
+def test_a_longer_latency_raises_no_touchs_peak_and_the_limit_alone_is_the_worst():
+    found = places._touched(places.Batch(BEST.case(), tiled(), ((0.1e-3,), (3e-3,), (6e-3,), ()), 3, 1))
+    forces = np.array([[force for force, _, _ in way] for way in found])
+    assert (np.diff(forces, axis=0) >= 0).all()
+    assert [[limited for _, _, limited in way] for way in found] == [[False] * 3] * 3 + [[True] * 3]
+
+
+def test_places_phases_and_latencies_fill_their_ranges_evenly():
+    for seed in (0, 1, 5):
+        found = places.evenly(60, seed)
+        assert np.histogram2d(*found[:, :2].T, bins=5, range=((0, 1), (0, 1)))[0].min() >= 1
+        for dimension in range(2, 6):
+            assert (np.histogram(found[:, dimension], 60, (0, 1))[0] == 1).all()
+    assert (places.evenly(60, 0) != places.evenly(60, 1)).all()
+
+
+@pytest.mark.parametrize(("count", "low", "high"), [(16, 6, 9), (5, 0, 3), (4, 0, 3), (2, 0, 1), (1, 0, 0.5)])
+def test_places_lie_in_the_sheets_middle(count, low, high):
+    found = [places._place_mm(*shares, count, 8.0) / 8.0 for shares in np.random.default_rng(0).random((500, 2))]
+    assert low <= min(found) < low + 0.1
+    assert high - 0.1 < max(found) <= high
+
+
+def test_a_run_to_its_peak_has_the_whole_runs_peak():
+    case = BEST.case().but(run=RUN, touch=({"x_mm": 45.0, "y_mm": 44.0},))
+    for latency in (0.5e-3, 6e-3):
+        whole, short = (run(case, "latency", latency_s=latency, skin=tiled(), to_peak=early) for early in (False, True))
+        assert short.outcome.peak_force_n == whole.outcome.peak_force_n
+        assert len(short.course) < len(whole.course)
+
+
+def test_forces_between_those_looked_at_follow_the_cells_themselves():
+    case = Geometry("flush", 10.0, 1.0, 5.0).case().but(touch=({"x_mm": 83.0, "y_mm": 81.0},))
+    switches, ball = Switches(case, Skin()), Ball(0.038, 3.45e5 / 0.75)
+    for force in (0.5, 3.33, 17.1):
+        found = switches.forces_n((force,))
+        exact = force * pressed(cells_of(case.cover, 16, 16, 0.01, 0.01), 83.0, 81.0, ball.patch_m(force))
+        assert found == pytest.approx(exact, abs=2e-3 * exact.max())
+
+
+def halves(first, second, limited=0.0):
+    marks = np.arange(len(first)) < limited * len(first)
+    return [Peaks(np.asarray(one, float), np.full(len(one), 2e-3), marks) for one in (first, second)]
+
+
+def test_a_worst_value_that_another_seed_changes_gives_way_to_a_quantile():
+    even = np.linspace(5.0, 10.0, 60)
+    assert anywhere.worst_text(halves(even, even + 0.2)) == "10.2"
+    found = anywhere.worst_text(halves(even, np.append(even[:-1], 12.0)))
+    values = np.sort([*even, *even[:-1], 12.0])
+    low, high = (values[int(binom.ppf(share, 120, 0.95)) - 1 + after] for share, after in ((0.025, 0), (0.975, 1)))
+    value, low_said, high_said = (
+        float(word.strip("()")) for word in found.removeprefix("95 %: ").replace(" to ", " ").split()
+    )
+    assert value == pytest.approx(np.quantile(values, 0.95), abs=0.1)
+    assert low_said == pytest.approx(low, abs=0.1)
+    assert high_said == pytest.approx(high, abs=0.1)
+
+
+def made_up(newtons):
+    """Every geometry with the same mean for each way, but what ``newtons`` says."""
+    found = {}
+    for geometry in GEOMETRIES:
+        means = [newtons.get((geometry, way), newtons.get(geometry, 15.0)) for way in WAYS]
+        found[geometry] = [halves([mean] * 4, [mean] * 4) for mean in means]
+    return found
+
+
+def test_the_sentence_names_what_takes_the_most():
+    latency = {(PAPER, "6 ms"): 18.0, (PAPER, "pin"): 14.0}
+    for name, value, word in (("face", "tiles", "face"), ("threshold_n", 0.2, "threshold"), ("pitch_mm", 6.4, "pitch")):
+        found = made_up({PAPER._replace(**{name: value}): 10.0} | latency)
+        assert f"What matters most is the {word}" in anywhere.matters(found)
+        assert "-5.0 N" in anywhere.matters(found)
+    assert "What matters most is the latency: pin" in anywhere.matters(made_up(latency))
+
+
+def test_every_effect_changes_one_thing_alone():
+    for base in (PAPER, BEST):
+        assert base in GEOMETRIES
+        factors = [effect.factor for effect in anywhere.effects(made_up({}), base)]
+        assert set(factors) == {*anywhere.FACTORS.values(), "latency"}
+
+
+def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):
+    path = tmp_path / "tiles.toml"
+    path.write_text(
+        'like = "paper"\nmodel = "frictionless"\n[foam]\ncut = true\n[cap]\nside_m = 0.0058\n'
+        "[switch]\nforce_n = 0.4\ntravel_m = 0.2e-3\nspread = 0.1\n"
+    )
+    assert Case.load(path) == BEST.case().but(cap={"side_m": 0.0058})
+
+
+def test_two_touches_have_no_place_anywhere():
+    with pytest.raises(CaseError, match="--places 0"):
+        places.check(Case.load("paper").but(touch=({}, {"x_mm": 20.0})))
+
+
+@pytest.mark.slow
+def test_the_command_says_what_touches_anywhere_come_to(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr("contactfpga_sim.lab.arm.report.columns", lambda *given: {})
+    monkeypatch.setattr("contactfpga_sim.lab.arm.report.as_json", lambda *given: {})
+    assert cli.main(["study", "arm", "--json", "--places", "6", "--latency", "3", "--jobs", "1"]) == 0
+    known = json.loads(capsys.readouterr().out)["anywhere"]
+    assert list(known) == ["3 ms", "UART", "pin", "limit alone"]
+    forces = np.array([one["peak_force_n"] for one in known.values()])
+    assert forces.shape == (4, 6)
+    assert (forces[1] <= forces[0]).all()
+    assert (forces[2] <= forces[1] + 0.3).all()
+    assert all(known["limit alone"]["torque_limit_first"])
+
+
+@pytest.mark.slow
+def test_the_gateware_takes_no_longer_than_its_bounds():
+    from contactfpga_sim.lab.arm import sweep
+
+    case = Case.load("paper")
+    bounds = sweep.bounds_s(case, Skin())
+    for way, name in (("uart", "UART"), ("pin", "pin")):
+        found = places.measured_s(case, Skin(), way)
+        assert len(found) == places.INSTANTS
+        assert 0 < min(found) < max(found) <= bounds[name]
+
+
+def test_batches_of_several_cases_come_back_by_their_names(tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
+    tasks = {latency: places.batches(BEST.case(), tiled(), ((latency,),), 4) for latency in (1e-3, 5e-3)}
+    with ThreadPoolExecutor(1) as workers:
+        found = anywhere.many(tasks, workers)
+    assert [len(half.force_n) for half in found[1e-3][0]] == [2, 2]
+    assert anywhere.mean_n(found[1e-3][0]) < anywhere.mean_n(found[5e-3][0]) - 3
