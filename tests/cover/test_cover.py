@@ -335,7 +335,7 @@ def test_no_contact_closes_nothing():
         (lambda: medium.spread("sand", 1.0), r"medium is 'sand'; it must be one of halfspace, bonded, frictionless"),
         (lambda: point.force_n(SWITCH, -0.1, 5e-3), r"offset_m is -0.1; it must be a finite number, 0 m or above"),
         (lambda: point.reach_m(SWITCH, math.inf, 5e-3), r"force is inf; it must be a finite number above 0 N"),
-        (lambda: hertz.stress_pa(-1.0, 0.01, 0.0, 0.005), r"force_n is -1.0; it must be 0 N or above"),
+        (lambda: hertz.stress_pa(-1.0, 0.01, 0.0, 0.005), r"force_n is -1.0; it must be a finite number, 0 N or above"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

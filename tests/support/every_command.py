@@ -13,6 +13,7 @@ ARGUMENTS = {
     "mesh": "mesh.stl",
     "output": "table.npz",
     "scenes": "fingers",
+    "skin": "tiles.toml",
     "link": "arm",
     "points": "points.toml",
     "joint": "joint",

@@ -7,6 +7,7 @@ corrected where they are misprinted. K. L. Johnson, "Contact mechanics" (1985), 
 
 from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.cells import Cells, cells_of
+from contactfpga.design.cover.felt import Felt, Sheet, feel
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
 from contactfpga.design.cover.point import Switch
@@ -20,11 +21,14 @@ __all__ = [
     "Cover",
     "CoverError",
     "Ellipse",
+    "Felt",
     "Load",
     "NoSolution",
     "Part",
     "Rectangle",
+    "Sheet",
     "Switch",
     "cells_of",
+    "feel",
     "load_cover",
 ]

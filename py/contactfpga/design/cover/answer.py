@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
+
+Floats = NDArray[np.float64]
 
 MAX_LENGTH_M = 1.0
 """No thickness, pitch, offset or radius of a cover on a robot is longer: who writes 5 means mm."""
@@ -13,6 +18,10 @@ MAX_LENGTH_M = 1.0
 
 SMALLEST, LARGEST = 1e-12, 1e12
 """Of what a file says in SI units, 0 aside; powers of it are still numbers."""
+
+
+TINIEST, HUGEST = 1e-25, 1e25
+"""Of any number in SI units, 0 aside: the powers and products of such numbers that occur here are still numbers."""
 
 
 class CoverError(ContactFPGAError, ValueError):
@@ -30,21 +39,40 @@ class NoSolution:
 
 
 def positive(name: str, value: float, unit: str) -> float:
-    """``value`` if it is a finite number above 0; raises :class:`CoverError` otherwise."""
+    """``value`` if it is a number above 0 with which one can compute; raises :class:`CoverError` otherwise."""
     if not is_finite(value) or value <= 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number above 0 {unit}".rstrip())
-    return float(value)
+    if value < TINIEST:
+        raise CoverError(f"{name} is {shown(value)}; it must be at least {TINIEST:g} {unit}".rstrip())
+    return _below_hugest(name, value, unit)
 
 
 def not_negative(name: str, value: float, unit: str) -> float:
-    """``value`` if it is a finite number, 0 or above; raises :class:`CoverError` otherwise."""
+    """``value`` if it is 0 or a number above with which one can compute; raises :class:`CoverError` otherwise."""
     if not is_finite(value) or value < 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number, 0 {unit} or above".replace("  ", " "))
-    return float(value)
+    return _below_hugest(name, value, unit)
 
 
 def finite(name: str, value: float) -> float:
-    """``value`` if it is a finite number; raises :class:`CoverError` otherwise."""
+    """``value`` if it is a number with which one can compute; raises :class:`CoverError` otherwise."""
     if not is_finite(value):
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number")
+    return _below_hugest(name, value, "")
+
+
+def _below_hugest(name: str, value: float, unit: str) -> float:
+    if abs(value) > HUGEST:
+        raise CoverError(f"{name} is {shown(value)}; it must be at most {HUGEST:g} {unit}".rstrip())
     return float(value)
+
+
+def numbers(name: str, values: Floats | float, unit: str) -> Floats:
+    """An array of such numbers; raises :class:`CoverError` where one is none."""
+    try:
+        found = np.asarray(values, float)
+    except OverflowError:  # one of Python's whole numbers
+        found = np.asarray(np.inf)
+    if not (np.abs(found) <= HUGEST).all():
+        raise CoverError(f"{name} has a value that is no finite number, at most {HUGEST:g} {unit}".rstrip())
+    return found

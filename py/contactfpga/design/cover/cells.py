@@ -24,12 +24,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.design.cover import medium, point
-from contactfpga.design.cover.answer import CoverError
+from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.press import Cover, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
 """Parts of a pitch into which stress is resolved: two to the foam's thickness, six to a face, as far as so many do."""
+
+MOST_PITCHES = 20
+"""Thickness of the foam in pitches up to which forces are computed; they are the same for all switches long before."""
 
 BEYOND = 4.0
 """Thicknesses of foam beyond the sheet that are looked at."""
@@ -39,18 +42,21 @@ class Cells:
     """The switches of a sheet of ``rows`` by ``columns`` under a cover, the first one at (0, 0) m.
 
     ``seed`` draws the closing force of each switch where the cover's switch has a ``spread``. Raises CoverError for the
-    model ``patch``, which knows no force, and for caps wider than the pitch.
+    model ``patch``, which knows no force, for caps wider than the pitch, and for foam of more than
+    :data:`MOST_PITCHES`.
     """
 
     def __init__(self, cover: Cover, rows: int, columns: int, pitch_x_m: float, pitch_y_m: float, seed: int = 0):
         if cover.model == "patch":
             raise CoverError("model is 'patch', which knows no force; take one that goes by stress")
+        pitch = min(positive("pitch_x_m", pitch_x_m, "m"), positive("pitch_y_m", pitch_y_m, "m"))
         side = cover.side_m
-        if side > min(pitch_x_m, pitch_y_m) and cover.model != "point":
+        if side > pitch and cover.model != "point":
             what = "a cap" if cover.cap else "a switch's face"
-            raise CoverError(
-                f"{what} is {side:g} m wide; the pitch is {min(pitch_x_m, pitch_y_m):g} m, take a smaller one"
-            )
+            raise CoverError(f"{what} is {side:g} m wide; the pitch is {pitch:g} m, take a smaller one")
+        if cover.thickness_m > MOST_PITCHES * pitch:
+            most = f"at most {MOST_PITCHES} pitches, {MOST_PITCHES * pitch:g} m"
+            raise CoverError(f"thickness_m is {cover.thickness_m:g}; it must be {most}")
         self.cover = cover
         self.shape = (rows, columns)
         self._x, self._y = np.arange(columns) * pitch_x_m, np.arange(rows) * pitch_y_m
@@ -83,6 +89,8 @@ class Cells:
     def false_presses(self, acceleration_m_s2: float = 0.0, foam_kg_m3: float = 0.0) -> float:
         """Expected number of switches that close though nothing touches: preload and the weight of cap and foam, while
         the link is accelerated toward the sheet's outside, reach a closing force drawn from the normal distribution."""
+        finite("acceleration_m_s2", acceleration_m_s2)
+        not_negative("foam_kg_m3", foam_kg_m3, "kg/m3")
         cap = self.cover.cap
         tile = math.prod(self.cover.width_m(axis.pitch_m) for axis in self._axes)
         mass = (cap.mass_kg if cap else 0.0) + foam_kg_m3 * tile * self.cover.thickness_m

@@ -6,6 +6,7 @@ import math
 
 from contactfpga.design.cover.answer import CoverError, positive
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.inputs.values import is_finite, shown
 
 BETWEEN_SPHERES = 1.1
 CYLINDER_ON_PLANE = 1.5
@@ -78,6 +79,6 @@ def thickness_m(
 
 
 def _poisson(value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not -1 < value <= 0.5:
-        raise CoverError(f"poisson is {value!r}; it must lie above -1 and not above 0.5")
+    if not is_finite(value) or not -1 < value <= 0.5:
+        raise CoverError(f"poisson is {shown(value)}; it must lie above -1 and not above 0.5")
     return value

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from contactfpga.design.cover.answer import CoverError, positive
+from contactfpga.design.cover.answer import not_negative, numbers, positive
 from contactfpga.design.cover.point import Switch
 
 
@@ -51,6 +51,9 @@ class Ball:
 
 def on_axis_pa(force_n: float, patch_m: float, depth_m: float) -> float:
     """Normal stress in Pa right below the middle of a Hertz patch (Johnson (3.45b)): 3 F / (2 pi (a^2 + z^2))."""
+    not_negative("force_n", force_n, "N")
+    not_negative("patch_m", patch_m, "m")
+    positive("depth_m", depth_m, "m")
     return 1.5 * force_n / (math.pi * (patch_m**2 + depth_m**2))
 
 
@@ -63,10 +66,9 @@ def stress_pa(force_n: float, patch_m: float, offset_m: np.ndarray | float, dept
     """
     positive("patch_m", patch_m, "m")
     positive("depth_m", depth_m, "m")
-    if not force_n >= 0:
-        raise CoverError(f"force_n is {force_n!r}; it must be 0 N or above")
+    not_negative("force_n", force_n, "N")
     peak = 1.5 * force_n / (math.pi * patch_m**2)
-    excess = np.asarray(offset_m, float) ** 2 + depth_m**2 - patch_m**2
+    excess = numbers("offset_m", offset_m, "m") ** 2 + depth_m**2 - patch_m**2
     root = np.sqrt(excess**2 + (2 * patch_m * depth_m) ** 2)
     # The sum cancels inside the patch; the product of both roots is known.
     u = np.where(excess > 0, (root + excess) / 2, 2 * (patch_m * depth_m) ** 2 / (root + np.abs(excess)))

@@ -14,13 +14,16 @@ import math
 import numpy as np
 
 from contactfpga.design.cover import hertz, medium
-from contactfpga.design.cover.answer import NoSolution, not_negative, positive
+from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.numerics import Floats, legendre, root
 from contactfpga.design.cover.point import Switch
 
 WIDEST = 8.0
 """Patch radius over thickness up to which stresses are computed; Hertz stops holding at 1."""
+
+MOST_WIDE = 1e6
+"""Beyond, a patch has no stress to speak of."""
 
 TRIED = 96
 """Patches that are tried, evenly in the logarithm, for the first one under which the switch closes."""
@@ -34,8 +37,11 @@ def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: floa
     """
     if within == "halfspace":
         return float(hertz.stress_pa(force_n, patch_m, offset_m, thickness_m))
-    shape = _shape(within, patch_m / thickness_m, offset_m / thickness_m)
-    return not_negative("force_n", force_n, "N") / thickness_m**2 * shape
+    force, thickness = not_negative("force_n", force_n, "N"), positive("thickness_m", thickness_m, "m")
+    wide, away = positive("patch_m", patch_m, "m") / thickness, not_negative("offset_m", offset_m, "m") / thickness
+    if wide > MOST_WIDE:
+        raise CoverError(f"patch_m is {wide:g} times thickness_m; it must be at most {MOST_WIDE:g} times as much")
+    return force / thickness**2 * _shape(within, wide, away)
 
 
 def closing_n(ball: Ball, switch: Switch, offset_m: float, thickness_m: float, within: str) -> float | NoSolution:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactfpga.design.cover import medium
-from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
+from contactfpga.design.cover.answer import CoverError, NoSolution, finite, not_negative, numbers, positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,8 +56,9 @@ def stress_pa(
     sigma = F/h^2 g(rho/h) (:mod:`contactfpga.design.cover.medium`); over a half-space, (9): 3 F z^3 / (2 pi (rho^2 +
     z^2)^(5/2)). ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`.
     """
+    finite("force_n", force_n)
     positive("thickness_m", thickness_m, "m")
-    offset = np.asarray(offset_m, float)
+    offset = numbers("offset_m", offset_m, "m")
     return force_n / thickness_m**2 * medium.spread(within, offset / thickness_m)
 
 
@@ -77,7 +78,7 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
             f"{limit:.4g} on a point force on a {within} layer does not press it"
         )
     spread = medium.spread if within == "halfspace" else medium.exact_spread  # that is a closed form already
-    return switch.closing_pa * thickness_m**2 / float(spread(within, ratio))
+    return positive("the closing force", switch.closing_pa * thickness_m**2 / float(spread(within, ratio)), "N")
 
 
 def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:

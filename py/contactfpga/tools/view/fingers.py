@@ -40,6 +40,10 @@ class Touchable(Protocol):
         """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
 
     @property
+    def by_force(self) -> bool:
+        """Whether it depends on a finger's force which switches close."""
+
+    @property
     def pressed(self) -> np.ndarray:
         """(rows, columns) bool: the switches that are closed."""
 

@@ -13,6 +13,7 @@ import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from contactfpga.driver import driver, transport
 from contactfpga.driver.address import SheetOf, Sim
@@ -178,8 +179,9 @@ def _virtual(named: ViewRequest) -> Any:
     """A virtual board; with nothing named an untouched one of the Skin, or of the reference Skin at a slower clock."""
     if named.port is not None:
         return transport.virtual_board(named.port)
-    skin = Skin.load(named.skin) if named.skin is not None else Skin().replace(**SLOW)
-    return transport.virtual_board("sim://?scene=nothing", skin)
+    if named.skin is not None:  # with its cover and its circuit
+        return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")
+    return transport.virtual_board("sim://?scene=nothing", Skin().replace(**SLOW))
 
 
 def browse(url: str) -> None:

@@ -89,7 +89,7 @@ class Panel:
             low, high = round(0.75 * pitch_mm, 1), round(4 * pitch_mm, 1)
             radius = server.gui.add_slider("finger mm", low, high, 0.1, min(max(hand.radius_mm, low), high))
             force = None
-            if self._source.cells is not None:
+            if self._source.cells is not None or hand.board.by_force:
                 force = server.gui.add_slider("force N", 0.5, MOST_N, 0.1, hand.force_n)
             lift = server.gui.add_button("Lift all")
         radius.on_update(lambda _: hand.resize(radius_mm=radius.value))

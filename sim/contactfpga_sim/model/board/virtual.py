@@ -113,6 +113,11 @@ class VirtualBoard:
             self.advance(cycles)
             left -= cycles
 
+    @property
+    def by_force(self) -> bool:
+        """Whether it depends on a finger's force which switches close: there is a cover that goes by stress."""
+        return self._cover is not None and self._cover.model != "patch"
+
     def touch(self, fingers: Iterable[RoundContact]) -> None:
         """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
         placed = [
@@ -205,7 +210,7 @@ def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheet
         if address.units is not None:
             units = LoadCells.load(address.units)
         scene = _compared(address.scene, address.threshold)
-        return VirtualBoard(skin, scene, cover if address.threshold is None else None, circuit, units=units)
+        return VirtualBoard(skin, scene, cover, circuit, units=units)
     except ValueError as error:  # a scene that is not known, or that does not fit the sheet
         raise PortNotFound(f"{name}: {error}") from None
 
