@@ -42,6 +42,7 @@ COUNTS = {
     "sole": {2},
     "edge": {1},
     "moving": {1},
+    "finger": {1},
 }
 
 
@@ -94,6 +95,21 @@ def test_gaps_are_as_asked_for(gap):
         for one, other in itertools.combinations(parts, 2):
             apart = np.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
             assert apart * 1e3 >= (one.half_x_m + other.half_x_m) * 1e3 + gap - 1e-9
+
+
+def test_a_finger_is_one_of_the_fingers_and_may_have_a_size():
+    radii = [
+        (part.half_x_m, part.half_y_m)
+        for scene in placements("finger", 20, 5, FINE, half_mm=(7.0, 7.0), ratio=(1.0, 1.0))
+        for part in scene.loads(0.0)[0].parts
+    ]
+    assert np.allclose(radii, 7e-3)
+    for family in ("finger", "fingers"):
+        loads = [load for scene in placements(family, 150, 5, FINE) for load in scene.loads(0.0)]
+        halves = [load.parts[0].half_x_m * 1e3 for load in loads]
+        ratios = [load.parts[0].half_y_m / load.parts[0].half_x_m for load in loads]
+        for values, (low, high) in ((halves, (5, 10)), (ratios, (0.6, 1)), ([load.force_n for load in loads], (2, 20))):
+            assert low <= min(values) < low + 0.1 * (high - low) < high - 0.1 * (high - low) < max(values) <= high
 
 
 def test_a_moving_finger_has_its_speed():

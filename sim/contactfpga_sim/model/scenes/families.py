@@ -22,6 +22,9 @@ from contactfpga_sim.model.scenes.scene import Scene, sheet
 FINGER_MM = 6.0
 """Radius of the fingers of a pair."""
 
+HALF_MM, RATIO = (5.0, 10.0), (0.6, 1.0)
+"""Half the length of a finger's ellipse, from the least to the greatest, and its width over its length."""
+
 TRIES = 200
 """Places that are tried for one more finger, before the scene stays without it."""
 
@@ -78,9 +81,7 @@ def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scen
     placed: list[tuple[float, float, float]] = []
     found = []
     for _ in range(int(rng.integers(2, most + 1))):
-        long = rng.uniform(5, 10)
-        shape, angle = contacts.ellipse(long, long * rng.uniform(0.6, 1)), rng.uniform(0, 180)
-        force = rng.uniform(2, 20)
+        long, shape, angle, force = _finger(rng)
         turned = tuple(part.placed(0.0, 0.0, math.radians(angle)) for part in shape)
         for _ in range(TRIES):
             x, y = place(rng, skin, turned)
@@ -89,6 +90,22 @@ def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scen
                 found.append(Contact(shape=shape, x_mm=x, y_mm=y, angle_deg=angle, force_n=force))
                 break
     return Scene(tuple(found))
+
+
+def finger(
+    rng: Random, skin: Skin, half_mm: tuple[float, float] = HALF_MM, ratio: tuple[float, float] = RATIO
+) -> Scene:
+    """One finger as in :func:`fingers`; ``half_mm``: from which to which half length, ``ratio``: of its width to it."""
+    _, shape, angle, force = _finger(rng, half_mm, ratio)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force),))
+
+
+def _finger(
+    rng: Random, half_mm: tuple[float, float] = HALF_MM, ratio: tuple[float, float] = RATIO
+) -> tuple[float, Shape, float, float]:
+    """Half length in mm, shape, angle in degrees and force in N."""
+    long = rng.uniform(*half_mm)
+    return long, contacts.ellipse(long, long * rng.uniform(*ratio)), rng.uniform(0, 180), rng.uniform(2, 20)
 
 
 def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGER_MM) -> Scene:
@@ -132,7 +149,7 @@ def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
 
 
 FAMILIES: dict[str, Callable[..., Scene]] = {
-    family.__name__: family for family in (bumper, fingers, pair, palm, sole, edge, moving)
+    family.__name__: family for family in (bumper, fingers, pair, palm, sole, edge, moving, finger)
 }
 """Every family by its name; its options are its keyword arguments."""
 
