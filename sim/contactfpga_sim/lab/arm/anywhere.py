@@ -270,11 +270,13 @@ def matters(found: Mapping[Geometry, Found]) -> str:
     first, *others = sorted(least.values(), key=lambda effect: effect.newtons)
     told = [f"{one.factor.partition(',')[0]} {one.after} {one.newtons:+.1f} N" for one in others]
     before, after = (found[base][WAYS.index("UART")] for base in (PAPER, BEST))
+    latency = next(one for one in effects(found, BEST) if one.factor == "latency")
     return (
         f"**What matters most is the {first.factor.partition(',')[0]}: {first.after} in place of "
         f'"{first.before}" change the mean peak force over touches anywhere by {first.newtons:+.1f} N**; '
-        f"{', '.join(told)}, each changed alone from the paper's sheet. All that is best together, tiles "
-        f"{BEST.pitch_mm:g} mm apart on switches of {BEST.threshold_n:g} N: {mean_n(after):.1f} N in the mean and "
-        f"{worst_text(after)} N at worst, the torque limit first at {_limited(after)}; "
-        f"the paper's sheet: {mean_n(before):.1f} N, {worst_text(before)} N, {_limited(before)}."
+        f"{', '.join(told)}, each changed alone from the paper's sheet. Tiles {BEST.pitch_mm:g} mm apart on switches "
+        f"of {BEST.threshold_n:g} N: {mean_n(after):.1f} N in the mean and {worst_text(after)} N at worst by UART, the "
+        f"torque limit first at {_limited(after)}; the paper's sheet: {mean_n(before):.1f} N, {worst_text(before)} N, "
+        f"{_limited(before)}. With these tiles latency from {latency.before} to the {latency.after} "
+        f"changes the mean by {latency.newtons:+.1f} N."
     )
