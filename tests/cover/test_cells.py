@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from foam import FoamOnCaps
 from hypothesis import given
 from hypothesis import strategies as st
 
 from contactfpga.design.cover import Cap, Cells, Cover, CoverError, Ellipse, Load, Rectangle, Switch, point
 from contactfpga.design.cover.press import read_cover, write_cover
+from contactfpga_sim.lab.cover.elements import FoamOnCaps
 
 PITCH = 10e-3
 PLACES = {"on a cap": (45.0, 45.0), "between two": (40.0, 45.0), "between four": (40.0, 40.0), "aside": (42.0, 43.0)}

@@ -2,14 +2,17 @@
 
 import dataclasses
 import json
+import re
+import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import Skin, SkinError, examples
-from contactfpga.design.cover import Cover, CoverError, Switch, load_cover
-from contactfpga.design.cover.press import write_cover
+from contactfpga.design.cover import Cap, Cover, CoverError, Switch, load_cover
+from contactfpga.design.cover.press import read_cover, write_cover
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
 REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
@@ -251,3 +254,28 @@ def test_a_value_that_cannot_be_is_named_with_its_file(tmp_path):
     with pytest.raises(SkinError) as caught:
         Skin.load(path)
     assert str(caught.value) == f"{path}: rows is 0; it must lie between 1 and 64"
+
+
+@pytest.mark.parametrize(("table", "kind"), [("cover", Cover), ("cover.cap", Cap), ("cover.switch", Switch)])
+def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
+    page = (Path(__file__).resolve().parents[2] / "docs/skin.md").read_text(encoding="utf-8")
+    (rows,) = re.findall(rf"^\| `\[{re.escape(table)}\]` .*\n\|[-|]+\|\n((?:\|.*\n)+)", page, re.MULTILINE)
+    told = dict(re.findall(r"^\| `(\w+)` \|[^|]*\| ?([^|]*?) ?\|", rows, re.MULTILINE))
+    fields = {field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap")}
+    assert told.keys() == fields.keys()
+    for name, default in fields.items():
+        if default is None:
+            assert told[name] == "none"
+        elif default is dataclasses.MISSING:
+            assert told[name] == ""
+        else:
+            assert tomllib.loads(f"x = {told[name].strip('`')}")["x"] == default
+
+
+def test_the_example_of_tiles_is_the_cover_of_the_page():
+    page = (Path(__file__).resolve().parents[2] / "docs/skin.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(\[cover\]\n.*?)```", page, re.DOTALL)
+    assert read_cover(tomllib.loads(text)["cover"]) == load_cover(examples() / "tiles.toml")
+    skin = Skin.load(examples() / "tiles.toml")
+    assert (skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, skin.connectivity) == (16, 16, 6.4, 6.4, 4)
+    assert skin == Skin(pitch_x_mm=6.4, pitch_y_mm=6.4, connectivity=4)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from study_pages import outdated, section
 
-from contactfpga.design.cover import Ball
+from contactfpga.design.cover import Ball, Cap, Cover
+from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M
 from contactfpga.design.cover.sense import LADDER
 from contactfpga.design.cover.task import FOAMS
-from contactfpga_sim.lab.cover import formulas, pictures, tables
+from contactfpga_sim.lab.cover import caps, formulas, pictures, tables
 from contactfpga_sim.lab.registry import StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -25,7 +26,7 @@ def cells(table):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
 
 
-@pytest.mark.parametrize("name", ["paper", "foams", "thinning"])
+@pytest.mark.parametrize("name", ["paper", "foams", "thinning", "sags"])
 def test_tables_without_times_are_up_to_date(name):
     assert not outdated("cover", name)
 
@@ -38,6 +39,41 @@ def test_errors_in_the_other_tables_are_up_to_date(name):
 
     assert comparable(section("cover.md", name)) == comparable(RUN.text(name))
     assert all(row[-1].endswith(" µs") for row in cells(section("cover.md", name))[2:])
+
+
+def test_the_largest_errors_against_the_boundary_elements_are_those_that_the_page_states():
+    rows = [[float(cell.split()[0]) for cell in row] for row in cells(section("cover.md", "elements"))[2:]]
+    assert len(rows) == len(caps.THICKNESSES_MM) * len(caps.SIDES_MM)
+    assert max(abs(flush) for _, _, flush, *_ in rows) < 2
+    assert all(abs(error) < 13 for _, side, _, *errors in rows for error in errors if side >= 6)
+    assert max(rigid for _, side, _, rigid, _ in rows if side == 4) > 20
+    error = caps._off(5.0, 8.0, math.inf, proud=False)
+    assert f"{100 * error:+.1f} %" == cells(section("cover.md", "elements"))[2 + 6][2]
+
+
+def test_proud_caps_close_lighter_than_flush_faces():
+    """The finding of the page's first part, by its table."""
+    found = {(row[0], row[1].split()[0], row[1].split()[1]): row for row in cells(section("cover.md", "closes"))[2:]}
+    for pitch in ("10 mm", "6.4 mm"):
+        flush, tiles = (float(found[pitch, *name][5].split()[0]) for name in (("flush", "face"), ("tiles:", "the")))
+        assert flush > 3 * tiles
+    assert float(found["6.4 mm", "tiles:", "the"][8].split()[0]) <= 2.0
+    assert f"The table has {found['10 mm', 'flush', 'face'][5]} for a finger" in PAGE
+    button, too_much = (float(found["10 mm", "proud", "button"][5].split()[0]), 1.24)
+    assert "5 mm | 4 mm | -0.2 % | +24.0 %" in section("cover.md", "elements")
+    assert 4 < too_much * button < 5
+    assert "the model would say 4 to 5 N" in PAGE
+
+
+def test_a_strip_sags_as_a_clamped_beam_does():
+    """Ten times as thick, it shears alone; ten times as long, it bends."""
+    thick = Cover("frictionless", 0.1, cap=Cap(5e-3), poisson=0.0, modulus_pa=1e5)
+    thin = Cover("frictionless", 1e-4, cap=Cap(5e-3), poisson=0.0, modulus_pa=1e5)
+    pressed = math.pi / 4 * LENGTH_M * WIDTH_M
+    by_shear = 1e-4 / (6 / 5 * 5e-3**2 / (8 * 5e4 * 0.1))
+    by_bending = 1e-4 / (5e-3**4 / (32 * 1e5 * 1e-4**3))
+    assert caps.sagging_n(thick, 10e-3, 1e-4) == pytest.approx(by_shear * pressed, rel=0.01)
+    assert caps.sagging_n(thin, 10e-3, 1e-4) == pytest.approx(by_bending * pressed, rel=0.01)
 
 
 def test_rules_that_are_offered_hold():
@@ -102,7 +138,7 @@ def test_a_time_is_measured():
 @pytest.mark.slow
 def test_the_pictures(tmp_path):
     drawn = sorted(file.name for file in tables.draw(tmp_path))
-    assert drawn == ["cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-study.svg"]
+    assert drawn == ["cover-caps.svg", "cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-study.svg"]
     assert drawn == sorted(file.name for file in tmp_path.glob("*.svg"))
 
 

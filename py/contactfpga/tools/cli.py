@@ -33,7 +33,7 @@ COMMANDS = {
     "publish": "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one.",
     "ros": "Publish contacts as ROS 2 topics, with no ROS installed.",
     "settle": "Compute the times that the circuit of a sheet needs.",
-    "cover": "Compute the soft cover: impact, sensitivity and design.",
+    "cover": "Compute the soft cover: touches felt, impact, sensitivity and design.",
     "haptics": "Compute forces at contacts from pressure units; set their zeros and thresholds.",
     "fit": "Find the cheapest Skin that is good enough for given scenes.",
     "study": "Run one of the studies: speed against accuracy, failures, flipped bits, the arm.",

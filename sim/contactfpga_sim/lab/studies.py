@@ -87,8 +87,11 @@ _ALL = (
         "cover",
         title="Formulas for covers of foam against integrals and the paper",
         page="cover.md",
-        minutes=1,
+        minutes=3,
         sections={
+            "closes": Section("caps:felt_table", sample="caps:felt_sample"),
+            "elements": Section("caps:elements_table"),
+            "sags": Section("caps:sagging_table", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", sample="tables:paper_table"),
             "rules": Section("tables:rules_table"),
             "failing": Section("tables:failing_table"),

@@ -12,7 +12,8 @@ that shears and bends (Timoshenko). The forces Q on the caps are those on rigid 
 (1 + L/k) Q = T: k the switch's stiffness, L the strips' stiffness as a discrete Laplacian.
 
 What this leaves out: what presses keeps its pressure whatever gives way; caps do not tilt; nothing carries the foam
-that sags between proud caps. A boundary-element solution in ``tests/cover`` says by how much that is off.
+that sags between proud caps. Boundary elements say by how much that is off, on
+the page on the cover.
 """
 
 from __future__ import annotations

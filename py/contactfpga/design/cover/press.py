@@ -29,7 +29,7 @@ SHEAR = 6 / 5
 
 GIVES = 0.75
 """Thicknesses of foam by which a strip between two caps is longer than the gap, as the foam on the caps gives way, too:
-fitted to the boundary-element solution in ``tests/cover`` for caps of 0.6 to 0.9 of the pitch under 2 and 5 mm."""
+fitted to boundary elements for caps of 0.6 to 0.9 of the pitch under 2 and 5 mm."""
 
 GRID = 16
 """A switch's face is looked at in this many by this many points where a share of it has to be covered."""

@@ -1,11 +1,15 @@
-"""An elastic layer on rigid caps, by boundary elements: what the cover's rules of thumb are held against.
+"""An elastic layer on rigid caps, by boundary elements: what :class:`contactfpga.design.cover.Cells` is held against.
 
 The layer is free of friction above and below. By wave number k, with t = k h/2 and E' = E/(1 - nu^2), equal pressures p
 on both faces move each inward by 2 p/(E' k) sinh^2 t/(sinh t cosh t + t), opposite ones both along by
 2 p/(E' k) cosh^2 t/(sinh t cosh t - t). Lengths in mm, forces in N; the sheet repeats itself beyond its edges.
 """
 
+from __future__ import annotations
+
 import numpy as np
+
+from contactfpga.design.cover.numerics import Floats
 
 STEP = 0.5
 """Side of an element."""
@@ -18,7 +22,17 @@ class FoamOnCaps:
     else it lies on a rigid base there.
     """
 
-    def __init__(self, thickness, side, pitch=10.0, count=8, modulus=0.345, poisson=0.3, stiffness=np.inf, proud=True):
+    def __init__(
+        self,
+        thickness: float,
+        side: float,
+        pitch: float = 10.0,
+        count: int = 8,
+        modulus: float = 0.345,
+        poisson: float = 0.3,
+        stiffness: float = np.inf,
+        proud: bool = True,
+    ):
         size = round(count * pitch / STEP)
         place = (np.arange(size) + 0.5) * STEP
         self.place, self.count, self.give = place, count, 0.0 if np.isinf(stiffness) else 1 / stiffness
@@ -36,19 +50,19 @@ class FoamOnCaps:
         confined = modulus * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
         self.equal[0, 0], self.opposite[0, 0] = thickness / 2 / confined, 0.0
 
-    def ellipse(self, x, y, half_x, half_y, force):
-        """Hertz's pressure on an ellipse."""
+    def ellipse(self, x: float, y: float, half_x: float, half_y: float, force: float) -> Floats:
+        """Hertz's pressure on an ellipse, in N/mm2."""
         square = ((self.place - x) / half_x) ** 2 + ((self.place[:, None] - y) / half_y) ** 2
         found = np.sqrt(np.maximum(0.0, 1 - square))
         return force * found / (found.sum() * STEP**2)
 
-    def forces(self, pressure):
+    def forces(self, pressure: Floats) -> Floats:
         """(count, count) N on each cap under a pressure in N/mm2."""
         found = self._solved(pressure)[self.cap >= 0]
         total = np.bincount(self.cap[self.cap >= 0], found * STEP**2, self.count**2)
-        return total.reshape(self.count, self.count)
+        return np.asarray(total, float).reshape(self.count, self.count)
 
-    def _solved(self, pressure):
+    def _solved(self, pressure: Floats) -> Floats:
         """The pressure below, by conjugate gradients: all that is held moves along, but for what the switches give."""
         below = np.where(self.held, pressure.sum() / self.held.sum(), 0.0)
         rest = self._free(self._moves(pressure, below) - self._given(below))
@@ -64,16 +78,16 @@ class FoamOnCaps:
             step = rest + size / before * step
         raise AssertionError("the conjugate gradients did not converge")
 
-    def _free(self, moved):
+    def _free(self, moved: Floats) -> Floats:
         """Without the part in common, which is how deep the layer as a whole lies."""
         return np.where(self.held, moved - moved[self.held].mean(), 0.0)
 
-    def _moves(self, above, below):
+    def _moves(self, above: Floats, below: Floats) -> Floats:
         """How far the lower face moves down."""
         top, bottom = np.fft.fft2(above), np.fft.fft2(below)
         return np.fft.ifft2(self.opposite * (top - bottom) / 2 - self.equal * (top + bottom) / 2).real
 
-    def _given(self, below):
+    def _given(self, below: Floats) -> Floats:
         on = self.cap >= 0
         total = np.bincount(self.cap[on], below[on] * STEP**2, self.count**2)
         found = np.zeros(below.shape)
