@@ -53,6 +53,8 @@ _ALL = (
         sections={
             "front": Section("tables:front_table"),
             "host": Section("tables:host_table"),
+            "floor": Section("limits:floor_table"),
+            "other_ways": Section("limits:rivals_section"),
         },
         compute="tables:compute",
         pictures="tables:draw",
