@@ -45,7 +45,7 @@ def bare_floor_mm(radius, pitch, steps=90):
     distance = count = 0
     for one, pattern in enumerate(patterns):
         middle = switches[pattern].mean(axis=0) if pattern.any() else (-1, -1)
-        if (min(middle) >= 0) and max(middle) < pitch:
+        if min(middle) >= 0 and max(middle) < pitch:
             same = np.column_stack([x, y])[number.ravel() == one]
             distance += minimize(lambda place, same=same: np.hypot(*(same - place).T).sum(), same.mean(axis=0)).fun
             count += len(same)

@@ -1,1 +1,1 @@
-"""What a frame says of the sheet: zones, many frames as arrays, labels and ghosts found on the host."""
+"""What a frame says of the sheet: zones, their places, many frames as arrays, labels and ghosts found on the host."""

@@ -58,6 +58,8 @@ _ALL = (
             "families": Section("tables:families_table"),
             "methods": Section("tables:methods_table"),
             "host": Section("tables:host_table"),
+            "floor": Section("limits:floor_table"),
+            "other_ways": Section("limits:rivals_section"),
         },
         compute="tables:compute",
         pictures="tables:draw",

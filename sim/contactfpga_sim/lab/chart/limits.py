@@ -1,0 +1,134 @@
+"""Tables for the chart's page: the least error of any method, and other ways to read a sheet."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_sim.lab import pool, writer
+from contactfpga_sim.lab.chart import errors
+from contactfpga_sim.lab.chart.errors import Interval
+from contactfpga_sim.lab.chart.floor import Floor, floor
+from contactfpga_sim.lab.chart.methods import EXTENT_MM
+from contactfpga_sim.lab.chart.rivals import RIVALS
+from contactfpga_sim.lab.covers import COVERS
+from contactfpga_sim.model.scenes.families import touches
+
+PITCHES_MM = (5.0, 6.4, 8.0, 10.0)
+SCENES = 4000
+"""For each floor."""
+
+KNOWN_MM = 7.0
+"""Radius of the finger whose size is known."""
+
+CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
+    "finger": ("finger", {}, tuple(COVERS)),
+    f"round finger, {KNOWN_MM:g} mm": (
+        "finger",
+        {"half_mm": (KNOWN_MM, KNOWN_MM), "ratio": (1.0, 1.0)},
+        ("bare", "tiles"),
+    ),
+    "bumper": ("bumper", {}, ("bare", "tiles")),
+}
+"""By name: family, its options, and the covers under which it is looked at."""
+
+RIVAL_PITCHES_MM = (6.4, 10.0)
+TOUCHES = 300
+"""For each rival."""
+
+
+def floor_table() -> str:
+    """The floor by contact, cover and pitch."""
+    head = (
+        "contact",
+        "cover",
+        "pitch",
+        "felt",
+        "barycenter",
+        "floor, between",
+        "table of places",
+        "saved by the table",
+    )
+    rows = [
+        (name, cover, pitch)
+        for name, (_, _, covers) in CONTACTS.items()
+        for cover, pitch in itertools.product(covers, PITCHES_MM)
+    ]
+    with pool.executor() as executor:
+        found = executor.map(measured, *zip(*rows, strict=True))
+        return writer.table(head, [_floor_line(*row, one) for row, one in zip(rows, found, strict=True)])
+
+
+def measured(name: str, cover: str, pitch_mm: float, count: int = SCENES) -> Floor:
+    """One of the table."""
+    family, options, _ = CONTACTS[name]
+    skin = Skin(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
+    return floor(family, skin, COVERS[cover](pitch_mm), count, 0, **options)
+
+
+def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
+    saved = 1 - found.table_mm.mean / found.barycenter_mm.mean
+    return writer.line(
+        (
+            name, cover, f"{pitch_mm:g} mm", _share(found.felt), _length(found.barycenter_mm),
+            f"{found.lower_mm.mean:.2f} ({found.lower_mm.low:.2f}) and {found.upper_mm.mean:.2f}"
+            f" ({found.upper_mm.high:.2f}) mm",
+            _length(found.table_mm), f"{round(100 * saved)} %",
+        )
+    )  # fmt: skip
+
+
+def rivals_table() -> str:
+    """Each rival on two pitches of tiles, for the family of several fingers."""
+    head = (
+        "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
+    )  # fmt: skip
+    rows = list(itertools.product(RIVALS, RIVAL_PITCHES_MM))
+    with pool.executor() as executor:
+        return writer.table(head, list(executor.map(rival_line, *zip(*rows, strict=True))))
+
+
+def rival_line(name: str, pitch_mm: float, count: int = TOUCHES) -> str:
+    """One line of :func:`rivals_table`."""
+    rival, cover = RIVALS[name], COVERS["tiles"](pitch_mm)
+    lines = round(EXTENT_MM / pitch_mm)
+    # On tiles of their own, cells that share a corner only are not joined.
+    skin = Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, connectivity=4)
+    scenes = touches("fingers", count, 0, skin)
+    rng = np.random.default_rng(0)
+    found = [rival.errors(scene, skin, cover) for scene in scenes]
+    times = np.array([rival.time_us(scene, skin, cover, rng) for scene in scenes]) / 1e3
+    median, late = np.quantile(times, (0.5, 0.95), method="inverted_cdf")
+    means = {key: errors.interval([float(getattr(one, key)) for one in found]) for key in errors.METRICS}
+    return writer.line(
+        (
+            name, f"{pitch_mm:g} mm", _share(means["miscounted"]), _share(means["missed"]),
+            _length(means["barycenter_mm"]), f"{median:.1f} / {late:.1f} ms", str(rival.wires(skin)),
+            f"{rival.cost_usd(skin):.0f} USD",
+        )
+    )  # fmt: skip
+
+
+def rivals_notes() -> str:
+    """What each model assumes."""
+    notes: dict[str, list[str]] = {}
+    for name, rival in RIVALS.items():
+        notes.setdefault(rival.note, []).append(name)
+    return "\n".join(f"- {', '.join(names)}: {note}." for note, names in notes.items())
+
+
+def rivals_section() -> str:
+    """Table and assumptions."""
+    return f"{rivals_table()}\n\n{rivals_notes()}"
+
+
+def _share(one: Interval) -> str:
+    low, high = max(0.0, one.low), min(1.0, one.high)
+    return f"{100 * one.mean:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def _length(one: Interval) -> str:
+    return f"{one.mean:.2f} mm ({one.low:.2f} to {one.high:.2f})"

@@ -1,0 +1,271 @@
+"""Other ways to read a sheet, as models under the same mechanics: no real device was measured.
+
+Each looks at the same scenes through the same cover. What an element of an analog array reads, how long a
+microcontroller takes and what parts cost are assumptions; each one has its name here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import zlib
+from collections.abc import Callable
+
+import numpy as np
+
+from contactfpga.design.cover import Cap, Cover, Switch, cells_of
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import CHECK_BYTES
+from contactfpga.zones import labels
+from contactfpga_sim.lab.chart import errors
+from contactfpga_sim.lab.chart.errors import Blob
+from contactfpga_sim.model.scenes.scene import Scene
+
+Random = np.random.Generator
+Readings = Callable[[Scene, float, Skin, Cover | None, Random], np.ndarray]
+"""(R, C) readings of a scene at a time in s, above 0 where an element is touched."""
+
+STRIPS = 4
+"""Groups of rows, each of which is looked at in the middle of its time."""
+
+HALVINGS = 14
+"""Of the time in which forces rise, until it is known when the first element is touched."""
+
+# ---- an analog array
+
+BITS = 8
+FULL_N = 10.0
+"""Force on an element that gives the greatest reading."""
+NOISE_COUNTS = 1.0
+"""Standard deviation of a reading, in steps of the converter."""
+CROSSTALK = 0.01
+"""Share of an element's force that each of its four neighbors reads."""
+GAIN_SPREAD = 0.05
+"""Relative standard deviation of the elements' gains, once calibrated."""
+THRESHOLD_N = 0.4
+"""From which on an element is touched: the closing force of the studies' domes."""
+HEAD_BYTES = 4
+"""Of an array's frame, in front of a byte for each element."""
+
+# ---- a microcontroller: 64 pins, about 50 of them for lines; USB is full speed
+
+MCU_HZ = 100e6
+ROW_CYCLES = 60
+"""To drive a row, wait for it apart, and read a port or two."""
+CELL_CYCLES = 15
+"""To store and label a cell in software."""
+SEND_CYCLES = 500
+"""To make a frame and hand it to the UART or the USB peripheral, which sends it while the next scan runs."""
+USB_SLOT_US, USB_BIT_US = 1000.0, 1 / 12
+
+# ---- rough prices of parts in USD, boards and the elements themselves not counted: assumed, no offers
+
+FPGA_USD, MCU_USD, CONVERTER_USD = 8.0, 4.0, 6.0
+DIODE_USD, AMPLIFIER_USD = 0.02, 0.8
+
+
+@dataclasses.dataclass(frozen=True)
+class Pace:
+    """Times in us of a method on a sheet; scans follow one another, and of those that are ready the newest is sent."""
+
+    scan_us: float
+    """From the first row to the last, spread evenly."""
+    work_us: float
+    """From a scan's end until its frame can be sent."""
+    loop_us: float
+    """From a scan to the next."""
+    wire_us: float
+    """That a frame is on the wire."""
+    slot_us: float = 0.0
+    """Between two instants at which a frame may be sent; 0: at any."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rival:
+    """A model of another way to read a sheet."""
+
+    note: str
+    """What is assumed."""
+    readings: Readings
+    pace: Callable[[Skin], Pace]
+    cost_usd: Callable[[Skin], float]
+    """Rough, of parts."""
+
+    def wires(self, skin: Skin) -> int:
+        """Lines of the sheet."""
+        return skin.rows + skin.columns
+
+    def zones(self, scene: Scene, skin: Skin, cover: Cover | None) -> list[Blob]:
+        """What it finds once all forces have risen; noise goes by the scene."""
+        rng = np.random.default_rng(zlib.crc32(repr(scene).encode()))
+        return _blobs(self.readings(scene, scene.settled_s, skin, cover, rng), skin)
+
+    def errors(self, scene: Scene, skin: Skin, cover: Cover | None) -> errors.Errors:
+        """Against what touches the sheet by then."""
+        there = errors.contacts(scene.truth(scene.settled_s, skin))
+        return errors.errors(self.zones(scene, skin, cover), there)
+
+    def time_us(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
+        """From the first touch of the foam, at 0 s of a scene whose forces rise, to the last byte on the host of the
+        first frame that reports a contact; infinite where none does. ``rng`` draws where in its round the scan is."""
+        first_s = self._first_s(scene, skin, cover, rng)
+        if not math.isfinite(first_s):
+            return math.inf
+        pace = self.pace(skin)
+        late, slot = rng.random() * pace.loop_us, rng.random() * pace.slot_us
+        latest = pace.scan_us + pace.work_us - late  # when the scan with number 0 is ready
+        number = max(0, math.floor((first_s * 1e6 + late) / pace.loop_us) - 1)
+        free = number * pace.loop_us + rng.random() * pace.wire_us
+        end = scene.settled_s * 1e6 + 20 * (pace.loop_us + pace.wire_us + pace.slot_us)
+        while free < end:
+            ready = max(free, number * pace.loop_us + latest)
+            sent = slot + math.ceil((ready - slot) / pace.slot_us) * pace.slot_us if pace.slot_us else ready
+            number = max(number, math.floor((sent - latest) / pace.loop_us))
+            free = sent + pace.wire_us
+            if self._scanned(scene, number * pace.loop_us - late, pace.scan_us, skin, cover, rng).any():
+                return free
+            number += 1
+        return math.inf
+
+    def _first_s(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
+        """When the first element is touched, as good as noise allows; infinite where none ever is."""
+
+        def touched(seconds: float) -> bool:
+            return bool(self.readings(scene, seconds, skin, cover, rng).any())
+
+        before, first = 0.0, scene.settled_s
+        if not touched(first):
+            return math.inf
+        for _ in range(HALVINGS if first else 0):
+            middle = (before + first) / 2
+            before, first = (before, middle) if touched(middle) else (middle, first)
+        return before
+
+    def _scanned(
+        self, scene: Scene, begin_us: float, scan_us: float, skin: Skin, cover: Cover | None, rng: Random
+    ) -> np.ndarray:
+        """(R, C) readings of a scan that begins then."""
+        found = np.zeros((skin.rows, skin.columns))
+        for number, rows in enumerate(np.array_split(np.arange(skin.rows), STRIPS)):
+            seconds = (begin_us + (number + 0.5) / STRIPS * scan_us) * 1e-6
+            if len(rows) and seconds >= 0:
+                found[rows] = self.readings(scene, seconds, skin, cover, rng)[rows]
+        return found
+
+
+def _blobs(readings: np.ndarray, skin: Skin) -> list[Blob]:
+    """Connected pieces of what is touched, in their middles, weighted by the readings."""
+    numbers = labels.label(readings > 0, skin.connectivity).ravel()
+    count = int(numbers.max(initial=0))
+    rows, columns = (axis.ravel() for axis in np.indices(readings.shape))
+    weight = np.bincount(numbers, readings.ravel(), count + 1)[1:]
+    x, y = (np.bincount(numbers, readings.ravel() * axis, count + 1)[1:] / weight for axis in (columns, rows))
+    area = np.bincount(numbers, minlength=count + 1)[1:] * skin.pitch_x_mm * skin.pitch_y_mm
+    places = zip(area.tolist(), (x * skin.pitch_x_mm).tolist(), (y * skin.pitch_y_mm).tolist(), strict=True)
+    return [Blob(*one) for one in places]
+
+
+def switches(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
+    """1 where a switch is closed. A bare sheet knows no force: there all that will be pressed is from the touch on."""
+    bare = cover is None or cover.model == "patch"
+    return scene.pressed(scene.settled_s if bare else seconds, skin, cover).astype(float)
+
+
+def analog(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
+    """Steps of the converter of each element, 0 below the threshold.
+
+    An element takes the force that a switch's face or cap takes, and does not give way. On a bare sheet elements lie
+    side by side and take what presses on them.
+    """
+    taken = cells_of(_elements(skin, cover), skin.rows, skin.columns, skin.pitch_x_mm * 1e-3, skin.pitch_y_mm * 1e-3)
+    forces = taken.forces_n(scene.loads(seconds)) * _gains(skin.rows, skin.columns)
+    beside = np.pad(forces, 1)
+    neighbors = beside[2:, 1:-1] + beside[:-2, 1:-1] + beside[1:-1, 2:] + beside[1:-1, :-2]
+    steps = (forces + CROSSTALK * neighbors) / FULL_N * (2**BITS - 1) + NOISE_COUNTS * rng.standard_normal(forces.shape)
+    steps = np.clip(np.round(steps), 0, 2**BITS - 1)
+    return np.where(steps >= THRESHOLD_N / FULL_N * (2**BITS - 1), steps, 0.0)
+
+
+def _elements(skin: Skin, cover: Cover | None) -> Cover:
+    if cover is None or cover.model == "patch":
+        side = min(skin.pitch_x_mm, skin.pitch_y_mm) * 1e-3
+        return Cover("frictionless", 1e-3, cap=Cap(side), cut=True)
+    return dataclasses.replace(cover, switch=Switch(area_m2=cover.switch.area_m2))
+
+
+@functools.lru_cache(maxsize=32)
+def _gains(rows: int, columns: int) -> np.ndarray:
+    return 1 + GAIN_SPREAD * np.random.default_rng(0).standard_normal((rows, columns))
+
+
+def _array_pace(rate_hz: float, skin: Skin) -> Pace:
+    """The frame rate falls where the wire is slower."""
+    wire = 10e6 * (HEAD_BYTES + skin.rows * skin.columns) / skin.baud
+    return Pace(1e6 / rate_hz, 0.0, max(1e6 / rate_hz, wire), wire)
+
+
+def _array_usd(skin: Skin) -> float:
+    return MCU_USD + CONVERTER_USD + AMPLIFIER_USD * skin.columns
+
+
+def _mcu_pace(usb: bool, skin: Skin) -> Pace:
+    scan = skin.rows * (skin.settle_us + 1e6 * ROW_CYCLES / MCU_HZ)
+    work = 1e6 * (skin.rows * skin.columns * CELL_CYCLES + SEND_CYCLES) / MCU_HZ
+    size = frame_bytes(skin, 1)
+    if usb:
+        return Pace(scan, work, scan + work, 8 * size * USB_BIT_US, USB_SLOT_US)
+    return Pace(scan, work, scan + work, 10e6 * size / skin.baud)
+
+
+def _mcu_usd(skin: Skin) -> float:
+    return MCU_USD + DIODE_USD * skin.rows * skin.columns
+
+
+def _cells_pace(skin: Skin) -> Pace:
+    """A board that sends rows as they are; the host's labelling comes after the last byte."""
+    sent = skin.replace(report="cells")
+    derived = sent.derived
+    scan = 1e6 * derived.frame_clocks / sent.clock_hz
+    return Pace(scan, 0.0, scan, 10e6 * frame_bytes(sent, skin.rows) * derived.bit_clocks / sent.clock_hz)
+
+
+def _cells_usd(skin: Skin) -> float:
+    return FPGA_USD + DIODE_USD * skin.rows * skin.columns
+
+
+def frame_bytes(skin: Skin, items: int) -> int:
+    """Of a frame with so many items in our protocol, which a microcontroller may use as well."""
+    plain = items * skin.derived.item_bytes + skin.derived.trailer_bytes
+    return plain + math.ceil(plain / 254) + CHECK_BYTES + 1
+
+
+_ARRAY = (
+    f"model: {BITS} bits to {FULL_N:g} N an element, noise {NOISE_COUNTS:g} step rms, crosstalk {100 * CROSSTALK:g} %"
+    f" to each neighbor, gains within {100 * GAIN_SPREAD:g} % rms, touched from {THRESHOLD_N:g} N on, centroid"
+    " weighted by force; a byte per element on the wire"
+)
+_MCU = (
+    f"model: {MCU_HZ / 1e6:g} MHz, {ROW_CYCLES} cycles and the settle time per row, {CELL_CYCLES} cycles per cell for"
+    f" labels, {SEND_CYCLES} per frame; no debounce; frames as ours; lines beyond 50 by shift registers that"
+    " take no time"
+)
+
+RIVALS: dict[str, Rival] = {
+    "analog array, 100 Hz": Rival(_ARRAY, analog, functools.partial(_array_pace, 100.0), _array_usd),
+    "analog array, 1 kHz": Rival(_ARRAY, analog, functools.partial(_array_pace, 1000.0), _array_usd),
+    "microcontroller, UART": Rival(_MCU, switches, functools.partial(_mcu_pace, False), _mcu_usd),
+    "microcontroller, USB": Rival(
+        f"{_MCU}; full-speed USB, a frame every {USB_SLOT_US / 1e3:g} ms",
+        switches,
+        functools.partial(_mcu_pace, True),
+        _mcu_usd,
+    ),
+    "OpenCV, cells from the board": Rival(
+        "model: our board scans and sends the cells; connected components on the host, whose time is not counted",
+        switches,
+        _cells_pace,
+        _cells_usd,
+    ),
+}
+"""By name."""
