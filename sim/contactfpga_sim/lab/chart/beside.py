@@ -12,7 +12,7 @@ from contactfpga_sim.lab.chart.errors import Interval, Quantile
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """A modelled way to read contacts that is not one of the chart's methods."""
+    """A modeled way to read contacts that is not one of the chart's methods."""
 
     name: str
     family: str

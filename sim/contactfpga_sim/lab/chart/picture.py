@@ -221,7 +221,6 @@ def legend(points: Sequence[Point], rivals: Sequence[Rival]) -> tuple[list[Line2
         [], [], color=style.SOFT, marker="o", mfc=style.CARD, **mark
     )
     lines["under a cover, not beaten in both"] = Line2D([], [], color=style.INK, linewidth=0.8)
-    lines["walls: bits of a frame, least error"] = Line2D(
-        [], [], color=style.GREEN, linewidth=1.4, linestyle=style.DASHES[1]
-    )
+    floor = ", least error" if any(point.least_mm for point in points) else ""
+    lines[f"wall: bits of a frame{floor}"] = Line2D([], [], color=style.GREEN, linewidth=1.4, linestyle=style.DASHES[1])
     return list(lines.values()), list(lines)
