@@ -35,6 +35,7 @@ from contactfpga_sim.lab.chart import (
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
 from contactfpga_sim.lab.chart.errors import Blob, Interval
 from contactfpga_sim.lab.chart.methods import EXTENT_MM, METHODS, PITCHES_MM, sheet
+from contactfpga_sim.lab.chart.rivals import RIVALS
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
@@ -410,9 +411,20 @@ def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
         assert section("chart.md", name) == getattr(tables, f"{name}_table")(points)
 
 
-@pytest.mark.slow
 def test_the_page_shows_as_many_placements_as_it_says():
-    assert {point.task.count for point in numbers.read(ROOT / tables.NUMBERS)} == {tables.PLACEMENTS}
+    (count,) = {point.task.count for point in numbers.read(ROOT / tables.NUMBERS)}
+    page = " ".join((ROOT / "docs/chart.md").read_text(encoding="utf-8").split())
+    assert f"have {count} scenes per point" in page
+    assert f"takes {tables.PLACEMENTS}." in page
+
+
+def test_ways_beside_the_chart_are_found_on_its_families():
+    found = beside.rivals(("bumper",), 3, 0)
+    assert [(one.name, one.family) for one in found] == [(name, "bumper") for name in RIVALS]
+    assert all(one.touch_us.value > 0 and one.errors["miscounted"].count == 3 for one in found)
+    task = next(point.task for point in numbers.read(ROOT / tables.NUMBERS) if point.task.family == "bumper")
+    assert 0 < beside.least_mm(task).mean < task.skin.pitch_x_mm
+    assert beside.least_mm(dataclasses.replace(task, family="fingers")) is None
 
 
 def test_the_picture_of_the_front_rings_what_to_build():

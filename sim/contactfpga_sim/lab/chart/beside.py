@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 from concurrent.futures import Executor
 
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_sim.lab.chart import errors, floor
 from contactfpga_sim.lab.chart.compute import Point, Task
 from contactfpga_sim.lab.chart.errors import Interval, Quantile
+from contactfpga_sim.lab.chart.methods import EXTENT_MM
+from contactfpga_sim.lab.chart.rivals import RIVALS
+from contactfpga_sim.lab.covers import COVERS
+from contactfpga_sim.model.scenes.families import touches
+
+PITCH_MM = 6.4
+"""Of the tiles under which other ways to read a sheet are drawn."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,10 +35,14 @@ class Rival:
 
 
 def least_mm(task: Task) -> Interval | None:
-    """The least mean error of the barycenter in mm that any method can have from this task's cells; None where it is
-    not known."""
-    # HOOK: floor(task.family, task.skin, task.cover, task.count, task.seed).barycenter_mm of chart.floor goes here.
-    return None
+    """The least mean error of the barycenter in mm that any method can have from this task's cells, from below; None
+    for families of several contacts, and where no contact is felt."""
+    if task.family not in floor.ONE:
+        return None
+    try:
+        return floor.floor(task.family, task.skin, task.cover, task.count, task.seed).lower_mm
+    except ValueError:
+        return None
 
 
 def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
@@ -36,9 +52,17 @@ def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
 
 
 def rivals(families: Sequence[str], count: int, seed: int) -> list[Rival]:
-    """Points of another kind, each drawn with the word "model"."""
-    # HOOK: those of chart.rivals go here.
-    return []
+    """Each other way to read a sheet, on each family, under tiles of :data:`PITCH_MM`; drawn with the word "model"."""
+    lines, cover = round(EXTENT_MM / PITCH_MM), COVERS["tiles"](PITCH_MM)
+    skin = Skin(rows=lines, columns=lines, pitch_x_mm=PITCH_MM, pitch_y_mm=PITCH_MM, connectivity=4)
+    found = []
+    for family, (name, rival) in itertools.product(families, RIVALS.items()):
+        scenes, rng = touches(family, count, seed, skin), np.random.default_rng(seed)
+        each = [rival.errors(scene, skin, cover) for scene in scenes]
+        times = [rival.time_us(scene, skin, cover, rng) for scene in scenes]
+        means = {metric: errors.interval([float(getattr(one, metric)) for one in each]) for metric in errors.METRICS}
+        found.append(Rival(name, family, errors.quantile(times, 0.5), means))
+    return found
 
 
 def bits_us(points: Sequence[Point]) -> float:
