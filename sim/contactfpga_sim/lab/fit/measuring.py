@@ -8,11 +8,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from contactfpga.choices import labellers
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import speed
-from contactfpga_sim.lab.chart.compute import compared
+from contactfpga_sim.lab.chart import errors, speed
+from contactfpga_sim.lab.chart.compute import Look
 from contactfpga_sim.lab.chart.errors import METRICS, Interval, interval
 from contactfpga_sim.lab.chart.speed import Speed
 from contactfpga_sim.lab.fit import faces, racing
@@ -52,8 +53,7 @@ def _batch(
 
     def new() -> list[Values]:
         looks = source.looks(skins[0], task.base, numbers, count, cover)
-        found = [compared(looks, skin)["total"] for skin in skins]
-        values = [{metric: one[metric] for metric in METRICS} for one in found]
+        values = [_compared(looks, skin) for skin in skins]
         if force_n is None:
             return values
         assert cover is not None
@@ -63,6 +63,17 @@ def _batch(
 
     found: list[Values] = kept.kept("fit-errors", _key(task, source, skins, cover, numbers, count, force_n), new)
     return found
+
+
+def _compared(looks: Sequence[Look], skin: Skin) -> Values:
+    zones = errors.exact_zones if exact(skin) else errors.method_zones
+    found = [errors.errors(zones(cells, skin), there) for cells, there in looks]
+    return {metric: [float(getattr(one, metric)) for one in found] for metric in METRICS}
+
+
+def exact(skin: Skin) -> bool:
+    """Whether its zones are the connected pieces of the cells: then they depend on the connectivity alone."""
+    return skin.report == "cells" or (skin.report == "moments" and labellers.find(skin.labeller).exact)
 
 
 def speed_of(task: FitTask, source: Source, skin: Skin, cover: Cover | None, others: bool, checked: int) -> Speed:

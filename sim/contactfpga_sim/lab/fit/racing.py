@@ -16,8 +16,11 @@ import numpy as np
 
 from contactfpga_sim.lab.fit.trial import SHARES, Goals
 
-FIRST = 60
+FIRST = 20
 """Scenes in the first batch; each look has twice as many as the one before."""
+
+ENOUGH = 30
+"""Values from which on their mean is taken to have a normal distribution."""
 
 ERR = 0.025
 """Probability with which a side of the interval errs, over all looks."""
@@ -55,7 +58,7 @@ def bounds(name: str, values: Sequence[float], err: float) -> tuple[float, float
     if name in SHARES:
         low, high = (chernoff(mean, len(known), err, end) for end in (0.0, 1.0))
         return low, high
-    if len(known) < FIRST // 2:
+    if len(known) < ENOUGH:
         return -math.inf, math.inf
     half = NormalDist().inv_cdf(1 - err) * float(known.std(ddof=1)) / math.sqrt(len(known))
     return mean - half, mean + half

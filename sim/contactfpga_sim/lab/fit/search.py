@@ -14,7 +14,7 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.fit.candidates import SHEET, Candidate
 from contactfpga_sim.lab.fit.cost import sized
-from contactfpga_sim.lab.fit.measuring import errors_of, speed_of
+from contactfpga_sim.lab.fit.measuring import errors_of, exact, speed_of
 from contactfpga_sim.lab.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 
 CHECKED = 2
@@ -146,6 +146,9 @@ def _sheet(one: Candidate) -> Settings:
 
 def _sees(one: Candidate) -> Settings:
     """The settings that decide what zones it finds."""
+    assert one.skin is not None
+    if exact(one.skin):
+        return (("connectivity", one.skin.connectivity),)
     return tuple((name, value) for name, value in one.settings if name not in ("scan", "baud"))
 
 

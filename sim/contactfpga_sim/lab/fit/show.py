@@ -69,9 +69,9 @@ def _told(fit: Fit) -> list[tuple[Trial, int]]:
         if answer and one.wires == answer.wires:
             key = (key, one.candidate.cover)
             if one.candidate.cover == answer.candidate.cover:
-                key = one
+                key = one.candidate
         groups.setdefault(key, []).append(one)
-    told = [(min(group, key=lambda one: one.excess), len(group)) for group in groups.values()]
+    told = [(min(group, key=lambda one: (one.excess, one.margin)), len(group)) for group in groups.values()]
     if fit.answer is None:
         return told[:SHEETS]
     coarser = [each for each in told if each[0].wires < fit.answer.wires]
