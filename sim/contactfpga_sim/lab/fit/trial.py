@@ -26,6 +26,9 @@ class Measurement:
     """None where it was not looked at, because errors are too large."""
 
 
+DOUBT = ": too few scenes to tell"
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Goals:
     """Limits; None: none. A mean error meets its limit when the upper end of its 95 % interval does, so that scenes
@@ -69,11 +72,17 @@ class Goals:
         given = ((name, getattr(self, name)) for name, *_ in _ERRORS)
         return [(name, limit) for name, limit in given if limit is not None]
 
-    def misses(self, found: Measurement, sure: bool = True) -> Iterator[tuple[float, str]]:
-        """For each limit that is not met: how many times it is exceeded, and what was measured.
+    def misses(self, found: Measurement, sure: bool = True) -> list[tuple[float, str]]:
+        """For each limit that is not met: how many times it is exceeded, and what was measured. What too few scenes tell
+        counts only where nothing else is missed: a Skin that is dropped early was looked at on few.
 
         ``sure``: errors are judged by the upper ends of their intervals, else by their means.
         """
+        missed = list(self._missed(found, sure))
+        beyond = [one for one in missed if not one[1].endswith(DOUBT)]
+        return beyond or missed
+
+    def _missed(self, found: Measurement, sure: bool) -> Iterator[tuple[float, str]]:
         for name, words, scale, unit in _ERRORS:
             limit, error = getattr(self, name), found.errors.get(name)
             if limit is None or error is None:
@@ -85,7 +94,7 @@ class Goals:
             if not judged <= limit:
                 what = words.format(_number(scale * error.mean) + unit)
                 ends = f"{_number(scale * error.low)} to {_number(scale * error.high)}"
-                doubt = ": too few scenes to tell" if error.mean <= limit else ""
+                doubt = DOUBT if error.mean <= limit else ""
                 yield judged / limit, f"{what} ({ends}), limit {_number(scale * limit)}{unit}{doubt}"
         if found.speed and self.latency_us is not None and not found.speed.worst_us <= self.latency_us:
             worst = found.speed.worst_us
