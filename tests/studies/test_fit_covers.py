@@ -21,6 +21,8 @@ pytestmark = pytest.mark.usefixtures("alone")
 
 PITCHES = (8.0, 10.0, 40 / 3, 20.0)
 LIMIT = 0.15
+SURELY = 0.02
+"""Three standard deviations of either count more than this are still below the limit's interval."""
 NEW = 200
 """Scenes on which everything is tried."""
 
@@ -60,9 +62,8 @@ def agrees(path):
         for name in made
         for connectivity, structure in ((4, None), (8, np.ones((3, 3))))
     }
-    sigma = math.sqrt(LIMIT * (1 - LIMIT) * (1 / count + 1 / NEW))
-    surely = {one for one, share in shares.items() if share < LIMIT - 5.5 * sigma}
-    perhaps = {one for one, share in shares.items() if share < LIMIT + 2 * sigma}
+    surely = {one for one, share in shares.items() if share <= SURELY}
+    perhaps = {one for one, share in shares.items() if share < LIMIT + 2 * math.sqrt(LIMIT * (1 - LIMIT) / NEW)}
     if found.answer is None:
         assert not surely
         return

@@ -73,8 +73,8 @@ class Goals:
         return [(name, limit) for name, limit in given if limit is not None]
 
     def misses(self, found: Measurement, sure: bool = True) -> list[tuple[float, str]]:
-        """For each limit that is not met: how many times it is exceeded, and what was measured. What too few scenes tell
-        counts only where nothing else is missed: a Skin that is dropped early was looked at on few.
+        """For each limit that is not met: how many times it is exceeded, and what was measured. Where one is surely
+        missed, those that too few scenes leave open are left out: a Skin that is dropped early was looked at on few.
 
         ``sure``: errors are judged by the upper ends of their intervals, else by their means.
         """
