@@ -39,9 +39,11 @@ def fit(
     possible = [one for one in ordered if one.skin is not None]
     trials: list[Trial] = []
     good: list[Trial] = []
+    before = 0
     for _, alike in itertools.groupby(sorted(possible, key=_wires), _wires):
-        judged = _judged(task, list(alike), executor, step, so_far, len(trials))
+        judged = _judged(task, list(alike), executor, step, so_far, before)
         trials += judged
+        before += len(task.sources) * len({_sheet(one.candidate) for one in judged})
         passed = [one for one in judged if not one.refusals]
         good += sized("synthesis", passed, executor, step, so_far) if passed else []
         if len(good) > 1:
@@ -81,7 +83,7 @@ def _judged(
     task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, before: int
 ) -> list[Trial]:
     """All with the limits that they miss on the scenes to choose with; times only of those whose errors are small
-    enough. ``before``: how many were judged before."""
+    enough. ``before``: pieces of work of the sheets before."""
     sheets: dict[Settings, dict[Settings, Candidate]] = {}
     for one in tried:
         sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one)
