@@ -17,13 +17,13 @@ DEVICE = sizes.UP5K
 
 
 def sized(
-    name: str, trials: Iterable[Trial], executor: Executor, step: Step, so_far: SoFar | None = None
+    name: str, trials: Iterable[Trial], executor: Executor, step: Step, so_far: SoFar | None = None, before: int = 0
 ) -> list[Trial]:
-    """The trials with their LUT4, the cheapest first."""
+    """The trials with their LUT4, the cheapest first; ``before``: pieces of this kind that are done already."""
     given = list(trials)
     luts: dict[Skin, int] = {}
     try:
-        gathered(name, {one.skin: (luts_of, one.skin) for one in given}, executor, step, found=luts)
+        gathered(name, {one.skin: (luts_of, one.skin) for one in given}, executor, step, before, found=luts)
     finally:
         for one in given:
             if so_far is not None and one.skin in luts:

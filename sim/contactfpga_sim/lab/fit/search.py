@@ -45,7 +45,7 @@ def fit(
         trials += judged
         before += len(task.sources) * len({_sheet(one.candidate) for one in judged})
         passed = [one for one in judged if not one.refusals]
-        good += sized("synthesis", passed, executor, step, so_far) if passed else []
+        good += sized("synthesis", passed, executor, step, so_far, len(good)) if passed else []
         if len(good) > 1:
             break
     if not good:
