@@ -27,7 +27,7 @@ POOLS = {
         ["study", "chart", "--placements", "125", "--method", "run, 10 mm", "--method", "run, 20 mm", "--no-size"],
         2,
     ),
-    "fit": (["fit", SCENES, "--placements", "80"], 2),
+    "fit": (["fit", SCENES, "--cover", "bare", "--placements", "80"], 2),
     "arm": (["study", "arm", "--charts"], 2),
 }
 """Commands that have processes work for them; and how many they have."""

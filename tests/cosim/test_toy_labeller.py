@@ -108,7 +108,18 @@ def test_the_chart_draws_it(tmp_path):
 
 @pytest.mark.slow
 def test_fit_tries_it(capsys):
-    asked = ["fit", "bumper", "--labeller", "toy_labeller:TOY", "--labeller", "single", "--pitch-mm", "20"]
+    asked = [
+        "fit",
+        "bumper",
+        "--labeller",
+        "toy_labeller:TOY",
+        "--labeller",
+        "single",
+        "--pitch-mm",
+        "20",
+        "--cover",
+        "bare",
+    ]
     cli.main(
         [
             *asked,

@@ -28,7 +28,7 @@ def test_one_contact_needs_single_and_a_second_one_an_exact_labeller(file, short
     assert (one.broken, two.broken) == ((), ())
     refused = {trial.skin.labeller: trial for trial in two.cheaper if trial.skin.report == "moments"}
     assert refused["single"].measured[0].errors["miscounted"].mean == 1
-    assert refused["single"].refusals[0].startswith("miscounts 100 % of scenes (96.3 to 100), limit 5 %")
+    assert refused["single"].refusals[0].startswith("miscounts 100 % of scenes (83.9 to 100), limit 5 %")
 
 
 @pytest.mark.slow
@@ -85,11 +85,11 @@ def test_the_answer_is_the_cheapest_of_all_that_pass(file, shortcuts):
         most_wrong = binomtest(sum(wrong), len(wrong)).proportion_ci(method="wilson").high
         most_apart = np.mean(apart) + 1.96 * np.std(apart, ddof=1) / math.sqrt(len(apart))
         if most_wrong <= 0.1 and most_apart <= 2.2:
-            passing.append((made_up(skin), skin.rows + skin.columns))
+            passing.append((skin.rows + skin.columns, made_up(skin)))
     assert found.answer.cost[:2] == min(passing)
     assert found.answer.skin.rows > min(one.skin.rows for one in found.cheaper)
     for trial in found.cheaper:
-        assert trial.cost <= found.answer.cost
+        assert trial.cost[:2] <= found.answer.cost[:2]
         assert trial.refusals
 
 

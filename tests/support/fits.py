@@ -49,11 +49,12 @@ def chosen(*names, pitches=(10.0, 20.0), shuffled=None, tried=None, **limits):
     """The fit on these scenes, and the candidates in the order of ``shuffled``."""
     given = tuple(map(source, names))
     options = {name: limits.pop(name) for name in ("host_us", "quick", "base") if name in limits}
+    count = limits.pop("count", None) or sources.default_count(given)
     base = options.pop("base", None)
     if tried is None:
         tried = candidates(base or Skin(), pitches_for(base, given, pitches), size_for(base, given))
     if shuffled is not None:
         random.Random(shuffled).shuffle(tried)
-    task = FitTask(given, names, base or Skin(), Goals(**limits), sources.default_count(given), timed=6, **options)
+    task = FitTask(given, names, base or Skin(), Goals(**limits), count, timed=6, **options)
     with ThreadPoolExecutor(1) as executor:
         return fit(task, tried, executor)

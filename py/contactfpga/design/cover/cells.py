@@ -62,8 +62,15 @@ class Cells:
         self.shape = (rows, columns)
         self._x, self._y = np.arange(columns) * pitch_x_m, np.arange(rows) * pitch_y_m
         self._axes = [_Axis(count, pitch, cover) for count, pitch in ((rows, pitch_y_m), (columns, pitch_x_m))]
-        self.thresholds_n = self._thresholds(seed)
+        self.thresholds_n = self.drawn(seed)
         """(rows, columns) closing force of each switch in N, its preload taken off."""
+
+    def drawn(self, seed: int) -> Floats:
+        """(rows, columns) closing force in N of each switch of a sheet whose switches are drawn with this seed, its
+        preload taken off."""
+        switch = self.cover.switch
+        drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
+        return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
     def forces_n(self, loads: Sequence[Load]) -> Floats:
         """(rows, columns) force on each switch in N, the loads' forces added up; below 0 where foam is pulled off."""
@@ -100,11 +107,6 @@ class Cells:
         sigma = switch.spread * switch.force_n
         share = float(margin <= 0) if not sigma else math.erfc(margin / sigma / math.sqrt(2)) / 2
         return share * math.prod(self.shape)
-
-    def _thresholds(self, seed: int) -> Floats:
-        switch = self.cover.switch
-        drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
-        return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
     def _of_points(self, loads: Sequence[Load]) -> Floats:
         """The paper's (9): the stress in the middle of each face, times its area."""

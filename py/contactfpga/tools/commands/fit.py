@@ -20,6 +20,7 @@ from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.fit.candidates import Candidate
+    from contactfpga_sim.lab.fit.faces import Faces
     from contactfpga_sim.lab.fit.trial import FitTask, SoFar
 
 EXTRA = "chart"
@@ -27,8 +28,15 @@ EXTRA = "chart"
 PERCENT = numbers.number(0, 100, "%", above=True)
 
 
+ORDER = (
+    "The answer has the fewest wires (rows and columns) of all that meet the goals; of these the fewest LUT4, then the "
+    "fewest bytes per frame, then the errors farthest from their limits."
+)
+
+
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
+    parser.epilog = ORDER
     what = "A .toml file of scenes, a .npz or .npy recording, or the name of a family or scene (docs/scenes.md)."
     parser.add_argument("scenes", nargs="+", metavar="SCENES", help=what)
     _goal_flags(parser.add_argument_group("what the Skin must meet for each of SCENES; none means no limit"))
@@ -38,7 +46,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     above = "Count cells of recordings above this as pressed; needed for numbers."
     parser.add_argument("--threshold", type=numbers.CELL, help=above)
     parser.add_argument("--seed", type=numbers.SEED, help="Seed of the places (default: the file's, or 0).")
-    parser.add_argument("--quick", action="store_true", help="Do not check which of the refused Skins are cheaper.")
+    parser.add_argument(
+        "--quick", action="store_true", help="Do not check which of the refused Skins with as many wires are cheaper."
+    )
     flags.workers(parser)
     parser.add_argument("--output", metavar="FILE", help="Write the Skin to this TOML file.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
@@ -51,6 +61,10 @@ def _goal_flags(goals: argparse._ArgumentGroup) -> None:
     _limit(goals, "--missed", "PERCENT", PERCENT, 5.0, "Contacts without a zone")
     _limit(goals, "--barycenter-mm", "MM", far, 5.0, "Mean distance of barycenters from those of the contacts")
     _limit(goals, "--area", "PERCENT", area, None, "Mean error of a contact's area")
+    felt = numbers.number(0, 99.999, "%", above=True)
+    _limit(goals, "--felt", "PERCENT", felt, 99.0, "At least so many fingertips are felt; of covers that know forces")
+    force = numbers.number(0, 1000, "N", above=True)
+    goals.add_argument("--felt-n", type=force, default=2.0, metavar="N", help="Force of these fingertips (default: 2).")
     _limit(goals, "--latency-us", "US", late, 1000.0, "Worst time from the touch to the last byte")
 
 
@@ -68,10 +82,16 @@ def _limit(
 
 
 def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
-    fixed = "Skin that gives all settings but pitch, labeller and scan, which are chosen."
+    fixed = "Skin that gives all settings but pitch, labeller, scan, and, where it has none, cover: these are chosen."
     tried.add_argument("--skin", metavar="FILE", help=fixed)
     pitch = "Try only this pitch; can be repeated."
     tried.add_argument("--pitch-mm", type=numbers.PITCH_MM, action="append", metavar="MM", help=pitch)
+    cover = "Try only this cover: bare, paper, caps or tiles; can be repeated (default: caps and tiles)."
+    tried.add_argument("--cover", metavar="NAME", action="append", help=cover)
+    dome = "Try only this closing force of the switches under caps and tiles; can be repeated (default: 0.15 to 1 N)."
+    tried.add_argument("--dome-n", type=numbers.number(0.001, 1000, "N"), metavar="N", action="append", help=dome)
+    foam = "Thickness of the foam on caps and tiles (default: 2)."
+    tried.add_argument("--foam-mm", type=numbers.number(0.01, 1000, "mm"), metavar="MM", default=2.0, help=foam)
     labeller = "Try only this labeller, cells, or module:attribute of your own; can be repeated."
     tried.add_argument("--labeller", action="append", metavar="NAME", help=labeller)
     scans = "Try only this scan; can be repeated (default: all that the Skin's columns can have)."
@@ -111,22 +131,23 @@ def run(args: argparse.Namespace) -> int:
 def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
     """The task, and all candidates; raises ValueError for what cannot be."""
     from contactfpga_sim.lab.fit import candidates
-    from contactfpga_sim.lab.fit.sources import default_count, source
+    from contactfpga_sim.lab.fit.faces import feels
+    from contactfpga_sim.lab.fit.sources import Recorded, default_count, source
     from contactfpga_sim.lab.fit.trial import FitTask, Goals
 
     base = Skin.load(args.skin) if args.skin else None
-    cover = load_cover(args.skin) if args.skin else None
-    sources = tuple(source(name, args.seed, args.threshold, cover) for name in args.scenes)
+    sources = tuple(source(name, args.seed, args.threshold) for name in args.scenes)
+    covers = _covers(args, all(isinstance(one, Recorded) for one in sources))
     goals = Goals(
         miscounted=_share(args.miscounted),
         missed=_share(args.missed),
         barycenter_mm=args.barycenter_mm,
         area=_share(args.area),
         latency_us=args.latency_us,
+        unfelt=None if args.felt is None else 1 - args.felt / 100,
+        felt_n=args.felt_n,
     )
     count = default_count(sources) if args.placements is None else args.placements
-    for one in sources:
-        goals.check_count(one.most(count))
     tried = candidates.candidates(
         base or Skin(),
         candidates.pitches_for(base, sources, args.pitch_mm),
@@ -134,10 +155,25 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
         _methods(args.labeller),
         flags.known("--scan", args.scan, list(SCANS)) if args.scan else None,
         args.baud,
+        covers,
     )
-    return FitTask(
-        sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick, cover=cover
-    ), tried
+    for one in sources:
+        goals.check_count(one.most(count), any(feels(each.cover) for each in tried))
+    return FitTask(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick), tried
+
+
+def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
+    """That of the Skin's file, those named, or the usual ones; none where nothing but recordings is asked for."""
+    from contactfpga_sim.lab import covers
+    from contactfpga_sim.lab.fit import faces
+
+    cover = load_cover(args.skin) if args.skin else None
+    if cover is not None:
+        if args.cover or args.dome_n:
+            raise ValueError(f"{args.skin} has a cover, and --cover or --dome-n asks for others; leave one of them out")
+        return faces.own(cover)
+    names = flags.known("--cover", args.cover, list(covers.COVERS)) if args.cover else faces.KINDS
+    return faces.BARE if recorded else faces.faces(names, args.dome_n or faces.DOMES_N, args.foam_mm)
 
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The Skins that are tried: every method at every pitch, all on sheets of one size."""
+"""The Skins that are tried: every method at every pitch under every cover, all on sheets of one size."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from typing import Any
 
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.choices.scans import SCANS
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin, SkinError
+from contactfpga_sim.lab.fit.faces import BARE, Faces, refusal
 from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
 
 
@@ -23,7 +25,8 @@ def by(labeller: Labeller) -> list[dict[str, Any]]:
 METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
 """Barycenters divided on the board are none: they cost more LUT4 and save a few microseconds per zone."""
 
-PITCHES_MM = (5.0, 8.0, 10.0, 16.0, 20.0, 32.0)
+COARSEST_MM, FINEST_MM = 32.0, 4.0
+"""Pitches between which every whole number of columns is tried."""
 
 
 SHEET = ("rows", "columns", "pitch_x_mm", "pitch_y_mm")
@@ -38,7 +41,9 @@ class Candidate:
     """What differs from the Skin asked for, in the order of the names."""
     skin: Skin | None
     refusal: str = ""
-    """What Skin says."""
+    """What Skin or Cover says."""
+    cover: Cover | None = None
+    """Through which contacts press."""
 
 
 def candidates(
@@ -48,16 +53,21 @@ def candidates(
     methods: Sequence[dict[str, Any]] = METHODS,
     scans: Sequence[str] | None = None,
     bauds: Sequence[int] | None = None,
+    covers: Faces = BARE,
 ) -> list[Candidate]:
-    """``base`` with each pitch (x, y) near the given ones that divides the sheet, each method, scan and baud rate;
-    without ``scans`` those that columns of ``base`` can have: they are driven with precharge, or they are not."""
+    """``base`` with each pitch (x, y) near the given ones that divides the sheet, each cover, method, scan and baud
+    rate; without ``scans`` those that columns of ``base`` can have: they are driven with precharge, or they are not."""
     if scans is None:
         scans = [name for name, scan in SCANS.items() if not scan.waits or base.precharge_us]
     found = {}
-    for pitch, method, scan, baud in itertools.product(pitches_mm, methods, scans, bauds or (base.baud,)):
-        settings = _sheet(pitch, size_mm) | method | {"scan": scan, "baud": baud}
-        one = _candidate(base, settings)
-        found[one.settings] = one
+    for pitch, cover in itertools.product(pitches_mm, covers):
+        sheet = _sheet(pitch, size_mm)
+        made = covers[cover](min(sheet["pitch_x_mm"], sheet["pitch_y_mm"]))
+        named = {} if made is None else {"cover": cover}
+        wide = refusal(made, (sheet["pitch_x_mm"], sheet["pitch_y_mm"]))
+        for method, scan, baud in itertools.product(methods, scans, bauds or (base.baud,)):
+            one = _candidate(base, sheet | named | method | {"scan": scan, "baud": baud}, made, wide)
+            found[one.settings] = one
     return list(found.values())
 
 
@@ -71,15 +81,17 @@ def _sheet(pitch_mm: tuple[float, float], size_mm: Size) -> dict[str, Any]:
     }
 
 
-def _candidate(base: Skin, settings: dict[str, Any]) -> Candidate:
+def _candidate(base: Skin, settings: dict[str, Any], cover: Cover | None, wide: str) -> Candidate:
     key = tuple(sorted(settings.items()))
-    changes = dict(settings)
+    if wide:
+        return Candidate(key, None, f"Cover refuses: {wide}", cover)
+    changes = {name: value for name, value in settings.items() if name != "cover"}
     if (base.rows, base.columns) != (settings["rows"], settings["columns"]):
         changes["mask"] = ()  # it tells switches of the other sheet
     try:
-        return Candidate(key, base.replace(**changes))
+        return Candidate(key, base.replace(**changes), "", cover)
     except SkinError as error:
-        return Candidate(key, None, str(error))
+        return Candidate(key, None, f"Skin refuses: {error}", cover)
 
 
 def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
@@ -105,8 +117,8 @@ def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
 
 
 def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[float] | None) -> list[Size]:
-    """Pitches (x, y) in mm to try: those asked for, else usual ones with that of the Skin asked for; of a recording
-    only its own."""
+    """Pitches (x, y) in mm to try: those asked for, else those of every whole number of columns from
+    :data:`COARSEST_MM` to :data:`FINEST_MM` with that of the Skin asked for; of a recording only its own."""
     for pitch in asked or ():
         if not 0 < pitch < math.inf:
             raise ValueError(f"--pitch-mm is {pitch}; it must be above 0")
@@ -116,5 +128,9 @@ def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[fl
         if asked and list(asked) != [pitch]:
             raise ValueError(f"--pitch-mm is {asked}; a recording has one pitch, here {pitch:g} mm")
         return [(pitch, pitch)]
-    own = [(base.pitch_x_mm, base.pitch_y_mm)] if base is not None and not asked else []
-    return own + [(pitch, pitch) for pitch in asked or PITCHES_MM]
+    if asked:
+        return [(pitch, pitch) for pitch in asked]
+    width, _ = size_for(base, sources)
+    columns = range(max(1, math.ceil(width / COARSEST_MM)), max(1, math.floor(width / FINEST_MM)) + 1)
+    own = [(base.pitch_x_mm, base.pitch_y_mm)] if base is not None else []
+    return own + [(width / each, width / each) for each in columns]

@@ -3,39 +3,84 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
 
+from contactfpga.choices import labellers
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import speed
-from contactfpga_sim.lab.chart.compute import Found, compared, intervals
-from contactfpga_sim.lab.chart.errors import Interval
+from contactfpga_sim.lab.chart import errors, speed
+from contactfpga_sim.lab.chart.compute import Look
+from contactfpga_sim.lab.chart.errors import METRICS, Interval, interval
 from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.fit.sources import Source
+from contactfpga_sim.lab.fit import faces, racing
+from contactfpga_sim.lab.fit.sources import Recorded, Source
 from contactfpga_sim.lab.fit.trial import FitTask
 
+Values = dict[str, list[float]]
+"""By metric, a value for each scene, or for each touch of a fingertip."""
 
-def errors_of(task: FitTask, source: Source, skins: Sequence[Skin], others: bool) -> list[dict[str, Interval]]:
-    """By metric, of each Skin's zones against what there is; all of them have the same sheet. ``others``: on the scenes
-    that are not used to choose."""
 
-    def new() -> list[Found]:
-        looks = source.looks(skins[0], task.base, numbers, count)
-        return [compared(looks, skin) for skin in skins]
-
+def errors_of(
+    task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, others: bool
+) -> list[dict[str, Interval]]:
+    """By metric, of each Skin's zones against what there is; all of them have the same sheet under the same cover.
+    ``others``: on all scenes that are not used to choose; else on as many as it takes to decide. Frames of a recording
+    do not depend on chance, so all of them are looked at."""
     count = source.most(task.count)
-    numbers = range(count, 2 * count) if others else range(count)
-    found = kept.kept("fit-errors", _key(task, source, skins, numbers, count), new)
-    return [intervals([one])["total"] for one in found]
+    ends = [count] if others or isinstance(source, Recorded) else racing.ends(count)
+    values: list[Values] = [{} for _ in skins]
+    left = list(range(len(skins)))
+    for first, last in itertools.pairwise([0, *ends]):
+        numbers = range(first + others * count, last + others * count)
+        batch = _batch(task, source, [skins[one] for one in left], cover, numbers, count)
+        for one, found in zip(left, batch, strict=True):
+            for metric, more in found.items():
+                values[one].setdefault(metric, []).extend(more)
+        left = [one for one in left if racing.decided(task.goals, values[one], len(ends)) is None]
+        if not left:
+            break
+    return [{metric: interval(each) for metric, each in one.items()} for one in values]
 
 
-def speed_of(task: FitTask, source: Source, skin: Skin, others: bool, checked: int) -> Speed:
+def _batch(
+    task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, numbers: Sequence[int], count: int
+) -> list[Values]:
+    force_n = task.goals.felt_n if task.goals.unfelt is not None and faces.feels(cover) else None
+
+    def new() -> list[Values]:
+        looks = source.looks(skins[0], task.base, numbers, count, cover)
+        values = [_compared(looks, skin) for skin in skins]
+        if force_n is None:
+            return values
+        assert cover is not None
+        pitch = (skins[0].pitch_x_mm, skins[0].pitch_y_mm)
+        felt = {"unfelt": faces.unfelt(cover, pitch, force_n, numbers)}
+        return [one | felt for one in values]
+
+    found: list[Values] = kept.kept("fit-errors", _key(task, source, skins, cover, numbers, count, force_n), new)
+    return found
+
+
+def _compared(looks: Sequence[Look], skin: Skin) -> Values:
+    zones = errors.exact_zones if exact(skin) else errors.method_zones
+    found = [errors.errors(zones(cells, skin), there) for cells, there in looks]
+    return {metric: [float(getattr(one, metric)) for one in found] for metric in METRICS}
+
+
+def exact(skin: Skin) -> bool:
+    """Whether its zones are the connected pieces of the cells: then they depend on the connectivity alone."""
+    return skin.report == "cells" or (skin.report == "moments" and labellers.find(skin.labeller).exact)
+
+
+def speed_of(task: FitTask, source: Source, skin: Skin, cover: Cover | None, others: bool, checked: int) -> Speed:
     """Of touches spread over the same scenes; ``checked`` of them go through the compiled gateware as well."""
 
     def new() -> dict[str, float]:
-        frames = [cells for cells in source.cells(skin, task.base, numbers, count) if cells.any()]
+        frames = [cells for cells in source.cells(skin, task.base, numbers, count, cover) if cells.any()]
         if not frames:
             return dict.fromkeys((field.name for field in dataclasses.fields(Speed)), math.nan)
         return dataclasses.asdict(speed.measure(skin, frames, checked))
@@ -43,8 +88,8 @@ def speed_of(task: FitTask, source: Source, skin: Skin, others: bool, checked: i
     count = source.most(task.count)
     timed = min(task.timed, count)
     numbers = [others * count + index * count // timed for index in range(timed)]
-    return Speed(**kept.kept("fit-speed", _key(task, source, [skin], numbers, count, checked), new))
+    return Speed(**kept.kept("fit-speed", _key(task, source, [skin], cover, numbers, count, checked), new))
 
 
-def _key(task: FitTask, source: Source, skins: Sequence[Skin], *more: Any) -> str:
-    return "\n".join((kept.made_by(__name__, *skins, task.base), repr(source), repr(more)))
+def _key(task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, *more: Any) -> str:
+    return "\n".join((kept.made_by(__name__, *skins, task.base), repr(source), repr(cover), repr(more)))

@@ -1,17 +1,20 @@
-"""The search: errors and times of all candidates, then the size of those that can be the answer or are cheaper."""
+"""The search: the sheets with the fewest wires first, errors and times of each, then the size of those that are good
+enough."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Hashable, Iterable, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.fit.candidates import SHEET, Candidate
-from contactfpga_sim.lab.fit.cost import cheapest, second
-from contactfpga_sim.lab.fit.measuring import errors_of, speed_of
+from contactfpga_sim.lab.fit.cost import sized
+from contactfpga_sim.lab.fit.measuring import errors_of, exact, speed_of
 from contactfpga_sim.lab.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 
 CHECKED = 2
@@ -32,26 +35,43 @@ def fit(
     there for those who end the search before it is done."""
     so_far = {} if so_far is None else so_far
     ordered = sorted(tried, key=lambda one: repr(one.settings))
-    impossible = [Trial(one, refusals=(f"Skin refuses: {one.refusal}",)) for one in ordered if one.skin is None]
-    trials = _judged(task, [one for one in ordered if one.skin is not None], executor, step, so_far)
-    if all(trial.refusals for trial in trials):
+    impossible = [Trial(one, refusals=(one.refusal,)) for one in ordered if one.skin is None]
+    possible = [one for one in ordered if one.skin is not None]
+    trials: list[Trial] = []
+    good: list[Trial] = []
+    before = 0
+    for _, alike in itertools.groupby(sorted(possible, key=_wires), _wires):
+        judged = _judged(task, list(alike), executor, step, so_far, before)
+        trials += judged
+        before += len(task.sources) * len({_sheet(one.candidate) for one in judged})
+        passed = [one for one in judged if not one.refusals]
+        good += sized("synthesis", passed, executor, step, so_far, len(good)) if passed else []
+        if len(good) > 1:
+            break
+    if not good:
         return _none(task, sorted(trials, key=lambda one: one.excess), impossible, executor, step)
-    passed = cheapest("synthesis", [one for one in trials if not one.refusals], second, executor, step, so_far)
-    answer, runner_up = passed[0], passed[1] if len(passed) > 1 else None
-    reported = _reported(task, passed[:2], executor, step, CHECKED)
-    refused = [] if task.quick else [one for one in trials if one.refusals]
-    sized = cheapest("synthesis of the refused", refused, lambda _: answer.cost[0], executor, step, so_far)
-    cheaper = tuple(one for one in sized if one.cost <= answer.cost)
+    answer, runner_up = good[0], good[1] if len(good) > 1 else None
+    reported = _reported(task, good[:2], executor, step, CHECKED)
+    refused = [one for one in trials if one.refusals and one.wires <= answer.wires]
+    as_many = [] if task.quick else [one for one in refused if one.wires == answer.wires]
+    looked = sized("synthesis of the refused", as_many, executor, step, so_far)
+    fewer = sorted((one for one in refused if one.wires < answer.wires), key=lambda one: (one.wires, one.excess))
+    cheaper = (*fewer, *(one for one in looked if one.cost[:2] <= answer.cost[:2]))
     return Fit(
         task,
         answer,
         runner_up,
         cheaper,
         tuple(impossible),
-        dearer=len(trials) - len(cheaper) - 1,
+        dearer=len(possible) - len(cheaper) - 1,
         reported=reported,
         broken=_words(task, reported[0], sure=False),
     )
+
+
+def _wires(one: Candidate) -> int:
+    assert one.skin is not None
+    return one.skin.rows + one.skin.columns
 
 
 def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor: Executor, step: Step) -> Fit:
@@ -59,37 +79,60 @@ def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor:
     return Fit(task, None, None, tuple(trials), tuple(impossible), 0, _reported(task, nearest, executor, step, 0), ())
 
 
-def _judged(task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar) -> list[Trial]:
-    """All that were measured on the scenes to choose with, with the limits that they miss."""
-    sheets: dict[Settings, dict[Settings, Skin]] = {}
+def _judged(
+    task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, before: int
+) -> list[Trial]:
+    """All with the limits that they miss on the scenes to choose with; times only of those whose errors are small
+    enough. ``before``: pieces of work of the sheets before."""
+    sheets: dict[Settings, dict[Settings, Candidate]] = {}
     for one in tried:
-        assert one.skin is not None
-        sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one.skin)
-    jobs: dict[Hashable, tuple[Any, ...]] = {}
-    for source in task.sources:
-        for sheet, skins in sheets.items():
-            jobs[source, sheet] = (errors_of, task, source, list(skins.values()), False)
-            same = [one.skin for one in tried if _sheet(one) == sheet]
-            jobs |= {(source, skin): (speed_of, task, source, skin, False, 0) for skin in same}
-    found: dict[Hashable, Any] = {}
+        sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one)
+    jobs: dict[Hashable, tuple[Any, ...]] = {
+        (source, sheet): (errors_of, task, source, [one.skin for one in seen.values()], _cover(seen), False)
+        for source in task.sources
+        for sheet, seen in sheets.items()
+    }
+    errors = gathered("scenes", jobs, executor, step, before)
+    trials: dict[Candidate, Trial] = {}
+    for one in tried:
+        place = list(sheets[_sheet(one)]).index(_sees(one))
+        found = tuple(Measurement(errors[source, _sheet(one)][place]) for source in task.sources)
+        trials[one] = _trial(task, one, found)
+    slow = [one for one in tried if not _without_host(trials[one].refusals)]
+    timed = {(source, one): (speed_of, task, source, one.skin, one.cover, False, 0)
+             for source in task.sources for one in slow}  # fmt: skip
+    times: dict[Hashable, Any] = {}
     try:
-        gathered("scenes", jobs, executor, step, found=found)
+        gathered("times", timed, executor, step, found=times)
     finally:
         for one in tried:
-            if all((source, part) in found for source in task.sources for part in (_sheet(one), one.skin)):
-                so_far[one] = _trial(task, one, sheets, found)
+            if one not in slow:
+                so_far[one] = trials[one]
+            elif all((source, one) in times for source in task.sources):
+                so_far[one] = _trial(task, one, _timed(task, trials[one], times))
     return [so_far[one] for one in tried]
 
 
-def _trial(
-    task: FitTask, one: Candidate, sheets: dict[Settings, dict[Settings, Skin]], found: dict[Hashable, Any]
-) -> Trial:
-    place = list(sheets[_sheet(one)]).index(_sees(one))
-    measured = tuple(
-        _with_host(task, one.skin, Measurement(found[source, _sheet(one)][place], found[source, one.skin]))
-        for source in task.sources
+def _cover(seen: dict[Settings, Candidate]) -> Cover | None:
+    return next(iter(seen.values())).cover
+
+
+def _without_host(refusals: Sequence[str]) -> tuple[str, ...]:
+    return tuple(one for one in refusals if one != ZONES_ON_HOST)
+
+
+def _timed(task: FitTask, trial: Trial, times: dict[Hashable, Any]) -> tuple[Measurement, ...]:
+    return tuple(
+        _with_host(task, trial.skin, dataclasses.replace(one, speed=times[source, trial.candidate]))
+        for source, one in zip(task.sources, trial.measured, strict=True)
     )
-    trial = Trial(one, measured, _words(task, measured), max(map(task.goals.excess, measured)))
+
+
+def _trial(task: FitTask, one: Candidate, measured: tuple[Measurement, ...]) -> Trial:
+    goals = task.goals
+    trial = Trial(
+        one, measured, _words(task, measured), max(map(goals.excess, measured)), max(map(goals.margin, measured))
+    )
     if trial.skin.report == "cells" and task.host_us is None:
         return dataclasses.replace(trial, refusals=(ZONES_ON_HOST, *trial.refusals), excess=math.inf)
     return trial
@@ -99,11 +142,15 @@ Settings = tuple[tuple[str, Any], ...]
 
 
 def _sheet(one: Candidate) -> Settings:
-    return tuple((name, value) for name, value in one.settings if name in SHEET)
+    """The settings of the sheet, and its cover."""
+    return tuple((name, value) for name, value in one.settings if name in (*SHEET, "cover"))
 
 
 def _sees(one: Candidate) -> Settings:
     """The settings that decide what zones it finds."""
+    assert one.skin is not None
+    if exact(one.skin):
+        return (("connectivity", one.skin.connectivity),)
     return tuple((name, value) for name, value in one.settings if name not in ("scan", "baud"))
 
 
@@ -121,6 +168,7 @@ def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurem
     """With the time that the host takes to find zones, where it has to."""
     if skin is None or skin.report != "cells" or task.host_us is None:
         return found
+    assert found.speed is not None
     later = {name: getattr(found.speed, name) + task.host_us for name in ("median_us", "worst_us", "bound_us")}
     return dataclasses.replace(found, speed=dataclasses.replace(found.speed, **later))
 
@@ -132,8 +180,16 @@ def _reported(
     jobs: dict[Hashable, tuple[Any, ...]] = {}
     for number, one in enumerate(trials):
         for source in task.sources:
-            jobs[number, source, "errors"] = (errors_of, task, source, [one.skin], True)
-            jobs[number, source, "speed"] = (speed_of, task, source, one.skin, True, 0 if number else checked)
+            jobs[number, source, "errors"] = (errors_of, task, source, [one.skin], one.candidate.cover, True)
+            jobs[number, source, "speed"] = (
+                speed_of,
+                task,
+                source,
+                one.skin,
+                one.candidate.cover,
+                True,
+                0 if number else checked,
+            )
     found = gathered("report", jobs, executor, step)
     return tuple(
         tuple(

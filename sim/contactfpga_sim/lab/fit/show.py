@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -10,12 +11,16 @@ from contactfpga import terminal
 from contactfpga.design.cover.press import write_cover
 from contactfpga.tools.console import tables
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
+from contactfpga_sim.lab.chart.speed import Speed
 from contactfpga_sim.lab.fit.cost import DEVICE
 from contactfpga_sim.lab.fit.sources import Recorded
 from contactfpga_sim.lab.fit.trial import Fit, Measurement, Trial
 
-HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
-"""Baud is left out where all have the same."""
+HEADS = ("zones by", "scan", "cover", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
+"""Cover and baud are left out where all have the same."""
+
+SHEETS = 12
+"""Sheets that are refused of which a line is shown: the finest."""
 
 METRIC_HEADS = ("scenes miscounted", "contacts missed", "barycenter", "area")
 
@@ -40,26 +45,55 @@ def _print(lines: Sequence[Sequence[str]], keys: int = 4, bold: str | None = Non
 
 
 def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
-    """The head, and a line for each Skin that is cheaper than the answer, the answer and the runner-up; without an
-    answer for each Skin, the nearest one first. ``impossible``: at the end those for which there is no Skin."""
-    lines = [_row(one, "; ".join(one.refusals)) for one in fit.cheaper]
+    """The head, a line for the refused ones of each sheet with fewer wires and of each cover on the answer's sheet, the
+    answer and the runner-up; without an answer a line for each sheet, the nearest one first. ``impossible``: at the end
+    those for which there is no Skin."""
+    lines = [_row(one, _why(one, of)) for one, of in _told(fit)]
     if fit.answer:
         lines.append(_row(fit.answer, "the answer"))
     if fit.runner_up:
         lines.append(_row(fit.runner_up, "runner-up"))
     if impossible:
         lines += [_row_of(dict(one.candidate.settings), one.refusals[0]) for one in fit.impossible]
-    table = [list(HEADS), *lines]
-    place = HEADS.index("baud")
-    if len({line[place] for line in lines}) == 1:
-        table = [line[:place] + line[place + 1 :] for line in table]
+    return _without_same([list(HEADS), *lines])
+
+
+def _told(fit: Fit) -> list[tuple[Trial, int]]:
+    """Of the refused ones those to show, each the nearest of how many: all on the answer's sheet under its cover, one
+    for each other cover there, one for each sheet with fewer wires, no more than :data:`SHEETS`; without an answer one
+    for each sheet."""
+    groups: dict[object, list[Trial]] = {}
+    for one in fit.cheaper:
+        skin, answer = one.skin, fit.answer
+        key: object = (skin.rows, skin.columns)
+        if answer and one.wires == answer.wires:
+            key = (key, one.candidate.cover)
+            if one.candidate.cover == answer.candidate.cover:
+                key = one.candidate
+        groups.setdefault(key, []).append(one)
+    told = [(min(group, key=lambda one: (one.excess, one.margin)), len(group)) for group in groups.values()]
+    if fit.answer is None:
+        return told[:SHEETS]
+    coarser = [each for each in told if each[0].wires < fit.answer.wires]
+    return coarser[-SHEETS:] + told[len(coarser) :]
+
+
+def _why(trial: Trial, of: int) -> str:
+    return (f"the nearest of {of}: " if of > 1 else "") + "; ".join(trial.refusals)
+
+
+def _without_same(table: list[list[str]]) -> list[list[str]]:
+    for name in ("cover", "baud"):
+        place = table[0].index(name)
+        if len({line[place] for line in table[1:]}) == 1:
+            table = [line[:place] + line[place + 1 :] for line in table]
     return table
 
 
 def rows_so_far(trials: Iterable[Trial]) -> list[list[str]]:
     """The head, and a line for each Skin that was measured when the search was ended, the nearest one first."""
     nearest = sorted(trials, key=lambda one: (one.excess, one.cost))
-    return [list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)]
+    return _without_same([list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)])
 
 
 def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
@@ -68,17 +102,38 @@ def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
 
 
 def _row(trial: Trial, verdict: str) -> list[str]:
-    speeds = [one.speed for one in trial.measured]
-    latency = f"{max(one.median_us for one in speeds):.0f} / {max(one.worst_us for one in speeds):.0f}"
+    speeds = [one.speed for one in trial.measured if one.speed]
+    latency = _latency(speeds)
     luts = "" if trial.luts is None else f"{trial.luts:,}"
-    return _row_of(dict(trial.candidate.settings), verdict, luts, str(trial.wires), f"{trial.bytes:g}", latency)
+    return _row_of(dict(trial.candidate.settings), verdict, luts, str(trial.wires), _bytes(trial), latency)
+
+
+def _bytes(trial: Trial) -> str:
+    return "" if math.isnan(trial.bytes) else f"{trial.bytes:g}"
+
+
+def _latency(speeds: Sequence[Speed]) -> str:
+    """Median and worst, of the source that takes longest."""
+    if not speeds:
+        return ""
+    return f"{max(one.median_us for one in speeds):.0f} / {max(one.worst_us for one in speeds):.0f}"
 
 
 def _row_of(settings: dict[str, Any], verdict: str, *numbers: str) -> list[str]:
     pitches = dict.fromkeys(f"{settings[name]:.4g}" for name in ("pitch_x_mm", "pitch_y_mm"))
     sheet = f"{settings['rows']}x{settings['columns']}"
     rest = numbers or ("",) * 4
-    return [_method(settings), settings["scan"], sheet, " x ".join(pitches), str(settings["baud"]), *rest, verdict]
+    cover = settings.get("cover", "bare")
+    return [
+        _method(settings),
+        settings["scan"],
+        cover,
+        sheet,
+        " x ".join(pitches),
+        str(settings["baud"]),
+        *rest,
+        verdict,
+    ]
 
 
 def _method(settings: dict[str, Any]) -> str:
@@ -95,18 +150,23 @@ def name(trial: Trial) -> str:
     settings = dict(trial.candidate.settings)
     pitches = dict.fromkeys((settings["pitch_x_mm"], settings["pitch_y_mm"]))
     pitch = " x ".join(f"{one:.4g}" for one in pitches)
-    return f"{_method(settings)}, {settings['scan']}, {settings['rows']}x{settings['columns']}, {pitch} mm"
+    sheet = f"{settings['rows']}x{settings['columns']}, {pitch} mm"
+    cover = f", {settings['cover']}" if "cover" in settings else ""
+    return f"{_method(settings)}, {settings['scan']}, {sheet}{cover}"
 
 
 def reported(fit: Fit) -> list[list[str]]:
     """The head, and a line for each Skin and source of what was measured on the other scenes."""
-    table = [["on scenes not used to choose", "scenes", *METRIC_HEADS, "latency us"]]
+    feels = any("unfelt" in one.errors for measured in fit.reported for one in measured)
+    metrics = [*METRICS, "unfelt"] if feels else METRICS
+    felt = [f"not felt at {fit.task.goals.felt_n:g} N"] * feels
+    table = [["on scenes not used to choose", "scenes", *METRIC_HEADS, *felt, "latency us"]]
     shown = [one for one in (fit.answer, fit.runner_up) if one] or list(fit.cheaper[:1])
     words = ["the answer", "runner-up"] if fit.answer else ["the nearest"]
     for trial, word, measured in zip(shown, words, fit.reported):
         for source, one in zip(fit.task.names, measured, strict=True):
-            errors = [_error(metric, one.errors[metric]) for metric in METRICS]
-            latency = f"{one.speed.median_us:.0f} / {one.speed.worst_us:.0f}"
+            errors = [_error(metric, one.errors[metric]) for metric in metrics]
+            latency = _latency([one.speed] if one.speed else [])
             count = str(one.errors["miscounted"].count)
             table.append([f"{word}: {name(trial)}; {source}", count, *errors, latency])
     return table
@@ -130,7 +190,10 @@ def notes(fit: Fit) -> list[str]:
     elif fit.answer:
         lines.append("On scenes not used to choose the answer meets all limits.")
     if fit.answer and fit.task.quick:
-        lines.append(f"{fit.dearer} others were tried; which of the refused ones are cheaper was not looked at.")
+        lines.append(
+            f"{fit.dearer} others were tried; which of the refused ones with as many wires are cheaper "
+            "was not looked at."
+        )
     elif fit.answer:
         lines.append(f"{len(fit.cheaper)} cheaper ones are refused; {fit.dearer} others cost more.")
     if any(isinstance(source, Recorded) for source in fit.task.sources):
@@ -147,8 +210,11 @@ def toml(fit: Fit, command: str) -> str:
     lines = [command, f"{fit.answer.luts} LUT4 on {DEVICE.fpga}, {fit.answer.wires} wires"]
     for source, one in zip(fit.task.names, fit.reported[0], strict=True):
         errors = (f"{head} {_error(metric, one.errors[metric])}" for head, metric in zip(METRIC_HEADS, METRICS))
-        lines.append(f"{source}, scenes not used to choose: {', '.join(errors)}, {one.speed.worst_us:.0f} us at worst")
-    cover = write_cover(fit.task.cover) if fit.task.cover else ""
+        worst = f", {one.speed.worst_us:.0f} us at worst" if one.speed else ""
+        felt = f", fingertips not felt {_error('unfelt', one.errors['unfelt'])}" if "unfelt" in one.errors else ""
+        lines.append(f"{source}, scenes not used to choose: {', '.join(errors)}{felt}{worst}")
+    made = fit.answer.candidate.cover
+    cover = write_cover(made) if made else ""
     return "".join(f"# {line}\n" for line in lines) + fit.answer.skin.to_toml() + cover
 
 
@@ -194,5 +260,5 @@ def _sources(fit: Fit, measured: Sequence[Measurement]) -> dict[str, Any]:
 def _measured(one: Measurement) -> dict[str, Any]:
     return {
         "errors": {metric: dataclasses.asdict(error) for metric, error in one.errors.items()},
-        "speed": dataclasses.asdict(one.speed),
+        "speed": dataclasses.asdict(one.speed) if one.speed else None,
     }

@@ -51,31 +51,37 @@ class Source(abc.ABC):
         return count
 
     @abc.abstractmethod
-    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
-        """The scenes with these numbers, below twice ``count``, on a sheet; ``base``: the Skin asked for."""
+    def looks(
+        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
+    ) -> list[Look]:
+        """The scenes with these numbers, below twice ``count``, on a sheet under a cover; ``base``: the Skin asked
+        for."""
 
     @abc.abstractmethod
-    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+    def cells(
+        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
+    ) -> list[np.ndarray]:
         """(R, C) bool of the same, without what there is to be found."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True)
 class Placed(Source):
     """Contacts at places drawn at random."""
-
-    cover: Cover | None = None
-    """Through which they press."""
 
     @abc.abstractmethod
     def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
         """A scene, and the instant in s at which it is looked at."""
 
-    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
-        return [look(*self.at(skin, base, number), skin, self.cover) for number in numbers]
+    def looks(
+        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
+    ) -> list[Look]:
+        return [look(*self.at(skin, base, number), skin, cover) for number in numbers]
 
-    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+    def cells(
+        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
+    ) -> list[np.ndarray]:
         drawn = (self.at(skin, base, number) for number in numbers)
-        return [scene.pressed(seconds, skin, self.cover) for scene, seconds in drawn]
+        return [scene.pressed(seconds, skin, cover) for scene, seconds in drawn]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,11 +164,15 @@ class Recorded(Source):
     def most(self, count: int) -> int:
         return min(count, len(self.recording.pressed) // 2)
 
-    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
+    def looks(
+        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
+    ) -> list[Look]:
         judge = skin.replace(connectivity=base.connectivity)
         return [(cells, errors.exact_zones(cells, judge)) for cells in self.cells(skin, base, numbers, count)]
 
-    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+    def cells(
+        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
+    ) -> list[np.ndarray]:
         frames = self.recording.pressed
         half = len(frames) // 2
         return [frames[number // count * half + number % count * half // count] for number in numbers]
@@ -173,17 +183,17 @@ def _recording(path: str, digest: str, threshold: float | None) -> Recording:
     return Recording.load(path, threshold)
 
 
-def source(name: str, seed: int | None = None, threshold: float | None = None, cover: Cover | None = None) -> Source:
+def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
     """By the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a recording.
 
     ``seed``: of the places, in the place of the file's. ``threshold``: above which a recording's numbers are pressed.
-    ``cover``: through which contacts press. A family hides the built-in scene of its name.
+    A family hides the built-in scene of its name.
     Raises ValueError for anything else.
     """
     if name in FAMILIES:
-        return Family(name, seed or 0, cover=cover)
+        return Family(name, seed or 0)
     if name in CONTACTS:
-        return BuiltIn(name, seed or 0, cover=cover)
+        return BuiltIn(name, seed or 0)
     if name.endswith((".npz", ".npy")):
         with open_regular(name) as file:
             found = Recorded(name, hashlib.sha256(file.read()).hexdigest(), threshold)
@@ -192,7 +202,7 @@ def source(name: str, seed: int | None = None, threshold: float | None = None, c
         return found
     if name.endswith(".toml"):
         says = SceneFile.load(name)
-        return File(says if seed is None else dataclasses.replace(says, seed=seed), cover=cover)
+        return File(says if seed is None else dataclasses.replace(says, seed=seed))
     known = ", ".join((*FAMILIES, *(name for name in CONTACTS if name not in FAMILIES)))
     raise ValueError(f"scene {name!r} is not known; take a .toml, .npz or .npy file, or one of {known}")
 

@@ -1,0 +1,89 @@
+"""The covers that are tried on each sheet, and how well a fingertip is felt through one."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from contactfpga.design.cover import Cells, Cover, CoverError, Ellipse, Load, cells_of
+from contactfpga_sim.lab import covers
+
+KINDS = ("caps", "tiles")
+"""Of :data:`contactfpga_sim.lab.covers.COVERS`: those that can be made with any switch."""
+
+DOMES_N = (0.15, 0.25, 0.4, 0.6, 1.0)
+"""Closing forces of the switches below them."""
+
+Faces = dict[str, Callable[[float], Cover | None]]
+"""By name: the cover of a sheet with this pitch in mm; None: there is none."""
+
+BARE: Faces = {"bare": covers.bare}
+
+
+def faces(kinds: Sequence[str] = KINDS, domes_n: Sequence[float] = DOMES_N, foam_mm: float = 2.0) -> Faces:
+    """Each kind; caps and tiles with each switch under foam of this thickness."""
+    found: Faces = {}
+    for kind in kinds:
+        if kind not in KINDS:
+            found[kind] = covers.COVERS[kind]
+            continue
+        for force_n in domes_n:
+            found[f"{kind}, {force_n:g} N"] = functools.partial(_on_domes, kind, force_n, foam_mm)
+    return found
+
+
+def _on_domes(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cover:
+    make = {"caps": covers.capped, "tiles": covers.tiled}[kind]
+    cover = make(pitch_mm, dataclasses.replace(covers.DOME, force_n=force_n))
+    return dataclasses.replace(cover, thickness_m=foam_mm * 1e-3)
+
+
+def own(cover: Cover) -> Faces:
+    """One cover for every sheet."""
+    return {"the file's": lambda pitch_mm: cover}
+
+
+def refusal(cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
+    """Why switches at this pitch cannot lie under the cover; empty where they can."""
+    if cover is None or cover.model == "patch":
+        return ""
+    try:
+        Cells(cover, 1, 1, pitch_mm[0] * 1e-3, pitch_mm[1] * 1e-3)
+    except CoverError as error:
+        return str(error)
+    return ""
+
+
+def feels(cover: Cover | None) -> bool:
+    """Whether it goes by force."""
+    return cover is not None and cover.model != "patch"
+
+
+TOUCHES = 8
+"""Touches of a fingertip that are looked at for each scene."""
+
+FINGERTIP_M = (12e-3, 10e-3)
+"""Length and width of its ellipse."""
+
+LINES = 9
+"""Rows and columns of the piece of a sheet on which they lie; they touch its middle cell."""
+
+
+def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers: Sequence[int]) -> list[float]:
+    """0 or 1 for each of the :data:`TOUCHES` of each number: 1 where a fingertip that presses with ``force_n`` at a
+    random place in the middle of a sheet, turned at random, closes no switch. Closing forces are drawn for each."""
+    pitch_x, pitch_y = (pitch * 1e-3 for pitch in pitch_mm)
+    cells = cells_of(cover, LINES, LINES, pitch_x, pitch_y)
+    found = []
+    for touch in (number * TOUCHES + each for number in numbers for each in range(TOUCHES)):
+        rng = np.random.default_rng([touch, LINES])
+        across, down = LINES // 2 + rng.uniform(-0.5, 0.5, 2)
+        length, width = (size / 2 for size in FINGERTIP_M)
+        tip = Ellipse(length, width, across * pitch_x, down * pitch_y, rng.uniform(0, math.pi))
+        closed = cells.forces_n([Load((tip,), force_n)]) >= cells.drawn(int(rng.integers(1 << 32)))
+        found.append(float(not closed.any()))
+    return found

@@ -1,0 +1,81 @@
+"""When enough scenes were looked at: a Skin that surely misses a limit is dropped, one that surely meets all is kept.
+
+Scenes are looked at in batches, and after each batch a Skin may be decided. A limit counts as met or missed where the
+end of a confidence interval says so; each side errs with a probability of at most 2.5 %, shared equally by all looks.
+Shares have Chernoff's interval, which holds for any values between 0 and 1 and any number of them, other errors that of
+the normal distribution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from statistics import NormalDist
+
+import numpy as np
+
+from contactfpga_sim.lab.fit.trial import SHARES, Goals
+
+FIRST = 20
+"""Scenes in the first batch; each look has twice as many as the one before."""
+
+ENOUGH = 30
+"""Values from which on their mean is taken to have a normal distribution."""
+
+ERR = 0.025
+"""Probability with which a side of the interval errs, over all looks."""
+
+
+def ends(count: int) -> list[int]:
+    """Scenes after each batch, ``count`` at last."""
+    found = []
+    reach = FIRST
+    while reach < count:
+        found.append(reach)
+        reach *= 2
+    return [*found, count]
+
+
+def decided(goals: Goals, values: dict[str, list[float]], looks: int) -> bool | None:
+    """True: all limits are met; False: one is missed; None: more scenes are needed. ``values``: by metric."""
+    met = True
+    for name, limit in goals.limits():
+        if name not in values:
+            continue
+        low, high = bounds(name, values[name], ERR / looks)
+        if low > limit:
+            return False
+        met &= high <= limit
+    return True if met else None
+
+
+def bounds(name: str, values: Sequence[float], err: float) -> tuple[float, float]:
+    """Of the mean of a metric, each of which errs with at most this probability."""
+    known = np.array([value for value in values if not math.isnan(value)], float)
+    if not len(known):
+        return -math.inf, math.inf
+    mean = float(known.mean())
+    if name in SHARES:
+        low, high = (chernoff(mean, len(known), err, end) for end in (0.0, 1.0))
+        return low, high
+    if len(known) < ENOUGH:
+        return -math.inf, math.inf
+    half = NormalDist().inv_cdf(1 - err) * float(known.std(ddof=1)) / math.sqrt(len(known))
+    return mean - half, mean + half
+
+
+def chernoff(mean: float, count: int, err: float, end: float) -> float:
+    """The value between ``mean`` and ``end``, 0 or 1, whose relative entropy is ln(1/err)/count: the mean of values
+    between 0 and 1 lies beyond it with a probability of at most ``err`` (Hoeffding 1963, theorem 1)."""
+    most = math.log(1 / err) / count
+    near, far = mean, end
+    for _ in range(60):
+        middle = (near + far) / 2
+        near, far = (near, middle) if _entropy(mean, middle) > most else (middle, far)
+    return far
+
+
+def _entropy(p: float, q: float) -> float:
+    """Of a coin with the probability p relative to one with q."""
+    parts = ((p, q), (1 - p, 1 - q))
+    return sum(one * math.log(one / other) if other else math.inf for one, other in parts if one)
