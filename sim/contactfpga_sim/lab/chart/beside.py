@@ -21,6 +21,9 @@ from contactfpga_sim.model.scenes.families import touches
 PITCH_MM = 6.4
 """Of the tiles under which other ways to read a sheet are drawn."""
 
+TOUCHES = 50
+"""The most of each family for such a point; a page has a table of them in its place."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Rival:

@@ -38,10 +38,9 @@ def compute() -> list[Point]:
 def draw(folder: Path, points: list[Point]) -> list[Path]:
     """The chart, its times, and the README's picture."""
     chart, small = folder.parent / "chart", folder / "front.svg"
-    rivals = beside.rivals(FAMILIES_DRAWN, PLACEMENTS, 0)
-    picture.save(points, chart, rivals)
+    picture.save(points, chart)
     times_picture.save(points, chart / "times.svg")
-    front_picture.save(points, small, rivals)
+    front_picture.save(points, small)
     return [chart / "chart.svg", chart / "times.svg", small]
 
 

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     print(path, flush=True)
     points = table.read(path, {task.method: Method(task.skin, task.cover) for task in tasks})
     families = list(dict.fromkeys(task.family for task in tasks))
-    picture.save(points, folder, beside.rivals(families, args.placements, args.seed))
+    picture.save(points, folder, beside.rivals(families, min(args.placements, beside.TOUCHES), args.seed))
     times_picture.save(points, folder / "times.svg")
     for name in ("chart.png", "chart.svg", "times.svg"):
         print(folder / name)
