@@ -24,7 +24,17 @@ SLACK_S = 3.0
 SCENES = "examples/scenes-bumper.toml"
 POOLS = {
     "chart": (
-        ["study", "chart", "--placements", "125", "--method", "run, 10 mm, bare", "--method", "run, 20 mm, tiles", "--no-size"],
+        [
+            "study",
+            "chart",
+            "--placements",
+            "125",
+            "--method",
+            "run, 10 mm, bare",
+            "--method",
+            "run, 20 mm, tiles",
+            "--no-size",
+        ],
         2,
     ),
     "fit": (["fit", SCENES, "--cover", "bare", "--placements", "80"], 2),
