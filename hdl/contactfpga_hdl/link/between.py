@@ -14,7 +14,7 @@ from contactfpga.wire.units import plain_bytes
 from contactfpga_hdl.link.faults import Reporter
 
 FRAMES_BEFORE_UNITS = 4
-"""As many frames go in a row while readings of units wait."""
+"""Frames sent in a row while unit readings wait."""
 
 
 class Wire(Protocol):

@@ -30,7 +30,7 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.press import Cover, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
-"""Parts of a pitch into which stress is resolved: two to the foam's thickness, six to a face, as far as so many do."""
+"""Least and most grid steps per pitch; between them, two steps per foam thickness and six per face."""
 
 MOST_PITCHES = 20
 """Thickness of the foam in pitches up to which forces are computed; they are the same for all switches long before."""
@@ -87,7 +87,7 @@ class Cells:
         return self.closed_by(self.forces_n(loads), before)
 
     def closed_by(self, forces_n: Floats, before: np.ndarray | None = None) -> np.ndarray:
-        """As :meth:`closed`, by the (rows, columns) forces on the switches in N."""
+        """Closed switches, (rows, columns) bool, under (rows, columns) forces in N; ``before``: see :meth:`closed`."""
         thresholds = self.thresholds_n
         if before is not None and self.cover.switch.hysteresis:
             thresholds = np.where(before, thresholds * (1 - self.cover.switch.hysteresis), thresholds)
