@@ -43,7 +43,7 @@ skins = [
     small.replace(report="cells", row_order=(2, 1, 0), baud=4_000_000),
 ]
 for skin in skins:
-    rtlil.convert(Top(skin), name="top")
+    rtlil.convert(Top(skin, probes=True), name="top")
 rtlil.convert(SeveralTop(Several((small.replace(**chains),) * 2)), name="top")
 for name, module in sorted(sys.modules.items()):
     if name.split(".")[0] in ("contactfpga", "contactfpga_hdl") and module is not stub:
