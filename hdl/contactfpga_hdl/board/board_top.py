@@ -95,7 +95,7 @@ class BoardTop(Elaboratable):
 
     def _column_levels(self, core: Top) -> Value:
         if not drives_columns_both_ways(self.skin):
-            return Const(-int(self.skin.selects_low), self.skin.columns)
+            return Const(-int(self.skin.selects_low), self.skin.column_lines)
         level = core.columns_level.replicate(self.skin.columns)
         return Cat(level, ~core.columns_level) if self.skin.guard else level
 

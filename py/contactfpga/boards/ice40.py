@@ -9,6 +9,8 @@ _PMOD = "1 2 3 4 7 8 9 10"
 _FT2232H = Bridge("FT2232H", (0x0403, 0x6010), 1, 12_000_000)  # interface 0 programs the flash
 # iceprog comes with IceStorm, is what both boards' makers name, and finds the FT2232H by itself.
 _ICEPROG = Programmer("iceprog", (), "sudo apt install fpga-icestorm")
+# What a 74HC595 drives at 3.3 V, series resistors at its outputs, pull-ups that a row of 16 pressed switches bears.
+_ON_REGISTERS = {"pin_ohm": 85.0, "series_ohm": 33.0, "line_pf": 50.0}
 _PULLS: dict[str, dict[str, object]] = {"col2row": {"PULLUP": 1}, "row2col": {}}
 
 ICEBREAKER = BoardSpec(
@@ -28,7 +30,8 @@ ICEBREAKER = BoardSpec(
     programmer=_ICEPROG,
     bitstream="bin",
     constraints="icebreaker.pcf",
-    skin=Skin(row_drive="74hc595", release_us=2.0),  # a switched-off row has to be lifted by the pull-ups
+    skin=Skin(row_drive="74hc595", precharge_us=0.25, settle_us=2.0, release_us=0.5),
+    circuit={**_ON_REGISTERS, "column_pull_ohm": 47_000.0},
 )
 
 ICESTICK = BoardSpec(
@@ -48,5 +51,7 @@ ICESTICK = BoardSpec(
     programmer=_ICEPROG,
     bitstream="bin",
     constraints="icestick.pcf",
-    skin=Skin(rows=8, columns=8, labeller="serial"),  # `run` takes 1,422 logic cells of 1,280
+    # 1,257 logic cells of 1,280; driving the columns back would take 1,361, `run` more.
+    skin=Skin(labeller="serial", row_drive="74hc595", release_us=4.0),
+    circuit={**_ON_REGISTERS, "column_pull_ohm": 22_000.0},
 )

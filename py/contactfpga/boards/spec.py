@@ -91,6 +91,8 @@ class BoardSpec:
     """File in constraints/; boards with the same pins share it."""
     skin: Skin
     """A sheet that fits, built unless another one is given."""
+    circuit: Mapping[str, float]
+    """What that sheet is made of: the values of its table ``[circuit]``."""
     uart: tuple[str, str] | None = None
     """Connector pins of an external bridge, where the board receives and where it sends; None: it has one on board."""
     held_high: tuple[str, ...] = ()
@@ -132,6 +134,10 @@ class BoardSpec:
         pins = iter(side)
         return {name: tuple(itertools.islice(pins, count)) for name, count in wires.items()}
 
+    def load(self, path: str | Path) -> Skin:
+        """A Skin's file; one that states no ``clock_hz`` or ``baud`` takes those of the board's own Skin."""
+        return Skin.load(path, usual={"clock_hz": self.skin.clock_hz, "baud": self.skin.baud})
+
     def label(self, pin: str) -> str:
         """What is printed on the board beside a pin."""
         connector, _, number = pin.partition(":")
@@ -139,12 +145,24 @@ class BoardSpec:
 
     def check(self, skin: Skin | Several) -> None:
         """Raise SkinError where ``skin``, or several sheets, cannot be built for this board."""
+        self.check_clock(skin)
+        self.check_pins(skin)
+        self.check_baud(skin)
+
+    def check_clock(self, skin: Skin | Several) -> None:
+        """Raise SkinError for a clock that neither the crystal nor the PLL makes."""
         if skin.clock_hz != self.clock_hz:
             pll.dividers(self.pll, self.clock_hz, skin.clock_hz)
+
+    def check_pins(self, skin: Skin | Several) -> None:
+        """Raise SkinError for more wires than there are pins."""
         if isinstance(skin, Several):
             self._check_sheets(skin)
         else:
             self._check_wires(skin)
+
+    def check_baud(self, skin: Skin | Several) -> None:
+        """Raise SkinError for a rate that the bridge does not reach, or misses by more than a UART bears."""
         if skin.baud > self.bridge.max_baud:
             raise SkinError(
                 f"baud is {skin.baud}, the {self.bridge.chip} of {self.title} reaches {self.bridge.max_baud} at most"

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -153,11 +154,12 @@ class Skin:
         checks.check_timing(self)
 
     @classmethod
-    def load(cls, path: str | Path, trust: bool = False) -> Skin:
+    def load(cls, path: str | Path, trust: bool = False, usual: Mapping[str, Any] | None = None) -> Skin:
         """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
         ``[circuit]`` are not the Skin's: :func:`contactfpga.design.cover.load_cover` and
         :func:`contactfpga.design.circuit.load_circuit` read them. A file that names a module, such as
-        ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code."""
+        ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code. ``usual``: values of fields that the file
+        leaves out, instead of their defaults."""
         values = tomlfile.load(path, SkinError)
         with trusted(trust):
             refuse_modules(values, str(path))
@@ -172,7 +174,7 @@ class Skin:
             tables = "and the tables [cover] and [circuit]"
             raise SkinError(f"{path}: unknown key {shown(unknown[0])}; known are {', '.join(known)}, {tables}")
         try:
-            return cls(**values)
+            return cls(**{**(usual or {}), **values})
         except SkinError as error:
             raise SkinError(f"{path}: {error}") from None
 

@@ -5,7 +5,7 @@ study of failures. SI units; capacitances in pF and times in us where a name say
 """
 
 from contactfpga.design.circuit.static import Problem, check, load_checked, problems
-from contactfpga.design.circuit.times import Needs, needed
+from contactfpga.design.circuit.times import Needs, check_times, needed, recommended_us
 from contactfpga.design.circuit.values import DIODES, SCHOTTKY, SILICON, Circuit, CircuitError, Diode, load_circuit
 
 __all__ = [
@@ -18,8 +18,10 @@ __all__ = [
     "Needs",
     "Problem",
     "check",
+    "check_times",
     "load_checked",
     "load_circuit",
     "needed",
     "problems",
+    "recommended_us",
 ]

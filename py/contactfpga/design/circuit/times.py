@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable, Mapping
 from contactfpga.design.circuit import patterns, phases, static
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels, Phase, PhaseResult
-from contactfpga.design.circuit.values import Circuit
+from contactfpga.design.circuit.values import Circuit, CircuitError
+from contactfpga.skin import Skin
 
 MARGIN = 1.3
 """What is recommended is this many times what the model takes."""
@@ -93,6 +94,32 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
         row_peak_ma=max(map(_peak_ma, [*settled, *released])),
         column_peak_ma=max(map(_peak_ma, charged)),
     )
+
+
+def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str, float | None]:
+    """For each time of the Skin that its circuit limits, what is recommended in us; None where no time is enough."""
+    found = {"settle_us": needs.settle.us(margin)}
+    if skin.precharge_us:
+        found["precharge_us"] = needs.precharge.us(margin)
+    else:
+        found["release_us"] = needs.pulled_release.us(margin)
+    if skin.reads_rows:
+        found["project_us"] = needs.project.us(margin)
+    return found
+
+
+def check_times(circuit: Circuit, skin: Skin) -> None:
+    """Raise :class:`CircuitError` where a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`. Takes
+    some 3 seconds at 64x64."""
+    wanted = recommended_us(skin, needed(circuit, skin.rows, skin.columns, skin.diodes))
+    short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
+    if not short:
+        return
+    given = ", ".join(f"{name} = {getattr(skin, name):g}" for name in short)
+    if None in short.values():
+        raise CircuitError(f"{given}: no time is enough for this circuit; `contactfpga settle` says what would help")
+    needs = ", ".join(f"{name} = {us:g}" for name, us in short.items())
+    raise CircuitError(f"{given}: too short for this circuit; {needs} would do, {MARGIN:g} times what it takes")
 
 
 class _Sheet:

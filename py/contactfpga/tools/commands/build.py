@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,9 @@ from contactfpga import terminal
 from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.boards.wiring import Connection, Output, Wire
-from contactfpga.design.circuit import Circuit, load_checked
-from contactfpga.errors import ContactFPGAError
+from contactfpga.design import buildable, kits
+from contactfpga.design.circuit import Circuit, CircuitError, check_times, load_checked, load_circuit
+from contactfpga.errors import UNSOLVED, ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
 from contactfpga.tools.console import flags, numbers, outputs
@@ -26,22 +28,26 @@ BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec.
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument("board", metavar="BOARD", help=BOARD)
+    parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
     flags.design(parser, "Skin to build (default: one that fits the board).")
     parser.add_argument("--output", metavar="DIR", help="Folder for the results (default: build/BOARD).")
     start = "Seed of place and route (default: 1)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
+    check = "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would."
+    parser.add_argument("--check", action="store_true", help=check)
     parser.add_argument("--wiring", action="store_true", help="Only print the wiring table; build nothing.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the command; :data:`UNSOLVED` where ``--check`` finds that something does not fit."""
     from contactfpga_hdl.board import sites
 
-    board = find(args.board)
-    design = flags.designed(args, board.skin)
-    circuit = load_checked(args.skin, design) if isinstance(design, Skin) and args.skin else None
+    board = _board(args)
+    design = flags.designed(args, board.skin, board.load)
+    if args.check:
+        return _check(args, board, design)
+    circuit = _circuit(args, board, design)
     board.check(design)
     table = WiringTable(board, design, circuit, sites.wire_sites(board, wiring.wires(board, design)))
     built = {} if args.wiring else _built(args, board, design)
@@ -51,6 +57,69 @@ def run(args: argparse.Namespace) -> int:
     else:
         table.show()
     return 0
+
+
+def _board(args: argparse.Namespace) -> BoardSpec:
+    if not args.kit:
+        if not args.board:
+            raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {' or --kit '.join(kits.names())}")
+        return find(args.board)
+    board = kits.kit(args.kit).board
+    if args.board and args.board != board.name:
+        raise ContactFPGAError(f"the kit {args.kit!r} is for {board.name}, not {args.board}; leave the board out")
+    return board
+
+
+def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
+    """What the Skin's file says, or of the board's own Skin what it is made of, if it works and its times are enough."""
+    if isinstance(design, Several):
+        return None
+    circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)
+    if circuit is not None:
+        try:
+            check_times(circuit, design)
+        except CircuitError as error:
+            raise CircuitError(f"{args.skin or board.title}: {error}") from None
+    return circuit
+
+
+def _check(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> int:
+    """Print what fits and what does not, and values that fit together."""
+    from contactfpga_hdl.board import build
+
+    if isinstance(design, Several):
+        raise ContactFPGAError("--check takes one sheet; build several ones, which names the first thing that is wrong")
+    circuit = load_circuit(args.skin) if args.skin else Circuit(**board.circuit)
+    answer: dict[str, Any] = {"board": board.name, "problems": buildable.findings(board, design, circuit)}
+    try:
+        changes = buildable.proposed(board, design, circuit)
+        with tempfile.TemporaryDirectory() as folder:
+            report = build.build(design.replace(**changes), board, Path(folder), args.seed)
+        answer |= {"changes": changes, "report": dataclasses.asdict(report)}
+    except (ContactFPGAError, build.BitstreamFailed) as error:
+        answer["unsolved"] = str(error)
+    if args.json:
+        print(json.dumps(answer))
+    else:
+        _show_check(board, answer, circuit is not None, report.lines() if "report" in answer else [])
+    return UNSOLVED if any(answer["problems"].values()) or "unsolved" in answer else 0
+
+
+def _show_check(board: BoardSpec, answer: dict[str, Any], stated: bool, size: list[str]) -> None:
+    terminal.say(board.title)
+    for name, problem in answer["problems"].items():
+        terminal.say(f"{name:13}{problem or 'fits'}", hang=13)
+    if not stated:
+        terminal.say("circuit      not stated: add a table [circuit] and its levels and times are checked, too", hang=13)
+    if "unsolved" in answer:
+        terminal.say(f"no values were found that fit together: {answer['unsolved']}", hang=2)
+        return
+    if answer["changes"]:
+        terminal.say("With these values in the Skin's file all of it fits:")
+        for name, value in answer["changes"].items():
+            terminal.say(f"    {name} = {json.dumps(value)}")
+    for line in size:
+        terminal.say(line)
 
 
 def _changed(several: Several) -> list[dict[str, Any]]:

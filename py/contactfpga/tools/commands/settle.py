@@ -15,7 +15,7 @@ from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.design.circuit.values import DIODE_LIMITS, LIMITS
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin, limits
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import flags, numbers
 
 EXTRA = None
 
@@ -47,7 +47,7 @@ DIODE_WORDS = {
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     skin = "Skin that gives rows, columns, diodes and the table [circuit]; flags below replace values of that table."
-    parser.add_argument("--skin", metavar="FILE", help=skin)
+    flags.sheet(parser, skin)
     lines = numbers.whole(1, limits.MAX_LINES, "lines")
     parser.add_argument("--rows", type=lines, metavar="N", help="Number of rows (default: the Skin's, or 16).")
     parser.add_argument("--columns", type=lines, metavar="N", help="Number of columns (default: the Skin's, or 16).")
@@ -75,7 +75,9 @@ def _flag(name: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; :data:`UNSOLVED` if the sheet cannot work, or a time is never long enough."""
+    """Run the command; :data:`UNSOLVED` if the sheet cannot work, a time is never long enough, or the Skin's are too
+    short."""
+    args.skin = flags.sheet_file(args)
     skin = Skin.load(args.skin) if args.skin else Skin()
     if skin.diodes == "none" and args.diodes is None:
         raise CircuitError("diodes is 'none'; the model is of sheets with a diode per switch")
@@ -84,15 +86,17 @@ def run(args: argparse.Namespace) -> int:
     diodes = args.diodes or skin.diodes
     values = _changed(given, args)
     needs = sheet.needed(values, rows, columns, diodes)
-    problems = sheet.problems(values, rows, columns, diodes, projects=True)
+    projects = skin.reads_rows if args.skin else True
+    problems = sheet.problems(values, rows, columns, diodes, projects)
     answer = _answer(values, needs, problems, args.margin) | {"rows": rows, "columns": columns, "diodes": diodes}
     if args.skin:
-        answer["skin"] = _given(skin, answer)
+        answer["skin"] = _given(skin, sheet.recommended_us(skin, needs, args.margin))
     if args.json:
         print(json.dumps(answer, allow_nan=False))
     else:
         _show(answer, needs, args.margin)
-    return UNSOLVED if problems or None in answer.values() else 0
+    short = any(not one["enough"] for one in answer.get("skin", {}).values())
+    return UNSOLVED if problems or short or None in answer.values() else 0
 
 
 def _changed(given: Circuit, args: argparse.Namespace) -> Circuit:
@@ -136,22 +140,15 @@ def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: flo
     }
 
 
-def _given(skin: Skin, answer: dict[str, Any]) -> dict[str, Any]:
+def _given(skin: Skin, wanted: dict[str, float | None]) -> dict[str, Any]:
     """Whether the Skin's times are enough."""
-    needs = {"settle_us": answer["settle_us"]}
-    if skin.precharge_us:
-        needs["precharge_us"] = answer["precharge_us"]
-    else:
-        needs["release_us"] = answer["pulled_release_us"]
-    if skin.reads_rows:
-        needs["project_us"] = answer["project_us"]
     return {
         name: {
             "given": getattr(skin, name),
             "needed": needed,
             "enough": needed is not None and getattr(skin, name) >= needed,
         }
-        for name, needed in needs.items()
+        for name, needed in wanted.items()
     }
 
 

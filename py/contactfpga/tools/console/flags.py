@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
+from contactfpga.design import kits
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError
@@ -34,19 +36,35 @@ def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
     parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
 
 
-def design(parser: argparse.ArgumentParser, skin: str) -> None:
-    """A Skin or several of them; ``skin``: the help of this option."""
+def sheet(parser: argparse.ArgumentParser, skin: str) -> None:
+    """A Skin's file or a kit's name; ``skin``: the help of the former."""
     parser.add_argument("--skin", metavar="FILE", help=skin)
+    parser.add_argument("--kit", metavar="NAME", help="The sheet of this kit (docs/kits.md).")
+
+
+def sheet_file(args: argparse.Namespace) -> str | None:
+    """The Skin's file that the options of :func:`sheet` name, or None."""
+    if not args.kit:
+        return args.skin
+    if args.skin:
+        raise ContactFPGAError("give --skin or --kit, not both; a kit has its own Skin")
+    return str(kits.kit(args.kit).skin_path)
+
+
+def design(parser: argparse.ArgumentParser, skin: str) -> None:
+    """A Skin, a kit's or several of them; ``skin``: the help of the first option."""
+    sheet(parser, skin)
     parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
 
 
-def designed(args: argparse.Namespace, usual: Skin) -> Skin | Several:
-    """What the options of :func:`design` name, or the usual Skin."""
+def designed(args: argparse.Namespace, usual: Skin, load: Callable[[str], Skin] = Skin.load) -> Skin | Several:
+    """What the options of :func:`design` name, or the usual Skin; ``load`` reads a Skin's file."""
+    args.skin = sheet_file(args)
     if args.skin and args.sheets:
         raise ContactFPGAError("give --skin or --sheets, not both; the Skins of several sheets are in their file")
     if args.sheets:
         return Several.load(args.sheets)
-    return Skin.load(args.skin) if args.skin else usual
+    return load(args.skin) if args.skin else usual
 
 
 def seconds(parser: argparse.ArgumentParser) -> None:

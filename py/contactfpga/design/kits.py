@@ -1,0 +1,66 @@
+"""Kits: a sheet, its cover, its board and the parts beside them, as files under ``examples/kits``."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from pathlib import Path
+
+from contactfpga.boards import find
+from contactfpga.boards.spec import BoardSpec
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+from contactfpga.shipped import examples
+from contactfpga.skin import Skin
+
+
+class KitError(ContactFPGAError, ValueError):
+    """A kit that does not exist or whose files are wrong; the message names the file and what it may hold."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """Something to buy that is not on the sheet's own board."""
+
+    count: int
+    what: str
+    maker: str
+    number: str
+    """The maker's; "" where any part of the description will do, and the description then says what counts."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Kit:
+    """A sheet that one can build, with everything that belongs to it."""
+
+    name: str
+    title: str
+    board: BoardSpec
+    parts: tuple[Part, ...]
+    folder: Path
+
+    @property
+    def skin_path(self) -> Path:
+        """The Skin's file, with the tables ``[circuit]`` and ``[cover]``."""
+        return self.folder / "skin.toml"
+
+    @functools.cached_property
+    def skin(self) -> Skin:
+        """What the bitstream is built from."""
+        return self.board.load(self.skin_path)
+
+
+def names() -> list[str]:
+    """The names of all kits, sorted."""
+    return sorted(path.parent.name for path in (examples() / "kits").glob("*/kit.toml"))
+
+
+def kit(name: str) -> Kit:
+    """The kit of this name; raises :class:`KitError`."""
+    if name not in names():
+        raise KitError(f"{shown(name)} is no kit; take one of {', '.join(names())}")
+    folder = examples() / "kits" / name
+    values = tomlfile.load(folder / "kit.toml", KitError)
+    parts = tuple(Part(**tomlfile.fields_of(Part, "part", part, KitError)) for part in values.get("part", ()))
+    return Kit(name, values["title"], find(values["board"]), parts, folder)
