@@ -121,8 +121,9 @@ _ALL = (
         "fit",
         title="Skins that `contactfpga fit` chooses for the examples",
         page="fit.md",
-        minutes=5,
+        minutes=10,
         sections={
+            "fingers": Section("tables:fingers_section"),
             "bumper": Section("tables:bumper_section"),
             "hands": Section("tables:hands_section"),
             "sole": Section("tables:sole_section"),
