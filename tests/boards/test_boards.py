@@ -187,19 +187,19 @@ def test_an_external_bridge_has_two_pins_and_a_line_that_rests_high_where_none_i
         ),
         (
             ICEBREAKER,
-            {"row_drive": "direct", "rows": 3, "columns": 30},
+            {"row_drive": "direct", "rows": 3, "columns": 30, "settle_us": 5},
             "3 rows and 30 columns take 3 + 30 wires, iCEBreaker has 23 free pins beside `contact`; "
             'set column_read = "74hc165"',
         ),
         (
             ICEBREAKER,
-            {"row_drive": "direct", "rows": 30, "column_read": "74hc165"},
+            {"row_drive": "direct", "rows": 30, "column_read": "74hc165", "precharge_us": 0},
             "30 rows and 16 columns take 30 + 3 wires, iCEBreaker has 23 free pins beside `contact`; "
             'set row_drive = "74hc595"',
         ),
         (
             ICEBREAKER,
-            {"row_chains": 16, "column_read": "74hc165", "column_chains": 8},
+            {"row_chains": 16, "column_read": "74hc165", "precharge_us": 0, "column_chains": 8},
             "16 rows and 16 columns take 19 + 10 wires, iCEBreaker has 23 free pins beside `contact`; use fewer chains",
         ),
         (
@@ -255,7 +255,7 @@ def test_the_example_of_64x64_fits_the_pins_of_the_icebreaker():
     ICEBREAKER.check(skin)
     text = (ROOT / PAGE).read_text()
     wires = sum(len(pins) for pins in ICEBREAKER.pins(skin).values())
-    assert f"with {wires} wires and a scan in {skin.derived.frame_clocks / 12:g} us" in text
+    assert f"with {wires} wires and a scan in {skin.derived.frame_clocks / 12_000:.1f} ms" in text
 
 
 def test_unknown_board_is_named_with_the_known_ones():

@@ -111,7 +111,7 @@ def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(build, "build", built)
     assert cli.main(["build", "icestick", "--output", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines()[:7] == [
-        "iCEStick, 8x8, report 'moments'",
+        "iCEStick, 16x16, report 'moments'",
         "LUT4         562 of 1280",
         "flip-flops   482",
         "logic cells  791 of 1280",

@@ -14,7 +14,7 @@ from contactfpga.tools.commands.build import WiringTable, ohms
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 
-CHAINED = {"rows": 20, "columns": 12, "row_drive": "74hc595", "column_read": "74hc165", "release_us": 4.0}
+CHAINED = {"precharge_us": 0, "rows": 20, "columns": 12, "row_drive": "74hc595", "column_read": "74hc165", "release_us": 4.0}
 CHANGES = {
     "as shipped": {},
     "direct": {"rows": 4, "columns": 7, "row_drive": "direct"},
@@ -180,8 +180,10 @@ def test_resistors_are_those_of_the_files_circuit(tmp_path, capsys):
     }
 
 
-def test_without_a_circuit_no_value_is_made_up(capsys):
-    out = printed(capsys, "ulx3s-12f", "--wiring")
+def test_without_a_circuit_no_value_is_made_up(tmp_path, capsys):
+    file = tmp_path / "skin.toml"
+    file.write_text("rows = 4\n")
+    out = printed(capsys, "ulx3s-12f", "--wiring", "--skin", str(file))
     assert "Ω" not in out
     assert re.search(r"^columns\[0\] .*column 0 +to 3\.3 V *$", out, re.M)
     assert "its table [circuit]" in out
@@ -202,8 +204,9 @@ def test_one_object_holds_what_was_built(tmp_path, monkeypatch, capsys):
     answer = json.loads(printed(capsys, "icestick", "--json", "--output", str(tmp_path)))
     assert answer["bitstream"] == str(tmp_path / "contactfpga.bin")
     assert answer["report"]["luts"] == [562, 1280]
-    assert len(answer["wires"]) == 8 + 8 + 4
-    assert answer["outputs"] == []
+    assert len(answer["wires"]) == 4 + 16 + 4
+    assert len(answer["outputs"]) == 16
+    assert {one["series_ohm"] for one in answer["outputs"]} == {33}
 
 
 @pytest.mark.parametrize(("value", "text"), [(33.0, "33 Ω"), (4700.0, "4.7 kΩ"), (100_000.0, "100 kΩ"), (1e6, "1 MΩ")])

@@ -91,7 +91,7 @@ class BoardSpec:
     """File in constraints/; boards with the same pins share it."""
     skin: Skin
     """A sheet that fits, built unless another one is given."""
-    circuit: Mapping[str, float]
+    circuit: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """What that sheet is made of: the values of its table ``[circuit]``."""
     uart: tuple[str, str] | None = None
     """Connector pins of an external bridge, where the board receives and where it sends; None: it has one on board."""

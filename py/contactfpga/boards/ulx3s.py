@@ -36,7 +36,7 @@ ULX3S_12F = BoardSpec(
     bitstream="bit",
     constraints="ulx3s.lpf",
     # 3 Mbaud is 4 % off at 25 MHz.
-    skin=Skin(precharge_us=0.25, settle_us=1.0, release_us=0.5, clock_hz=25_000_000, baud=1_000_000),
+    skin=Skin(precharge_us=0.25, settle_us=2.0, release_us=0.5, clock_hz=25_000_000, baud=1_000_000),
     circuit={"series_ohm": 33.0, "line_pf": 50.0, "column_pull_ohm": 47_000.0},
     held_high=("L2",),  # GPIO0 of the ESP32: low puts it into its boot loader
 )
@@ -57,5 +57,5 @@ ULX3S_12F_FT232H = dataclasses.replace(
     uart=("gpio_0:26+", "gpio_0:26-"),
     bridge=_FT232H,
     constraints="ulx3s-ft232h.lpf",
-    skin=Skin(precharge_us=0.25, settle_us=1.0, release_us=0.5, clock_hz=60_000_000, baud=12_000_000),
+    skin=Skin(precharge_us=0.25, settle_us=2.0, release_us=0.5, clock_hz=60_000_000, baud=12_000_000),
 )

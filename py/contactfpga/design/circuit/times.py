@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
 
@@ -61,6 +62,7 @@ class Needs:
     column_peak_ma: float
 
 
+@functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
     """Times, levels and currents of a sheet. Takes some 3 seconds at 64x64."""
     sheet = _Sheet(circuit, rows, columns, diodes)
