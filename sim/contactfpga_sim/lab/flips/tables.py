@@ -69,6 +69,12 @@ def worst_text(found: FlipResults) -> str:
     ]
     groups.sort(key=lambda group: -max(row.found.seconds for row in group[1]))
     lines = [f"- {name}: {_worst(some)}" for name, some in groups]
+    if fought := [row for row in rows if row.found.fights]:
+        worst = max(fought, key=lambda row: row.found.fights)
+        lines.append(
+            f"- A column was driven against a row in {len(fought)} of {len(rows):,} flips, for at most "
+            f"{worst.found.fights} clocks: `{worst.found.name}` in `{worst.design}`."
+        )
     return "\n".join((*lines, "", "A flip that was not drawn may be worse than all of these."))
 
 
