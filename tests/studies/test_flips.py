@@ -348,6 +348,21 @@ def test_tables_count_what_came_out():
     ]
 
 
+def test_a_flip_that_drives_pins_against_each_other_is_followed_and_counted():
+    """Of the rows that a board of driven columns selects: a driven column meets one in a pressed switch."""
+    skin = PLAIN.replace(scan="reversal", precharge_us=1.0, project_us=1.0, send="on_change", fail_safe=False)
+    for fast in made(skin):
+        place, first = place_of(fast.board, "scan.cycle.selected"), fast.step_clocks * 24
+        found = [
+            flip.follow(fast, Flip(Bit(place, 0, row), clock))
+            for row in range(4)
+            for clock in range(first, first + 120, 7)
+        ]
+        fights = [one.fights for one in found]
+        assert 0 < max(fights) < 100
+        assert 0 in fights
+
+
 @pytest.mark.campaign
 def test_a_raster_scan_finds_its_row_again(plain):
     for name in ("scan.pattern", "scan.row", "scan.is_last", "scan.done_is_row"):

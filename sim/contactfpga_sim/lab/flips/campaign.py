@@ -152,6 +152,7 @@ def _row(line: dict[str, str]) -> Row:
         frames=int(line["frames"]),
         seconds=float(line["seconds"]),
         gone_s=float(line["gone_s"]),
+        fights=int(line["fights"]),
     )
     return Row(line["design"], found)
 

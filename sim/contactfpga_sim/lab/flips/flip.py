@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import itertools
 from collections.abc import Iterator, Sequence
@@ -11,7 +12,9 @@ import numpy as np
 
 from contactfpga_sim.lab.flips import touches
 from contactfpga_sim.lab.flips.reference import AFTER_S, FIRST_S, LAST_S, DeliveredFrame, Listener, Reference
+from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.state import Bit, Storage
+from contactfpga_sim.model.sheet.matrix import Contention
 
 SETTLED_STEPS = 4
 """The driver hears this many more once the board is what it was."""
@@ -44,6 +47,8 @@ class FlipOutcome(NamedTuple):
     """From the first frame that was silently wrong until the next right one."""
     gone_s: float
     """When the board was again what it would have been; infinite if it was not within the time."""
+    fights: int = 0
+    """Clocks in which a column was driven against a row."""
 
 
 def module(name: str) -> str:
@@ -70,7 +75,14 @@ def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Fli
 
 def follow(reference: Reference, flip: Flip) -> FlipOutcome:
     """Flip it and say what comes of it."""
+    before = reference.board.fights
     listener, heard, gone_s = _run(reference, flip)
+    return _judged(reference, flip, listener, heard, gone_s)._replace(fights=reference.board.fights - before)
+
+
+def _judged(
+    reference: Reference, flip: Flip, listener: Listener, heard: list[DeliveredFrame], gone_s: float
+) -> FlipOutcome:
     place = reference.board.places[flip.bit.place]
     begun_s = flip.cycle / reference.skin.clock_hz
     told = _told(reference, listener, heard, gone_s, begun_s)
@@ -100,11 +112,11 @@ def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFram
     number = flip.cycle // clocks
     board.go_to(reference.steps[number].moment)
     board.press(reference.sheets[number])
-    board.run(flip.cycle - board.cycle)
+    _advance(board, flip.cycle - board.cycle)
     board.flip(flip.bit)
     listener, heard, gone_s = copy.deepcopy(reference.steps[number].listener), [], float("inf")
     last = number + round(AFTER_S / touches.STEP_S)
-    board.run((number + 1) * clocks - flip.cycle)
+    _advance(board, (number + 1) * clocks - flip.cycle)
     for step in range(number + 1, last + 1):
         heard += listener.hear(board.take("received"), skin.clock_hz)
         if board.same(reference.steps[step].moment):
@@ -113,10 +125,16 @@ def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFram
                 heard += listener.hear(following.events, skin.clock_hz)
             break
         board.press(reference.sheets[step])
-        board.run(clocks)
+        _advance(board, clocks)
     else:
         heard += listener.hear(board.take("received"), skin.clock_hz)
     return listener, [one for one in heard if one.time_s > flip.cycle / skin.clock_hz], gone_s
+
+
+def _advance(board: CompiledBoard, clocks: int) -> None:
+    """Run on where pins meet at different levels, too: they are counted."""
+    with contextlib.suppress(Contention):
+        board.run(clocks)
 
 
 def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame], gone_s: float, begun_s: float) -> str:

@@ -69,6 +69,13 @@ def worst_text(found: FlipResults) -> str:
     ]
     groups.sort(key=lambda group: -max(row.found.seconds for row in group[1]))
     lines = [f"- {name}: {_worst(some)}" for name, some in groups]
+    if fought := [row for row in rows if row.found.fights]:
+        worst = max(fought, key=lambda row: row.found.fights)
+        lines.append(
+            f"- A column was driven against a row in {len(fought)} of {len(rows):,} flips, for {worst.found.fights} "
+            f"{'clock' if worst.found.fights == 1 else 'clocks'} at most: `{worst.found.name}` in `{worst.design}`. The "
+            "resistors at the pins bound its current ([which](maker.md#which-resistor-at-each-pin))."
+        )
     return "\n".join((*lines, "", "A flip that was not drawn may be worse than all of these."))
 
 

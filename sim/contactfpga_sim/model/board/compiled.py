@@ -206,8 +206,13 @@ class CompiledBoard(CompiledModel):
         )
         self._check_pins()
 
+    @property
+    def fights(self) -> int:
+        """Clocks since the board was made in which a column was driven against a row."""
+        return int(self._call("fights"))
+
     def _check_pins(self) -> None:
-        if clocks := self._call("fights"):
+        if clocks := self.fights:
             raise Contention(f"in {clocks} clocks a column was driven against a row")
 
     def pull_low(self, cycles: int) -> None:
