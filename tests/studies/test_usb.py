@@ -6,6 +6,7 @@ import random
 
 import numpy as np
 import pytest
+from bridge_oracle import brute
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import Bridge
@@ -86,37 +87,6 @@ def test_a_full_speed_bridge_takes_a_frame():
     assert late.worst == pytest.approx(end_us(line, 33) + 2000 + 8 * (13 + 2 + 1) / 12, abs=1e-9)
 
 
-def brute(settings, line, byte, phase_us):
-    """The same for one phase: a list of bytes, and a loop over frames that does what AN232B-04 says."""
-    buffer, ready, place, arrived = [], [], 0, []
-    frame, sent = settings.chip.frame_us, phase_us
-    fed = [(time / MHZ, value, number) for number, (time, value) in enumerate(zip(line.times, line.values))]
-    at = phase_us
-    first = True
-    while True:
-        while place < len(fed) and fed[place][0] <= at:
-            _, value, number = fed[place]
-            place += 1
-            buffer.append(number)
-            full = len(buffer) == settings.chip.payload_bytes
-            if full or (settings.event is not None and value == settings.event and len(buffer) >= 2):
-                ready.append(buffer)
-                buffer = []
-        if first or round(at - sent, 6) >= 1000 * settings.timer_ms:
-            ready.append(buffer)
-            buffer = []
-        first = False
-        bus = 0.0
-        for one in ready:
-            bus += settings.packet_us(len(one))
-            if byte in one:
-                return at + bus
-            arrived += one
-        sent = at if ready else sent
-        ready = []
-        at += frame
-
-
 @pytest.mark.parametrize("seed", range(12))
 def test_every_phase_is_that_of_a_chip_stepped_frame_by_frame(seed):
     rng = random.Random(seed)
@@ -142,7 +112,7 @@ def test_every_phase_is_that_of_a_chip_stepped_frame_by_frame(seed):
         phase = origin / MHZ + settings.period_us * share
         within = share - np.cumsum(late.weight)[place] + late.weight[place]
         found = late.low[place] + within / late.weight[place] * (late.high[place] - late.low[place])
-        assert found == pytest.approx(brute(settings, line, byte, phase), abs=1e-6)
+        assert found == pytest.approx(brute(settings, MHZ, line, byte, phase), abs=1e-6)
 
 
 @pytest.mark.parametrize("event", [0, None])
@@ -155,8 +125,7 @@ def test_the_chip_that_is_stepped_sends_the_same(event):
         middle = (late.low[place] + late.high[place]) / 2
         share = np.cumsum(late.weight)[place] - late.weight[place] / 2
         phase = (line.since + settings.period_us * MHZ * share) / MHZ
-        chip = BridgeChip(FAST.payload_bytes, 1000, event)
-        chip._sent = phase - 1000
+        chip = BridgeChip(FAST.payload_bytes, 1000, event, sent=phase - 1000)
         for time, value in zip(line.times / MHZ, line.values):
             chip.put(time, int(value))
         before, at = 0, phase

@@ -78,14 +78,14 @@ class BridgeSettings:
 
 
 class BridgeChip:
-    """The chip, byte by byte; times in any unit, those of ``timer``."""
+    """The chip, byte by byte; times in any unit, that of ``timer``. ``sent``: when it has sent last."""
 
-    def __init__(self, payload_bytes: int, timer: float, event: int | None = None):
+    def __init__(self, payload_bytes: int, timer: float, event: int | None = None, sent: float = 0.0):
         self._payload_bytes, self._timer, self._event = payload_bytes, timer, event
         self._coming: collections.deque[tuple[float, int]] = collections.deque()
         self._open = bytearray()
         self._closed: list[bytes] = []
-        self._sent = 0.0
+        self._sent = sent
 
     def put(self, time: float, value: int) -> None:
         """A byte whose stop bit ends at this time; in their order."""
