@@ -177,15 +177,22 @@ def test_all_rows_and_the_picture(run, tmp_path, monkeypatch):
     assert rows["host to user code"].endswith("1 left out as the machine was busy")
     assert rows["measured on"] == "a machine, 2 cores"
     assert "6,000 us" in rows["paper"]
-    worst = [float(rows[title].replace(" us worst", "").split(", ")[2].split()[0]) for title in ("touch to host", "touch to user code")]
+    worst = [
+        float(rows[title].replace(" us worst", "").split(", ")[2].split()[0])
+        for title in ("touch to host", "touch to user code")
+    ]
     assert worst[1] == pytest.approx(worst[0] + 300, abs=0.11)
     assert "host" not in rows["touch to last byte"]
     drawn = picture.read_text()
-    assert all(f">{title}<" in drawn for title in ("touch to last byte", "last byte to host", "host to user code", "the paper"))
+    assert all(
+        f">{title}<" in drawn for title in ("touch to last byte", "last byte to host", "host to user code", "the paper")
+    )
 
 
 def test_settings_of_the_bridge_are_told(run):
-    status, out, _ = run("--board", "icebreaker", "--touches", "1", "--exact", "--timer", "2", "--no-event-char", "--json")
+    status, out, _ = run(
+        "--board", "icebreaker", "--touches", "1", "--exact", "--timer", "2", "--no-event-char", "--json"
+    )
     assert status == 0
     found = json.loads(out)
     assert found["bridge"] == {"chip": "FT2232H", "frame_us": 125, "latency_timer_ms": 2, "event_character": None}

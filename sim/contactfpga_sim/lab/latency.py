@@ -94,8 +94,8 @@ def measure(
     """A contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
 
     Each comes when the sheet has been reported untouched, at instants spread evenly over a scan. Touches that meet a
-    hello or a keep-alive on the wire are repeated. ``step`` is called after each, with its kind and how many there are. ``around_us``: how long before a touch, and after
-    its frame, all bytes are recorded, in us.
+    hello or a keep-alive on the wire are repeated. ``step`` is called after each, with its kind and how many there are.
+    ``around_us``: how long before a touch, and after its frame, all bytes are recorded, in us.
 
     Raises ValueError for a contact that does not fit, and :class:`Late`.
     """

@@ -58,7 +58,8 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 def alone() -> None:
-    """To be called first in a worker: it and all that it starts are one group, which is ended as a whole, and ends with its parent."""
+    """To be called first in a worker: it and all that it starts are one group, which is ended as a whole, and ends with
+    its parent."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
     signal.signal(signal.SIGTERM, _leave)

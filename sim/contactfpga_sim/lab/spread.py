@@ -38,7 +38,9 @@ class Times:
     def mixed(cls, parts: Iterable[Times]) -> Times:
         """Each of the parts, as likely as the others."""
         parts = list(parts)
-        low, high, weight = (np.concatenate([getattr(one, name) for one in parts]) for name in ("low", "high", "weight"))
+        low, high, weight = (
+            np.concatenate([getattr(one, name) for one in parts]) for name in ("low", "high", "weight")
+        )
         return cls(low, high, weight / len(parts))
 
     def later(self, us: float) -> Times:

@@ -3,16 +3,16 @@
 From FTDI's AN232B-04, "Data Throughput, Latency and Handshaking":
 
 - A packet is closed when it is full, and when the event character comes, unless that is the packet's first byte.
-- The latency timer runs from the last packet that was sent. When it ends, the open packet is sent, even an empty one. It
-  takes 1 to 255 ms, 16 ms by default.
+- The latency timer runs from the last packet that was sent. When it ends, the open packet is sent, even an empty one.
+  It takes 1 to 255 ms, 16 ms by default.
 
 From the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and the
 time that a packet takes on the bus (tables 5-9 and 5-10).
 
-Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip then sends all packets
-that are closed, first in first out. Real controllers ask again within a frame, so bytes may come sooner, by one frame at
-most. Nothing else is on the bus, nothing is repeated, no bits are stuffed, and a byte is in the chip when its stop bit
-ends.
+Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip then sends all
+packets that are closed, first in first out. Real controllers ask again within a frame, so bytes may come sooner, by one
+frame at most. The timer counts from frame to frame. Nothing else is on the bus, nothing is repeated, no bits are
+stuffed, and a byte is in the chip when its stop bit ends.
 """
 
 from __future__ import annotations

@@ -28,16 +28,19 @@ ENDINGS = (".svg", ".png")
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument("--skin", metavar="FILE", help="Skin to measure (default: that of --board, else the reference Skin).")
+    parser.add_argument(
+        "--skin", metavar="FILE", help="Skin to measure (default: that of --board, else the reference Skin)."
+    )
     bridge = f"Board whose USB bridge is taken: {', '.join(boards.BOARDS)}, or one of your own (default: {BOARD})."
     parser.add_argument("--board", metavar="NAME", help=bridge)
     size = "Rows and columns of the contact (default: 3x3, a fingertip)."
     parser.add_argument("--cells", type=_cells, default=(3, 3), metavar="HxW", help=size)
     count = "Number of places to touch, spread over the sheet (default: every place)."
     parser.add_argument("--touches", type=numbers.whole(1, 4096), metavar="N", help=count)
-    timer = f"Latency timer of the bridge (default: {health.LATENCY_MS}, which `contactfpga doctor` advises; a chip's own is 16)."
-    parser.add_argument("--timer", type=numbers.whole(1, 255, "ms"), default=health.LATENCY_MS, metavar="MS", help=timer)
-    event = "A bridge without event character, as it is by default."
+    own = health.LATENCY_MS
+    timer = f"Latency timer of the bridge in ms (default: {own}, as `contactfpga doctor` advises; a new bridge has 16)."
+    parser.add_argument("--timer", type=numbers.whole(1, 255, "ms"), default=own, metavar="MS", help=timer)
+    event = "Take a bridge without event character, as a new one is."
     parser.add_argument("--no-event-char", action="store_true", help=event)
     exact = "Leave out the host's share, which is measured on this machine and varies."
     parser.add_argument("--exact", action="store_true", help=exact)
@@ -63,8 +66,8 @@ def run(args: argparse.Namespace) -> int:
     if path is not None:
         from contactfpga_sim.lab.finger import picture
 
-        title = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.baud / 1e6:g} Mbaud, {board.bridge.chip} of {board.title}"
-        picture.save(found, title, path)
+        sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.baud / 1e6:g} Mbaud"
+        picture.save(found, f"{sheet}, {board.bridge.chip} of {board.title}", path)
     if args.json:
         print(json.dumps(found.as_json()))
         return 0

@@ -1,9 +1,9 @@
 """The host's share of a touch, measured: the driver that reads a real board, on a pseudo-terminal.
 
-A process of its own is the board and its USB bridge. It runs the compiled gateware, which answers the driver's requests,
-and writes what the bridge delivers when the bridge would deliver it. This program opens the port, as any does, and waits
-for frames. What is between the host's USB controller and the port is left out: the controller's interrupt and the
-kernel's driver of the chip. Here writing to the pseudo-terminal stands for them.
+A process of its own is the board and its USB bridge. It runs the compiled gateware, which answers the driver's
+requests, and writes what the bridge delivers when the bridge would deliver it. This program opens the port, as any does,
+and waits for frames. What is between the host's USB controller and the port is left out: the controller's interrupt and
+the kernel's driver of the chip. Here writing to the pseudo-terminal stands for them.
 """
 
 from __future__ import annotations

@@ -75,7 +75,9 @@ def measure(
     """
     chip = settings.chip
     if skin.baud > chip.max_baud:
-        raise TooFast(f"baud is {skin.baud}, the {chip.chip} reaches {chip.max_baud} at most; name a board with a faster one")
+        raise TooFast(
+            f"baud is {skin.baud}, the {chip.chip} reaches {chip.max_baud} at most; name a board with a faster one"
+        )
     frame, period = chip.frame_us, settings.period_us
     board = latency.measure(skin, cells, touches, step, around_us=(2 * period + frame, period + 2 * frame))
     us = skin.clock_hz / 1e6
