@@ -1,9 +1,9 @@
 """The host's share of a touch, measured: the driver that reads a real board, on a pseudo-terminal.
 
 A process of its own is the board and its USB bridge. It runs the compiled gateware, which answers the driver's
-requests, and writes what the bridge delivers when the bridge would deliver it. This program opens the port, as any does,
-and waits for frames. What is between the host's USB controller and the port is left out: the controller's interrupt and
-the kernel's driver of the chip. Here writing to the pseudo-terminal stands for them.
+requests, and writes what the bridge delivers when the bridge would deliver it. This program opens the port, as any
+does, and waits for frames. What is between the host's USB controller and the port is left out: the controller's
+interrupt and the kernel's driver of the chip. Here writing to the pseudo-terminal stands for them.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ LEAD_US = 5_000
 SPIN_S = 300e-6
 """A sleep may take longer by this, so the rest of a wait is spent looking at the clock."""
 
-LATE_S = 0.5e-3
-"""A touch is left out where this machine was too busy to write a packet in time, by more than this: what then comes at
-once would keep the driver busy as no bridge does."""
+LATE_S, LATE_US = 0.5e-3, 2_000
+"""A touch is left out where this machine was too busy to write a packet in time, by more than LATE_S, in the last
+LATE_US before the touch's own: what then comes at once would keep the driver busy as no bridge does."""
 
 TRIES = 3
 """Touches that are played for each that is wanted, at most."""
@@ -140,7 +140,7 @@ class _Player:
         self.time_us = context.RawArray("q", [-1] * touches)
         """By touch the time of its frame as it is on the wire."""
         self.late_s = context.RawArray("d", touches)
-        """By touch by how much a packet up to that one was written too late, at most."""
+        """By touch by how much that packet, or one shortly before, was written too late, at most."""
         self.process = context.Process(target=self._run, daemon=True)
 
     def close(self) -> None:
@@ -192,7 +192,7 @@ class _Player:
             data = b"".join(chip.take(at))
             due_s = begin_s + 1e-6 * (at - begin_us)
             _wait_until(due_s)
-            if written <= touch.byte:
+            if written <= touch.byte and at >= touch.last / mhz - LATE_US:
                 self.late_s[number] = max(self.late_s[number], time.monotonic() - due_s)
             if written <= touch.byte < written + len(data):
                 self.written_s[number] = time.monotonic()
