@@ -94,6 +94,8 @@ def _board_lines(skin: Skin, cells: tuple[int, int], found: Finger) -> list[tupl
 
 
 def _host_lines(title: str, found: Finger, exact: bool) -> list[tuple[str, str]]:
+    from contactfpga_sim.lab.finger import stages
+
     settings, share = found.settings, found.host
     event = "no event character" if settings.event is None else f"event character {settings.event}"
     every = f"{settings.chip.frame_us} us" if settings.chip.high_speed else "1 ms"
@@ -112,8 +114,13 @@ def _host_lines(title: str, found: Finger, exact: bool) -> list[tuple[str, str]]
         ]
     elif not exact:
         lines.append(("host to user code", "not measured: this machine has no pseudo-terminals, or is too busy"))
-    lines.append(("paper", "6,000 us from touch to decision, stated for its sheet and control together"))
-    return lines
+    assumed, paper = f"{stages.ASSUMED_HOST_US:g} us", f"{stages.PAPER_US:,.0f} us"
+    decision = f"{_times(found.decision_us)}, with {assumed} for the host as in `contactfpga study arm`"
+    return [
+        *lines,
+        ("touch to decision", decision),
+        ("the paper", f"{paper} for the same, its sheet and control together"),
+    ]
 
 
 def _times(us: Spread, digits: int = 1) -> str:

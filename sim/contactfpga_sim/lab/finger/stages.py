@@ -9,6 +9,7 @@ from typing import Any
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import latency
+from contactfpga_sim.lab.arm.parts import Usb
 from contactfpga_sim.lab.finger import host
 from contactfpga_sim.lab.finger.host import HostShare
 from contactfpga_sim.lab.latency import Latency
@@ -17,6 +18,9 @@ from contactfpga_sim.lab.usb import BridgeSettings, delivered
 
 PAPER_US = 6000.0
 """What the paper states for its sheet and control together, from a touch to the decision to turn back, in us."""
+
+ASSUMED_HOST_US = 1e6 * Usb().host_s
+"""From the host's USB controller to the decision, as ``contactfpga study arm`` takes it."""
 
 
 class TooFast(ContactFPGAError, ValueError):
@@ -38,6 +42,11 @@ class Finger:
     user_code_us: Spread | None
     """From the touch to user code on that machine: each exact time with each measured one."""
 
+    @property
+    def decision_us(self) -> Spread:
+        """From the touch to the decision, with :data:`ASSUMED_HOST_US` in place of what a machine takes."""
+        return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
+
     def as_json(self) -> dict[str, Any]:
         """All of it as plain values."""
         board = dataclasses.asdict(dataclasses.replace(self.board, recorded=()))
@@ -55,6 +64,8 @@ class Finger:
             "touch_to_host_us": dataclasses.asdict(self.usb_us),
             "host": measured | {"us": dataclasses.asdict(shares.us)} if shares else None,
             "touch_to_user_code_us": dataclasses.asdict(self.user_code_us) if self.user_code_us else None,
+            "assumed_host_us": ASSUMED_HOST_US,
+            "touch_to_decision_us": dataclasses.asdict(self.decision_us),
             "paper_touch_to_decision_us": PAPER_US,
         }
 
