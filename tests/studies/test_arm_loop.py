@@ -12,7 +12,8 @@ from contactfpga.skin import Skin
 from contactfpga.skin.latency import latency_s
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.world import Chip, Faults
+from contactfpga_sim.lab.arm.world import Faults
+from contactfpga_sim.lab.usb import BridgeChip
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, predict
 
@@ -138,14 +139,14 @@ def test_noise_delays_the_reaction_and_costs_force(by_uart):
 def test_the_chip_sends_when_its_timer_runs_out_or_a_packet_is_full(timer_ms):
     """A byte a microframe of 125 us; and 600 of them at once."""
     usb = dataclasses.replace(PAPER.usb, timer_s=timer_ms * 1e-3)
-    chip, came = Chip(usb), []
+    chip, came = BridgeChip(usb.packet_bytes, usb.timer_s), []
     for frame in range(1, 1200):
         if frame < 1000:
             chip.put((frame - 0.5) * usb.frame_s, frame % 256)
         if frame == 644:
             for _ in range(600):
                 chip.put((frame - 0.5) * usb.frame_s, 0)
-        came.append(len(chip.take(frame * usb.frame_s)))
+        came.append(len(b"".join(chip.take(frame * usb.frame_s))))
     period = timer_ms * 8
     assert [frame + 1 for frame in range(640) if came[frame]] == list(range(period, 641, period))
     assert set(came[:640]) == {0, period}

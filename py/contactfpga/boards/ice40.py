@@ -6,7 +6,7 @@ from contactfpga.boards.spec import BoardSpec, Bridge, Programmer, pins_of
 from contactfpga.skin import Skin
 
 _PMOD = "1 2 3 4 7 8 9 10"
-_FT2232H = Bridge("FT2232H", (0x0403, 0x6010), 1, 12_000_000)  # interface 0 programs the flash
+_FT2232H = Bridge("FT2232H", (0x0403, 0x6010), 1, 12_000_000, high_speed=True)  # interface 0 programs the flash
 # iceprog comes with IceStorm, is what both boards' makers name, and finds the FT2232H by itself.
 _ICEPROG = Programmer("iceprog", (), "sudo apt install fpga-icestorm")
 # What a 74HC595 drives at 3.3 V, series resistors at its outputs, pull-ups that a row of 16 pressed switches bears.

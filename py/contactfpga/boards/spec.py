@@ -44,6 +44,19 @@ class Bridge:
     interface: int | None
     """That carries the UART where the chip has several; None: it has one."""
     max_baud: int
+    high_speed: bool = False
+    """Whether it is a high-speed device, 480 Mbit/s; else a full-speed one, 12 Mbit/s."""
+
+    @property
+    def frame_us(self) -> int:
+        """From one start of USB's schedule to the next, in us: a microframe, or a frame (USB 2.0, 5.3.3)."""
+        return 125 if self.high_speed else 1000
+
+    @property
+    def payload_bytes(self) -> int:
+        """Bytes of the UART in a full packet: the largest of a bulk endpoint (USB 2.0, 5.8.3), less the two bytes of
+        status that begin each packet of an FTDI chip (AN232B-04)."""
+        return (512 if self.high_speed else 64) - 2
 
     def nearest(self, baud: int) -> float:
         """The rate the chip makes when asked for ``baud``."""

@@ -25,7 +25,7 @@ COMMANDS = {
     "doctor": "Find out what is wrong between this computer and the board.",
     "build": "Build a bitstream for a board; print its wiring.",
     "flash": "Write a bitstream to a board.",
-    "latency": "Measure the time from a touch to the last byte that reports it, on the simulated gateware.",
+    "latency": "Measure the time from a touch to the last byte, through USB and to your code, on simulated gateware.",
     "record": "Record a board, or all boards of a robot, into an MCAP file; repair one that was not closed.",
     "replay": "Send recorded frames through the compiled gateware.",
     "plot": "Draw a recording: where, when and how large it was touched.",

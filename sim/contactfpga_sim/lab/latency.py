@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import statistics
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
+from contactfpga_sim.lab.spread import Spread, Times
+from contactfpga_sim.lab.usb import ByteStream
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import ReceivedFrame, Receiver
 
@@ -29,17 +31,20 @@ MOVING_FRAMES = 300
 """For which the rate is counted, about."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Spread:
-    """Times in us."""
+class RecordedTouch(NamedTuple):
+    """A touch, and what was on the wire around it; all times in clocks from the touch on."""
 
-    median: float
-    worst: float
-
-    @classmethod
-    def of(cls, clocks: list[int], skin: Skin) -> Spread:
-        us = skin.clock_hz / 1e6
-        return cls(statistics.median(clocks) / us, max(clocks) / us)
+    last: int
+    """To the end of the last byte of the frame that shows all of it."""
+    pin: int
+    """To the contact pin."""
+    received: ReceivedFrame
+    """That frame; its times count from the board's power-up."""
+    start: int
+    """The touch itself, from power-up."""
+    stream: ByteStream
+    byte: int
+    """Number of that last byte in the stream."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +60,8 @@ class Latency:
     bytes: int
     """On the wire, of one frame with the contact; the most."""
     touches: int
+    recorded: tuple[RecordedTouch, ...] = dataclasses.field(default=(), repr=False)
+    """Each of them."""
 
 
 class Late(ContactFPGAError):
@@ -82,22 +89,26 @@ def measure(
     cells: tuple[int, int] = (3, 3),
     touches: int | None = None,
     step: Callable[[str, int], None] = lambda name, of: None,
+    around_us: tuple[int, int] = (0, 0),
 ) -> Latency:
     """A contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
 
     Each comes when the sheet has been reported untouched, at instants spread evenly over a scan. Touches that meet a
     hello or a keep-alive on the wire are repeated. ``step`` is called after each, with its kind and how many there are.
+    ``around_us``: how long before a touch, and after its frame, all bytes are recorded, in us.
 
     Raises ValueError for a contact that does not fit, and :class:`Late`.
     """
     contacts = places(skin, *cells)
     chosen = contacts if touches is None else [contacts[i * len(contacts) // touches] for i in range(touches)]
-    with _Bench(skin) as bench:
+    before, after = (round(us * skin.clock_hz / 1e6) for us in around_us)
+    with Bench(skin) as bench:
         found = []
         for number, contact in enumerate(chosen):
-            found.append(bench.touch(contact, number * GOLDEN % 1))
+            bench.line.clear()
+            found.append(bench.touch(contact, number * GOLDEN % 1, before, after))
             step("touches", len(chosen))
-        size = max(one.size for _, _, one in found)
+        size = max(one.received.size for one in found)
         most = max(int(contact.sum()) for contact in contacts)
         whole = [contact for contact in contacts if contact.sum() == most]  # told from one that lost a corner
         changes = []
@@ -106,42 +117,63 @@ def measure(
             step("changes", min(CHANGES, len(chosen)))
         rate = bench.moving(contacts, size)
     return Latency(
-        touch_to_last_byte_us=Spread.of([clocks for clocks, _, _ in found], skin),
-        touch_to_contact_us=Spread.of([clocks for _, clocks, _ in found], skin),
-        change_to_last_byte_us=Spread.of(changes, skin),
+        touch_to_last_byte_us=_spread([one.last for one in found], skin),
+        touch_to_contact_us=_spread([one.pin for one in found], skin),
+        change_to_last_byte_us=_spread(changes, skin),
         frames_per_s=rate,
         bytes=size,
         touches=len(found),
+        recorded=tuple(found),
     )
 
 
-class _Bench:
+def _spread(clocks: list[int], skin: Skin) -> Spread:
+    return Times.of([count / (skin.clock_hz / 1e6) for count in clocks]).spread()
+
+
+class Bench:
     """A compiled board that is touched and let go again and again."""
 
     def __init__(self, skin: Skin):
+        self.line: list[tuple[int, int]] = []
+        """Each byte that was seen: the board's clock in which its stop bit ended, and the byte. Whoever reads it may
+        clear it."""
+        self._cells: int | None = None  # in the last frame that was seen
         self._skin = skin
         self._derived = skin.derived
         self._untouched = np.zeros((skin.rows, skin.columns), bool)
         self._scan = self._derived.frame_clocks
+        self._byte = 10 * self._derived.bit_clocks
         debounce = (skin.debounce_press_us + skin.debounce_release_us) * self._derived.clocks_per_us
         self._patience = SCANS * self._scan + round(2 * debounce) * self._derived.debounced
-        packet = (self._derived.max_stored_bytes + 4) * 10 * self._derived.bit_clocks
+        packet = (self._derived.max_stored_bytes + 4) * self._byte
         self._patience += 4 * packet
         self._board = CompiledBoard(skin, ("bytes", "contact"))
         self._receiver = Receiver(skin)
 
-    def __enter__(self) -> _Bench:
+    def __enter__(self) -> Bench:
         self._board.run(self._patience)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._board.close()
 
-    def touch(self, cells: np.ndarray, share: float) -> tuple[int, int, ReceivedFrame]:
-        """Clocks to the end of the last byte of the frame that holds all of the contact, and to the contact pin."""
+    def send(self, data: bytes) -> None:
+        """Bytes from the host to the board."""
+        self._board.send(data)
+
+    def idle(self, clocks: int) -> None:
+        """Let this many clocks pass."""
+        self._board.run(clocks)
+        self._drop()
+
+    def touch(self, cells: np.ndarray, share: float, before: int = 0, after: int = 0) -> RecordedTouch:
+        """Touch the sheet at this share of a scan; ``before`` and ``after``: clocks that are recorded, from before the
+        touch until after the frame that shows all of it."""
+        rest = max(3, before // self._scan + 2)
         for _ in range(TRIES):
             self._let_go()
-            start = (self._board.cycle // self._scan + 3) * self._scan + round(share * self._scan)
+            start = (self._board.cycle // self._scan + rest) * self._scan + round(share * self._scan)
             self._board.run(start - self._board.cycle)
             self._drop()
             self._board.press(cells)
@@ -149,11 +181,19 @@ class _Bench:
             one, kept_alive = self._wait(int(cells.sum()))
             pin = next(int(event["cycle"]) for event in self._board.take("contact") if event["data"])
             if not kept_alive and self._receiver.hellos == hellos:
-                return one.last + 10 * self._derived.bit_clocks - start, pin - start, one
+                self.idle(after)
+                return self._recorded(one, start, pin, before)
         raise Late(
             f"{TRIES} touches in a row met a hello or a keep-alive; keep_alive_ms is {self._skin.keep_alive_ms:g}, "
             "measure with a longer one"
         )
+
+    def _recorded(self, one: ReceivedFrame, start: int, pin: int, before: int) -> RecordedTouch:
+        last, until = one.last + self._byte - start, self._board.cycle - start
+        seen = [(end - start, value) for end, value in self.line if -before < end - start <= until]
+        times, values = np.array(seen, np.int64).reshape(-1, 2).T
+        byte = int(np.searchsorted(times, last))
+        return RecordedTouch(last, pin - start, one, start, ByteStream(times, values, -before, until), byte)
 
     def change(self, contacts: list[np.ndarray], number: int, size: int) -> int:
         """Clocks from a change to the last byte of the frame that shows it: the contact has moved on by some places,
@@ -168,7 +208,7 @@ class _Bench:
         changed[tuple(np.argwhere(changed)[0])] = False
         self._board.press(changed)
         one, _ = self._wait(int(changed.sum()))
-        return one.last + 10 * self._derived.bit_clocks - start
+        return one.last + self._byte - start
 
     def moving(self, contacts: list[np.ndarray], size: int) -> float:
         """Frames received per second while the contact moves by one place, twice in the time that a frame's bits
@@ -185,7 +225,8 @@ class _Bench:
 
     def _let_go(self) -> None:
         self._board.press(self._untouched)
-        self._wait(0)
+        if self._cells != 0:
+            self._wait(0)
 
     def _wait(self, cells: int) -> tuple[ReceivedFrame, bool]:
         """The first frame with this many cells, and whether a keep-alive was on the wire before."""
@@ -204,7 +245,11 @@ class _Bench:
 
     def _frames(self) -> list[ReceivedFrame]:
         events = self._board.take("bytes")
-        return list(self._receiver.take(zip(events["cycle"].tolist(), events["data"].tolist(), strict=True)))
+        cycles, values = events["cycle"].tolist(), events["data"].tolist()
+        self.line += zip([cycle + self._byte for cycle in cycles], values, strict=True)
+        frames = list(self._receiver.take(zip(cycles, values, strict=True)))
+        self._cells = frames[-1].frame.cells if frames else self._cells
+        return frames
 
     def _drop(self) -> None:
         self._frames()

@@ -35,7 +35,7 @@ def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Execu
         with _cluster(dask) as workers:
             yield workers
         return
-    with ProcessPoolExecutor(jobs or usual_jobs, initializer=_alone) as workers:
+    with ProcessPoolExecutor(jobs or usual_jobs, initializer=alone) as workers:
         try:
             yield workers
         except BaseException:
@@ -57,8 +57,9 @@ def _cluster(address: str) -> Iterator[Executor]:
             raise
 
 
-def _alone() -> None:
-    """In a worker: it and all that it starts are one group, which is ended as a whole, and ends with its parent."""
+def alone() -> None:
+    """To be called first in a worker: it and all that it starts are one group, which is ended as a whole, and ends with
+    its parent."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
     signal.signal(signal.SIGTERM, _leave)

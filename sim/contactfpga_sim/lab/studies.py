@@ -210,6 +210,7 @@ _ALL = (
             "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample"),
             "report": Section("scans:report_table", sample="scans:report_sample"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
+            "bridges": Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
             "sides": Section("scans:sides_table", sample="scans:sides_sample"),
             "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table"),
             "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",)),

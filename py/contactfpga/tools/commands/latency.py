@@ -1,55 +1,138 @@
-"""`contactfpga latency`: from a touch to the last byte and to the contact pin."""
+"""`contactfpga latency`: from a touch to the contact pin, to the last byte, through USB, and to user code."""
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import re
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from contactfpga import terminal
+from contactfpga import boards, terminal
+from contactfpga.driver import health
 from contactfpga.skin import Skin
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import numbers, outputs
+
+if TYPE_CHECKING:
+    from contactfpga_sim.lab.finger.stages import Finger
+    from contactfpga_sim.lab.spread import Spread
 
 EXTRA = "sim"
 
 CELLS = re.compile(r"([1-9][0-9]?)x([1-9][0-9]?)")
 
+BOARD = "icebreaker"
+
+ENDINGS = (".svg", ".png")
+
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument("--skin", metavar="FILE", help="Skin to measure (default: the reference Skin).")
+    parser.add_argument(
+        "--skin", metavar="FILE", help="Skin to measure (default: that of --board, else the reference Skin)."
+    )
+    bridge = f"Board whose USB bridge is taken: {', '.join(boards.BOARDS)}, or one of your own (default: {BOARD})."
+    parser.add_argument("--board", metavar="NAME", help=bridge)
     size = "Rows and columns of the contact (default: 3x3, a fingertip)."
     parser.add_argument("--cells", type=_cells, default=(3, 3), metavar="HxW", help=size)
     count = "Number of places to touch, spread over the sheet (default: every place)."
     parser.add_argument("--touches", type=numbers.whole(1, 4096), metavar="N", help=count)
+    own = health.LATENCY_MS
+    timer = f"Latency timer of the bridge in ms (default: {own}, as `contactfpga doctor` advises; a new bridge has 16)."
+    parser.add_argument("--timer", type=numbers.whole(1, 255, "ms"), default=own, metavar="MS", help=timer)
+    event = "Take a bridge without event character, as a new one is."
+    parser.add_argument("--no-event-char", action="store_true", help=event)
+    exact = "Leave out the host's share, which is measured on this machine and varies."
+    parser.add_argument("--exact", action="store_true", help=exact)
+    picture = "Draw a bar for each stage, SVG or PNG by the ending."
+    parser.add_argument("--picture", metavar="FILE", help=picture)
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.lab import latency, pool
+    from contactfpga_sim.lab import pool
+    from contactfpga_sim.lab.finger import host, stages
+    from contactfpga_sim.lab.usb import BridgeSettings
 
-    skin = Skin.load(args.skin) if args.skin else Skin()
+    path = _picture(args.picture)
+    board = boards.find(args.board or BOARD)
+    skin = Skin.load(args.skin) if args.skin else board.skin if args.board else Skin()
+    event = None if args.no_event_char else health.EVENT_CHAR & 0xFF
+    settings = BridgeSettings(board.bridge, args.timer, event)
     with pool.progress() as step:
-        found = latency.measure(skin, args.cells, args.touches, step)
+        touches = 0 if args.exact else host.TOUCHES
+        found = stages.measure(skin, settings, args.cells, args.touches, host_touches=touches, step=step)
+    if path is not None:
+        from contactfpga_sim.lab.finger import picture
+
+        sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.baud / 1e6:g} Mbaud"
+        picture.save(found, f"{sheet}, {board.bridge.chip} of {board.title}", path)
     if args.json:
-        print(json.dumps(dataclasses.asdict(found)))
+        print(json.dumps(found.as_json()))
         return 0
-    height, width = args.cells
-    sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.clock_hz / 1e6:g} MHz, {skin.baud / 1e6:g} Mbaud"
-    last, pin, change = found.touch_to_last_byte_us, found.touch_to_contact_us, found.change_to_last_byte_us
-    for title, what in (
-        ("sheet", sheet),
-        ("contact", f"{height}x{width} cells at {found.touches} places, on the compiled gateware"),
-        ("touch to last byte", f"{last.median:.1f} us median, {last.worst:.1f} us worst"),
-        ("touch to contact pin", f"{pin.median:.2f} us median, {pin.worst:.2f} us worst"),
-        ("change to last byte", f"{change.median:.1f} us median, {change.worst:.1f} us worst, with frames on the wire"),
-        ("frames per second", f"{found.frames_per_s:,.0f} while it moves"),
-        ("bytes", f"{found.bytes} in a frame with the contact"),
-    ):
+    for title, what in (*_board_lines(skin, args.cells, found), *_host_lines(board.title, found, args.exact)):
         terminal.say(f"{title:22}{what}", hang=22)
+    if path is not None:
+        terminal.say(f"{'picture':22}{path}", hang=22)
     return 0
+
+
+def _board_lines(skin: Skin, cells: tuple[int, int], found: Finger) -> list[tuple[str, str]]:
+    board, (height, width) = found.board, cells
+    sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.clock_hz / 1e6:g} MHz, {skin.baud / 1e6:g} Mbaud"
+    change = _times(board.change_to_last_byte_us)
+    return [
+        ("sheet", sheet),
+        ("contact", f"{height}x{width} cells at {board.touches} places, on the compiled gateware"),
+        ("touch to contact pin", _times(board.touch_to_contact_us, 2)),
+        ("touch to last byte", _times(board.touch_to_last_byte_us)),
+        ("change to last byte", f"{change}, with frames on the wire"),
+        ("frames per second", f"{board.frames_per_s:,.0f} while it moves"),
+        ("bytes", f"{board.bytes} in a frame with the contact"),
+    ]
+
+
+def _host_lines(title: str, found: Finger, exact: bool) -> list[tuple[str, str]]:
+    from contactfpga_sim.lab.finger import stages
+
+    settings, share = found.settings, found.host
+    event = "no event character" if settings.event is None else f"event character {settings.event}"
+    every = f"{settings.chip.frame_us} us" if settings.chip.high_speed else "1 ms"
+    bridge = f"{settings.chip.chip} of {title}, asked every {every}, latency timer {settings.timer_ms} ms, {event}"
+    lines = [
+        ("bridge", bridge),
+        ("last byte to host", f"{_times(found.bridge_us)}, by a model of the bridge over all its phases"),
+        ("touch to host", f"{_times(found.usb_us)}, at its USB controller"),
+    ]
+    if share is not None and found.user_code_us is not None:
+        late = f", {share.left_out} left out as the machine was busy" if share.left_out else ""
+        lines += [
+            ("host to user code", f"{_times(share.us)}, measured by {share.touches} touches through the driver{late}"),
+            ("measured on", share.machine),
+            ("touch to user code", f"{_times(found.user_code_us)}, on that machine"),
+        ]
+    elif not exact:
+        lines.append(("host to user code", "not measured: this machine has no pseudo-terminals, or is too busy"))
+    assumed, paper = f"{stages.ASSUMED_HOST_US:g} us", f"{stages.PAPER_US:,.0f} us"
+    decision = f"{_times(found.decision_us)}, with {assumed} for the host as in `contactfpga study arm`"
+    return [
+        *lines,
+        ("touch to decision", decision),
+        ("the paper", f"{paper} for the same, its sheet and control together"),
+    ]
+
+
+def _times(us: Spread, digits: int = 1) -> str:
+    return f"{us.median:.{digits}f} us median, {us.p99:.{digits}f} us 99 %, {us.worst:.{digits}f} us worst"
+
+
+def _picture(name: str | None) -> Path | None:
+    if name is None:
+        return None
+    if Path(name).suffix.lower() not in ENDINGS:
+        raise ValueError(f"--picture is {name!r}; it must end in {' or '.join(ENDINGS)}")
+    return outputs.file(name, "--picture")
 
 
 def _cells(text: str) -> tuple[int, int]:

@@ -17,8 +17,9 @@ from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.control import Controller, SensorReadings
-from contactfpga_sim.lab.arm.parts import Touch, Usb
+from contactfpga_sim.lab.arm.parts import Touch
 from contactfpga_sim.lab.arm.plant import Plant, finite
+from contactfpga_sim.lab.usb import BridgeChip
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3
@@ -139,32 +140,6 @@ class UnitsUnderSheet:
         return b"".join(encode_command(number, Command(*one), pulsed=derived.pulsed) for number, one in numbered)
 
 
-class Chip:
-    """Holds bytes until it has a packet full or its latency timer ran out, which runs also while it has none; the host
-    takes them at its next frame."""
-
-    def __init__(self, usb: Usb):
-        self._usb = usb
-        self._held: collections.deque[tuple[float, int]] = collections.deque()
-        self._sent = 0.0
-
-    def put(self, seconds: float, value: int) -> None:
-        """A byte whose stop bit ended at this time."""
-        self._held.append((seconds, value))
-
-    def take(self, seconds: float) -> bytes:
-        """What the host takes now; called once at each of its frames."""
-        ready = sum(1 for at, _ in self._held if at <= seconds)
-        if ready < self._usb.packet_bytes and seconds - self._sent < self._usb.timer_s - 1e-9:
-            return b""
-        self._sent = seconds
-        return bytes(self._held.popleft()[1] for _ in range(min(ready, int(self._usb.packet_bytes))))
-
-    def frame_at(self, seconds: float) -> int:
-        """Number of the host's frame at a time."""
-        return math.floor(seconds / self._usb.frame_s + 1e-9)
-
-
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
 """How a contact comes to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;
 zones over UART and the host; not at all, so that the torque limit alone is left; the pin of a board with pressure units
@@ -227,7 +202,7 @@ class World:
             self._board.load(self._under.readings([0.0] * len(case.touch)))
             self._board.send(self._under.commands())
         self._clock_hz = skin.clock_hz
-        self._chip = Chip(case.usb)
+        self._chip = BridgeChip(int(case.usb.packet_bytes), case.usb.timer_s)
         self._bytes = b""
         self._cells = self._switches.at(-case.run.lead_s, (0.0,))
         self._closed = False
@@ -345,10 +320,10 @@ class World:
             self._chip.put(cycle / hz, self._noisy(cycle / hz - lead, value))
 
     def _host_frame(self) -> None:
-        frame = self._chip.frame_at(self.clock())
+        frame = math.floor(self.clock() / self.case.usb.frame_s + 1e-9)
         if frame != self._frame and self._way == "uart":
             self._catch_up()
-            self._bytes += self._chip.take(self.clock())
+            self._bytes += b"".join(self._chip.take(self.clock()))
         self._frame = frame
 
     def _noisy(self, seconds: float, value: int) -> int:

@@ -1,0 +1,102 @@
+"""The stages from a touch to user code: what is exact, and what is measured on one machine."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+from contactfpga_sim.lab import latency
+from contactfpga_sim.lab.arm.parts import Usb
+from contactfpga_sim.lab.finger import host
+from contactfpga_sim.lab.finger.host import HostShare
+from contactfpga_sim.lab.latency import Latency
+from contactfpga_sim.lab.spread import MEDIAN, MOST, Spread, Times, summed
+from contactfpga_sim.lab.usb import BridgeSettings, delivered
+
+PAPER_US = 6000.0
+"""What the paper states for its sheet and control together, from a touch to the decision to turn back, in us."""
+
+ASSUMED_HOST_US = 1e6 * Usb().host_s
+"""From the host's USB controller to the decision, as ``contactfpga study arm`` takes it."""
+
+
+class TooFast(ContactFPGAError, ValueError):
+    """The bridge does not reach the Skin's baud rate."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Finger:
+    """What :func:`measure` found. Times in us; all but ``host`` and ``user_code_us`` are exact."""
+
+    board: Latency
+    settings: BridgeSettings
+    bridge_us: Spread
+    """From the last byte on the wire to the host's USB controller."""
+    usb_us: Spread
+    """From the touch to there."""
+    host: HostShare | None
+    """None: not measured."""
+    user_code_us: Spread | None
+    """From the touch to user code on that machine: each exact time with each measured one."""
+
+    @property
+    def decision_us(self) -> Spread:
+        """From the touch to the decision, with :data:`ASSUMED_HOST_US` in place of what a machine takes."""
+        return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it as plain values."""
+        board = dataclasses.asdict(dataclasses.replace(self.board, recorded=()))
+        del board["recorded"]
+        shares = self.host
+        measured = {name: getattr(shares, name) for name in ("touches", "left_out", "machine")} if shares else {}
+        return board | {
+            "bridge": {
+                "chip": self.settings.chip.chip,
+                "frame_us": self.settings.chip.frame_us,
+                "latency_timer_ms": self.settings.timer_ms,
+                "event_character": self.settings.event,
+            },
+            "last_byte_to_host_us": dataclasses.asdict(self.bridge_us),
+            "touch_to_host_us": dataclasses.asdict(self.usb_us),
+            "host": measured | {"us": dataclasses.asdict(shares.us)} if shares else None,
+            "touch_to_user_code_us": dataclasses.asdict(self.user_code_us) if self.user_code_us else None,
+            "assumed_host_us": ASSUMED_HOST_US,
+            "touch_to_decision_us": dataclasses.asdict(self.decision_us),
+            "paper_touch_to_decision_us": PAPER_US,
+        }
+
+
+def measure(
+    skin: Skin,
+    settings: BridgeSettings,
+    cells: tuple[int, int] = (3, 3),
+    touches: int | None = None,
+    *,
+    host_touches: int = host.TOUCHES,
+    step: Callable[[str, int], None] = lambda name, of: None,
+) -> Finger:
+    """The board's stages as :func:`contactfpga_sim.lab.latency.measure` finds them, the bridge's over all of its phases
+    for each touch, and the host's of ``host_touches``, 0 for none.
+
+    Raises ValueError for a contact that does not fit, :class:`TooFast`, and :class:`~contactfpga_sim.lab.latency.Late`.
+    """
+    chip = settings.chip
+    if skin.baud > chip.max_baud:
+        raise TooFast(
+            f"baud is {skin.baud}, the {chip.chip} reaches {chip.max_baud} at most; name a board with a faster one"
+        )
+    frame, period = chip.frame_us, settings.period_us
+    board = latency.measure(skin, cells, touches, step, around_us=(2 * period + frame, period + 2 * frame))
+    us = skin.clock_hz / 1e6
+    late = [delivered(settings, skin.clock_hz, one.stream, one.byte) for one in board.recorded]
+    usb = Times.mixed(late)
+    bridge = Times.mixed(times.later(-one.last / us) for times, one in zip(late, board.recorded, strict=True))
+    share = host.measured(skin, settings, latency.places(skin, *cells), host_touches, step) if host_touches else None
+    code = None
+    if share is not None:
+        code = Spread(*(summed(usb, share.times, part) for part in (MEDIAN, MOST, 1.0)))
+    return Finger(board, settings, bridge.spread(), usb.spread(), share, code)
