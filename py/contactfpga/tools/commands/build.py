@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga import terminal
-from contactfpga.boards import BOARDS, find, wiring
+from contactfpga.boards import BOARDS, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.boards.wiring import Connection, Output, Wire
 from contactfpga.design import buildable, kits
@@ -43,7 +43,9 @@ def run(args: argparse.Namespace) -> int:
     """Run the command; :data:`UNSOLVED` where ``--check`` finds that something does not fit."""
     from contactfpga_hdl.board import sites
 
-    board = _board(args)
+    board = flags.board(args)
+    if board is None:
+        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {' or --kit '.join(kits.names())}")
     design = flags.designed(args, board.skin, board.load)
     if args.check:
         return _check(args, board, design)
@@ -57,17 +59,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         table.show()
     return 0
-
-
-def _board(args: argparse.Namespace) -> BoardSpec:
-    if not args.kit:
-        if not args.board:
-            raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {' or --kit '.join(kits.names())}")
-        return find(args.board)
-    board = kits.kit(args.kit).board
-    if args.board and args.board != board.name:
-        raise ContactFPGAError(f"the kit {args.kit!r} is for {board.name}, not {args.board}; leave the board out")
-    return board
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from contactfpga import boards, terminal
 from contactfpga.driver import health
 from contactfpga.skin import Skin
-from contactfpga.tools.console import numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.finger.stages import Finger
@@ -28,9 +28,7 @@ ENDINGS = (".svg", ".png")
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument(
-        "--skin", metavar="FILE", help="Skin to measure (default: that of --board, else the reference Skin)."
-    )
+    flags.sheet(parser, "Skin to measure (default: that of --board, else the reference Skin).")
     bridge = f"Board whose USB bridge is taken: {', '.join(boards.BOARDS)}, or one of your own (default: {BOARD})."
     parser.add_argument("--board", metavar="NAME", help=bridge)
     size = "Rows and columns of the contact (default: 3x3, a fingertip)."
@@ -56,8 +54,9 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_sim.lab.usb import BridgeSettings
 
     path = _picture(args.picture)
-    board = boards.find(args.board or BOARD)
-    skin = Skin.load(args.skin) if args.skin else board.skin if args.board else Skin()
+    named, file = flags.board(args), flags.sheet_file(args)
+    board = named or boards.find(BOARD)
+    skin = board.load(file) if named and file else Skin.load(file) if file else named.skin if named else Skin()
     event = None if args.no_event_char else health.EVENT_CHAR & 0xFF
     settings = BridgeSettings(board.bridge, args.timer, event)
     with pool.progress() as step:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
+from contactfpga.boards import find
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.design import kits
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
@@ -49,6 +51,16 @@ def sheet_file(args: argparse.Namespace) -> str | None:
     if args.skin:
         raise ContactFPGAError("give --skin or --kit, not both; a kit has its own Skin")
     return str(kits.kit(args.kit).skin_path)
+
+
+def board(args: argparse.Namespace) -> BoardSpec | None:
+    """The board that ``--board`` or its argument names, or that of ``--kit``; None where neither is given."""
+    if not args.kit:
+        return find(args.board) if args.board else None
+    kit = kits.kit(args.kit)
+    if args.board and args.board != kit.board.name:
+        raise ContactFPGAError(f"the kit {args.kit!r} is for {kit.board.name}, not {args.board}; leave the board out")
+    return kit.board
 
 
 def design(parser: argparse.ArgumentParser, skin: str) -> None:
