@@ -146,17 +146,32 @@ class _Matrix:
         found = []
         for row, number in enumerate(skin.line_of_row):
             pin, pull = port("rows", number, skin.row_lines), rows[number].pull
-            found.append(Line(self.row_net(row), pin, self.risers[row], "row", pull))
+            found.append(Line(self.row_net(row), pin, self.risers[row], "row", pull, bool(self._ends(row))))
         for column, number in enumerate(skin.line_of_column):
             pin, pull = port("columns", number, skin.column_lines), columns[number].pull
             x = column * self.px if column < skin.columns else self.guard_x
-            found.append(Line(self.column_net(column), pin, x, "column", pull))
+            used = column == skin.columns or self._last(column) >= 0
+            found.append(Line(self.column_net(column), pin, x, "column", pull, used))
         return sorted(found, key=lambda line: line.x)
+
+    def _ends(self, row: int) -> list[float]:
+        """Where along x something hangs on a row, from its start on."""
+        found = [column for column in range(self.skin.columns) if (row, column) not in self.masked]
+        ends = [column * self.px + _DIODE_AT[0] + 1.1 for column in found]
+        return [*ends, self.guard_x + _GUARD_DIODE_X] if self.skin.guard and row < self.skin.rows else ends
+
+    def _last(self, column: int) -> int:
+        """The last row at which something hangs on a column, the guard row counted; -1 for none."""
+        if self.skin.guard:
+            return self.skin.rows
+        return max((row for row in range(self.skin.rows) if (row, column) not in self.masked), default=-1)
 
     def draw(self, drawing: Drawing, base: float) -> None:
         """Draw all cells, and the lines up to ``base``."""
         for column in range(self.skin.columns):
-            drawing.run(self.column_net(column), "F", (column * self.px, base), (column * self.px, -self.switch.reach))
+            if self._last(column) >= 0:
+                x = column * self.px
+                drawing.run(self.column_net(column), "F", (x, base), (x, -self.switch.reach))
         for row in range(self.skin.rows):
             for column in range(self.skin.columns):
                 self._cell(drawing, row, column)
@@ -169,15 +184,17 @@ class _Matrix:
 
     def _cell(self, drawing: Drawing, row: int, column: int) -> None:
         x, y, net = column * self.px, self.row_y(row), self.column_net(column)
-        reach = self.switch.reach
-        if row + 1 < self.skin.rows:
+        reach, last = self.switch.reach, self._last(column)
+        if row < min(last, self.skin.rows - 1):
             drawing.run(net, "F", (x, y + reach), (x, y + self.py - reach))
         if (row, column) in self.masked:
-            drawing.run(net, "F", (x, y - reach), (x, y + reach))
+            if row < last:
+                drawing.run(net, "F", (x, y - reach), (x, y + reach))
             return
         node = self.row_net(row) if self.skin.diodes == "none" else f"N{row}_{column}"
         drawing.place("SW", self.switch.part, self.switch.part.name, (x, y), {"1": net, "2": node}, back=False)
-        for tracks, name in ((self.switch.column, net), (self.switch.diode, node)):
+        column_tracks = self.switch.column[: len(self.switch.column) - (self.switch.tail if row == last else 0)]
+        for tracks, name in ((column_tracks, net), (self.switch.diode, node)):
             for x1, y1, x2, y2 in tracks:
                 drawing.run(name, "F", (x + x1, y + y1), (x + x2, y + y2))
         self._to_row(drawing, x, y, node, self.row_net(row))
@@ -221,10 +238,9 @@ class _Matrix:
 
     def _row(self, drawing: Drawing, row: int, base: float) -> None:
         x, y, net = self.risers[row], self.row_y(row), self.row_net(row)
-        ends = [column * self.px + _DIODE_AT[0] + 1.1 for column in range(self.skin.columns)]
-        if self.skin.guard and row < self.skin.rows:
-            ends.append(self.guard_x + _GUARD_DIODE_X)
-        along = [(end, y + _ROW_Y) for end in ends]
+        along = [(end, y + _ROW_Y) for end in self._ends(row)]
+        if not along:
+            return
         if x < _ROW_START:
             foot = x, y + _ROW_Y
             drawing.run(net, "B", foot, *along)

@@ -67,6 +67,8 @@ class SwitchPart:
     """Tracks (x, y, x, y) from one end of the column to the other; pieces meet at their ends."""
     diode: tuple[tuple[float, float, float, float], ...]
     """Tracks from pads numbered 2 to the via of the diode."""
+    tail: int
+    """Of the column's tracks, so many at the end only lead on to the next cell."""
     reach: float
     half_width: float
     """The copper of the cell reaches this far to the left and right of its middle."""
@@ -100,6 +102,7 @@ DOME = SwitchPart(
     closed_by=1.5,
     column=tuple((*a, *b) for a, b in zip(_SIDES, _SIDES[1:])),
     diode=(),
+    tail=0,
     reach=_LEG,
     half_width=_LEG + 0.6,
     open_pf=0.6,  # a disk of 5 mm at 0.3 mm of air: eps0 pi 2.5^2 / 0.3 mm
@@ -122,6 +125,7 @@ TACT = SwitchPart(
     closed_by=1.5,
     column=tuple((*a, *b) for a, b in zip(_TACT_SIDE, _TACT_SIDE[1:])),
     diode=((2.4, 1.5, 2.4, -1.5), (2.4, -1.5, 0.0, -1.5), (0.0, -1.5, *DIODE_VIA)),
+    tail=2,
     reach=2.7,
     half_width=3.0,
     open_pf=0.5,

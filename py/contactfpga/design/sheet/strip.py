@@ -39,6 +39,8 @@ class Line:
     """``row`` or ``column``."""
     pull: str
     """``up``, ``down`` or nothing."""
+    used: bool = True
+    """It has copper in the matrix: something hangs on it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,8 +88,9 @@ def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], 
 def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float) -> Iterator[Pin]:
     """A line's resistors, and their tracks up to the channel."""
     x, middle = line.x, base - 1.9
-    drawing.via(line.net, x, base)
-    drawing.run(line.net, "B", (x, base), (x, middle + 0.8))
+    if line.used:
+        drawing.via(line.net, x, base)
+        drawing.run(line.net, "B", (x, base), (x, middle + 0.8))
     ohms = f"{circuit.series_ohm:g}"
     drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90)
     yield _stepped(drawing, line.pin, x, middle - 0.8)
