@@ -77,7 +77,8 @@ def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", marg
 
 def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
     """The finest pitch in mm, along x and along y, at which the cells of a Skin hold their parts."""
-    wide, high = switch.part.width + 2 * CLEARANCE_MM, max(switch.part.height + CLEARANCE_MM, 2 * switch.reach, _CELL_HEIGHT)
+    wide = switch.part.width + CLEARANCE_MM
+    high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, _CELL_HEIGHT)
     if skin.columns > 1:
         wide = max(wide, 2 * switch.half_width + VIA_MM + 2 * CLEARANCE_MM, 2 * PLACE_MM)
     if skin.closed and skin.guard:
@@ -255,10 +256,11 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
     left, top, right = ends
     around = -skin.pitch_x_mm / 2, (skin.columns - 0.5) * skin.pitch_x_mm
     if skin.closed:
-        if left < around[0] + EDGE_MM or right > around[1] - EDGE_MM:
+        if min(left - around[0], around[1] - right) < EDGE_MM - 1e-6:
             raise SheetError(
-                f"the connectors and shift registers take {right - left:.1f} mm, and the closed sheet has "
-                f"{around[1] - around[0]:.1f} mm around; take fewer lines, more chains on fewer chips, or a larger radius"
+                f"radius_mm is {skin.radius_mm:g}: connectors, shift registers and resistors lie from {left:.1f} to {right:.1f} "
+                f"mm, and the closed sheet's edges at {around[0]:.1f} and {around[1]:.1f}, {EDGE_MM} mm of them free; take fewer "
+                "lines or a larger radius"
             )
         left, right = around
     else:

@@ -21,6 +21,7 @@ from contactfpga.skin import Skin
 PLACE_MM = 2.6
 """Width of a line's place: two resistors side by side."""
 _BESIDE = PLACE_MM / 2
+_PAD = RESISTOR.pads[0].height / 2
 LINES_A_GROUND = 4
 """Of so many neighboring wires of a cable one is ground."""
 ENABLE_OHM = 10_000
@@ -81,7 +82,7 @@ def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], 
     channel.join(drawing, pins, bottom)
     widths = [(unit.x, unit.part.width / 2) for unit in plugs + chips]
     ends += [x - half for x, half in widths] + [x + half for x, half in widths]
-    ends += [min(line.x for line in lines) - PLACE_MM, max(line.x for line in lines) + _BESIDE]
+    ends += [min(line.x for line in lines) - _BESIDE - _PAD, max(line.x for line in lines) + _PAD]
     return min(ends), top - plugs[0].part.height / 2, max(ends)
 
 
