@@ -10,11 +10,11 @@ import pytest
 pytest.importorskip("gerbonara", reason="gerbonara is not installed")
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 
-from traced_board import TracedBoard, lines_of  # noqa: E402
+from traced_board import TracedBoard, lines_of
 
-from contactfpga import Skin  # noqa: E402
-from contactfpga.design.sheet import check, files, lay_out  # noqa: E402
-from contactfpga.design.sheet.caps import caps  # noqa: E402
+from contactfpga import Skin
+from contactfpga.design.sheet import check, files, lay_out
+from contactfpga.design.sheet.caps import caps
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 

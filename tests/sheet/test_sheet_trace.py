@@ -10,18 +10,18 @@ from sample import sample
 pytest.importorskip("gerbonara", reason="gerbonara is not installed")
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 
-from traced_board import TracedBoard, lines_of  # noqa: E402
+from traced_board import TracedBoard, lines_of
 
-from contactfpga import Skin  # noqa: E402
-from contactfpga.boards import BOARDS, wiring  # noqa: E402
-from contactfpga.design.sheet import files, lay_out  # noqa: E402
-from contactfpga.design.sheet.caps import caps  # noqa: E402
+from contactfpga import Skin
+from contactfpga.boards import BOARDS, wiring
+from contactfpga.design.sheet import files, lay_out
+from contactfpga.design.sheet.caps import caps
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 
-TILE = dict(pitch_x_mm=6.4, pitch_y_mm=6.4)
-CLOSED = dict(surface="cylinder", closed=True)
-REGISTERS = dict(row_drive="74hc595", column_read="74hc165")
+TILE = {"pitch_x_mm": 6.4, "pitch_y_mm": 6.4}
+CLOSED = {"surface": "cylinder", "closed": True}
+REGISTERS = {"row_drive": "74hc595", "column_read": "74hc165"}
 
 
 def shuffled(count, seed):
@@ -36,7 +36,10 @@ SKINS = {
     "12x20 chains": (Skin(rows=12, columns=20, row_chains=3, column_chains=2, guard=True, **REGISTERS), "tact"),
     "16x16 595": (Skin(row_drive="74hc595", column_order=shuffled(16, 1), row_order=shuffled(16, 2), **TILE), "dome"),
     "10x9 165": (Skin(rows=10, columns=9, column_read="74hc165", diodes="row2col", guard=True), "tact"),
-    "6x5 reversal": (Skin(rows=6, columns=5, scan="reversal", precharge_us=0.25, guard=True, row_order=shuffled(6, 3)), "dome"),
+    "6x5 reversal": (
+        Skin(rows=6, columns=5, scan="reversal", precharge_us=0.25, guard=True, row_order=shuffled(6, 3)),
+        "dome",
+    ),
     "9x12 closed guard": (Skin(rows=9, columns=12, radius_mm=16.0, guard=True, pitch_y_mm=5.5, **CLOSED), "dome"),
     "7x4 bare": (Skin(rows=7, columns=4, diodes="none", connectivity=4), "dome"),
     "masked": (Skin(rows=5, columns=5, mask=(*((r, 2) for r in range(5)), *((4, c) for c in (0, 1, 3, 4)))), "tact"),

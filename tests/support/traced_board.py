@@ -1,7 +1,7 @@
 """What a sheet's files say is joined: Gerbers and drill read by gerbonara, drawn as images, and their copper labeled.
 
-Shares no code with the layout. Which pad lies where comes from the file for the board's electrical test, read by gerbonara
-as well; what is joined comes from the copper alone.
+Shares no code with the layout. Which pad lies where comes from the file for the board's electrical test, read by
+gerbonara as well; what is joined comes from the copper alone.
 """
 
 import csv
@@ -30,9 +30,12 @@ def _points(primitive):
         return np.column_stack([primitive.x + primitive.r * np.cos(angles), primitive.y + primitive.r * np.sin(angles)])
     if name == "Rectangle":
         w, h = primitive.w / 2, primitive.h / 2
-        assert primitive.rotation == 0
-        return np.array([(-w, -h), (w, -h), (w, h), (-w, h)]) + (primitive.x, primitive.y)
-    raise AssertionError(name)
+        c, s = math.cos(primitive.rotation), math.sin(primitive.rotation)
+        corners = np.array([(-w, -h), (w, -h), (w, h), (-w, h)])
+        return corners @ np.array([(c, s), (-s, c)]) + (primitive.x, primitive.y)
+    assert name == "ArcPoly"
+    assert not any(primitive.arc_centers)
+    return np.array(primitive.outline)
 
 
 class _Image:
@@ -44,6 +47,7 @@ class _Image:
         return np.round((np.asarray(points) - self.low) / PIXEL_MM * 2**SHIFT).astype(np.int32)
 
     def draw(self, primitive):
+        assert primitive.polarity_dark
         if type(primitive).__name__ != "Line":
             cv2.fillPoly(self.pixels, [self._scaled(_points(primitive))], 255, shift=SHIFT)
             return
@@ -64,6 +68,15 @@ class _Image:
         return int(labels[row, column])
 
 
+def drawn_layer(path, low, high):
+    """A Gerber file as an image from one corner to the other."""
+    image = _Image(low, high)
+    for thing in GerberFile.open(path).objects:
+        for primitive in thing.to_primitives(MM):
+            image.draw(primitive)
+    return image
+
+
 class TracedBoard:
     """The board in a folder of files; ``folder`` may have been tampered with."""
 
@@ -72,10 +85,7 @@ class TracedBoard:
         left, bottom, right, top = self._edge()
         self._layers, self._images = {}, {}
         for side in ("top", "bottom"):
-            image = _Image((left, bottom), (right, top))
-            for thing in GerberFile.open(folder / f"{name}-{side}-copper.gbr").objects:
-                for primitive in thing.to_primitives(MM):
-                    image.draw(primitive)
+            image = drawn_layer(folder / f"{name}-{side}-copper.gbr", (left, bottom), (right, top))
             self._layers[side], self._images[side] = image.labels(), image
         self._join()
         self._read_pads()
@@ -113,7 +123,7 @@ class TracedBoard:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             records = Netlist.open(self.folder / f"{self.name}.ipc").test_records
-        self.pads, self.said = defaultdict(list), {}
+        self.pads, self.said, self.places = defaultdict(list), {}, {}
         for one in records:
             side = "bottom" if one.access_layer == 2 else "top"
             where = self.copper(side, MM(one.x, one.unit), MM(one.y, one.unit))
@@ -122,6 +132,7 @@ class TracedBoard:
                 continue
             assert one.pad_type in (PadType.SMD_PAD, PadType.THROUGH_HOLE)
             self.pads[one.ref_des, one.pin].append(where)
+            self.places[one.ref_des, one.pin] = MM(one.x, one.unit), MM(one.y, one.unit)
             self.said.setdefault(where, set()).add(one.net_name)
 
     def pad(self, reference, pin):

@@ -1,7 +1,7 @@
 """The cap layer: a printed cap on each switch, as one STL file.
 
-A cap is a square plate with a square plunger below, which stands on the switch. Nothing joins the caps: they are printed
-where they lie, upside down, taken up by the foam that is glued to their tops, and set onto the switches together.
+A cap is a square plate with a square plunger below, which stands on the switch. Nothing joins the caps: they are
+printed in their places, and the foam that is glued to their tops carries them onto the switches together.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Caps:
         whose normals point outward."""
         one = _cap(self.side_mm / 2, self.plunger_mm / 2, self.plunger_height_mm)
         moved = np.column_stack([self.centers[:, 0], -self.centers[:, 1], np.zeros(len(self.centers))])
-        return (one[None] + moved[:, None, None]).reshape(-1, 3, 3)
+        return np.asarray(one[None] + moved[:, None, None]).reshape(-1, 3, 3)
 
     def stl(self) -> bytes:
         """A binary STL file; its unit is the millimeter."""
@@ -51,7 +51,8 @@ class Caps:
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         record = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
         record["normal"], record["corners"] = normals, corners
-        return b"contactfpga cap layer".ljust(80) + np.uint32(len(corners)).astype("<u4").tobytes() + record.tobytes()
+        count: bytes = np.array(len(corners), "<u4").tobytes()
+        return b"contactfpga cap layer".ljust(80) + count + bytes(record.tobytes())
 
 
 def caps(skin: Skin, switch: SwitchPart, side_mm: float | None = None) -> Caps:
@@ -66,7 +67,9 @@ def caps(skin: Skin, switch: SwitchPart, side_mm: float | None = None) -> Caps:
             f"a printer needs {LEAST_GAP_MM} mm: take caps of {(pitch - LEAST_GAP_MM) / 1e3:g} m at most"
         )
     if side <= switch.closed_by:
-        raise SheetError(f"side_m in [cover.cap] is {side / 1e3:g}; it must be more than {switch.closed_by / 1e3:g}, the plunger's")
+        raise SheetError(
+            f"side_m in [cover.cap] is {side / 1e3:g}; it must be more than {switch.closed_by / 1e3:g}, the plunger's"
+        )
     masked = set(skin.mask)
     cells = [(row, column) for row in range(skin.rows) for column in range(skin.columns) if (row, column) not in masked]
     centers = np.array([(column * skin.pitch_x_mm, row * skin.pitch_y_mm) for row, column in cells], float)
@@ -79,7 +82,9 @@ def _cap(half: float, inner: float, height: float) -> np.ndarray:
     foot, neck = _level(inner * square, 0.0), _level(inner * square, height)
     rim, top = _level(half * square, height), _level(half * square, height + PLATE_MM)
     faces = [*_ends(foot)[::-1], *_ends(top)]
-    found = [np.array(face) if upward else np.array(face)[::-1] for face, upward in zip(faces, (False, False, True, True))]
+    found = [
+        np.array(face) if upward else np.array(face)[::-1] for face, upward in zip(faces, (False, False, True, True))
+    ]
     for low, high in ((foot, neck), (rim, top)):
         found += _band(low, high)
     found += _band(neck, rim)  # the underside of the plate

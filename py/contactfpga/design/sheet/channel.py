@@ -1,8 +1,8 @@
 """Joins pins above a strip of the board with pins below it: each net on a level of its own across the strip.
 
 This is channel routing with the left-edge rule (Hashimoto and Stevens, 1971). Levels run on the top side, and from
-each pin a track leads to its level on the back. Pins above lie on whole steps of :data:`GRID_MM`, pins below half a step
-beside them, so that no two of these tracks ever meet and no rule about their order is needed.
+each pin a track leads to its level on the back. Pins below lie on whole steps of a :class:`Grid`, pins above half a
+step beside them, so that no two of these tracks ever meet and no rule about their order is needed.
 """
 
 from __future__ import annotations
@@ -31,10 +31,16 @@ class Pin:
     y: float
 
 
-def on_grid(x: float, half: bool) -> float:
-    """The nearest whole step, or half a step beside one."""
-    shift = GRID_MM / 2 if half else 0.0
-    return round((x - shift) / GRID_MM) * GRID_MM + shift
+@dataclasses.dataclass(frozen=True)
+class Grid:
+    """Places along the channel, :data:`GRID_MM` apart; ``origin`` is a place of pins below."""
+
+    origin: float
+
+    def near(self, x: float, below: bool) -> float:
+        """The place nearest to x for a pin below, or for one above."""
+        shift = self.origin if below else self.origin + GRID_MM / 2
+        return round((x - shift) / GRID_MM) * GRID_MM + shift
 
 
 def levels(pins: Iterable[Pin]) -> dict[str, int]:

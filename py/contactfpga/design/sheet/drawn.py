@@ -6,6 +6,7 @@ Lengths are in mm as seen from the top side, x to the right and y down; cell (ro
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import Literal
 
@@ -148,7 +149,7 @@ class Drawing:
     def run(self, net: str, layer: Layer, *points: tuple[float, float], width: float = TRACK_MM) -> None:
         """Add tracks from point to point; a point that repeats the one before it adds none."""
         spots = [(rounded(x), rounded(y)) for x, y in points]
-        for a, b in zip(spots, spots[1:]):
+        for a, b in itertools.pairwise(spots):
             if a != b:
                 self.tracks.append(Track(*a, *b, layer, net, width))
 
@@ -172,7 +173,8 @@ class Drawing:
                 ends = [(left + corners[k][0] * 0.6 * step, corners[k][1] * tall) for k in (a, b)]
                 if not upright:
                     ends = [(v, -u) for u, v in ends]
-                self.stroke(*(value for u, v in ends for value in (x + u, y + v)))
+                (u1, v1), (u2, v2) = ends
+                self.stroke(x + u1, y + v1, x + u2, y + v2)
 
     def nets(self) -> list[str]:
         """Names of all nets, in the order of the alphabet."""
@@ -183,7 +185,9 @@ class Drawing:
 _SEGMENTS = {
     digit: [((0, 1), (1, 3), (3, 5), (4, 5), (2, 4), (0, 2), (2, 3))["abcdefg".index(letter)] for letter in letters]
     for digit, letters in zip(
-        "0123456789", "abcdef bc abdeg abcdg bcfg acdfg acdefg abc abcdefg abcdfg".split(), strict=True
+        "0123456789",
+        ["abcdef", "bc", "abdeg", "abcdg", "bcfg", "acdfg", "acdefg", "abc", "abcdefg", "abcdfg"],
+        strict=True,
     )
 }
 """Ends of the lit segments of each digit: corners 0 and 1 are at the top, 2 and 3 in the middle, 4 and 5 below."""

@@ -3,9 +3,9 @@ across them.
 
 Each formula is for copper of no thickness on or in one dielectric, so capacitances are good to some ten percent:
 
-- a track above another at right angles: eps w1' w2' / h, where w' is the width of the plate that has the capacitance per
-  length of a track of width w over a plane (E. Hammerstad and O. Jensen, Accurate models for microstrip computer-aided
-  design, IEEE MTT-S 1980, pp. 407-409);
+- a track above another at right angles: eps w1' w2' / h, where w' is the width of the plate that has the capacitance
+  per length of a track of width w over a plane (E. Hammerstad and O. Jensen, Accurate models for microstrip
+  computer-aided design, IEEE MTT-S 1980, pp. 407-409);
 - two tracks beside each other: 2 eps0 e K(k')/K(k), k^2 = s (s + w1 + w2) / ((s + w1)(s + w2)), with K the complete
   elliptic integral and e the mean of board and air (conformal mapping; B. C. Wadell, Transmission Line Design Handbook,
   1991, section 3.4);
@@ -33,6 +33,8 @@ SHEET_OHM = 4.9e-4
 """Of a square of copper of 35 um, 1 oz per square foot, at 20 degrees Celsius: 1.72e-8 ohm m over 35 um."""
 BOARDS = {"plane": (1.53, 4.4), "cylinder": (0.1, 3.4)}
 """Distance of the two copper layers in mm, and permittivity: FR-4 of 1.6 mm, and a polyimide flex of 0.1 mm."""
+VIA_SIEMENS = 1e3
+"""A via: 1 mohm."""
 PIN_PF = 10.0
 """Of a pin of an FPGA, a 74HC595 or a 74HC165 with its pads."""
 CABLE_PF_M = 50.0
@@ -96,7 +98,7 @@ def over_pf(width: float, height: float, eps: float) -> float:
     b = 0.564 * ((eps - 0.9) / (eps + 3)) ** 0.053
     effective = (eps + 1) / 2 + (eps - 1) / 2 * (1 + 10 / u) ** (-a * b)
     f = 6 + (2 * math.pi - 6) * math.exp(-((30.666 / u) ** 0.7528))
-    return 2 * math.pi * EPS0_PF_MM * effective / math.log(f / u + math.sqrt(1 + (2 / u) ** 2))
+    return float(2 * math.pi * EPS0_PF_MM * effective / math.log(f / u + math.sqrt(1 + (2 / u) ** 2)))
 
 
 def across_pf(width: float, other: float, height: float, eps: float) -> float:
@@ -161,19 +163,21 @@ def _line_ohms(layout: Layout, kind: str) -> list[float]:
 def _ohms(drawing: Drawing, net: str, x: float) -> float:
     tracks = [track for track in drawing.tracks if track.net == net]
     spots: dict[tuple[float, float, str], int] = {}
-    joints = []
+    joints: list[tuple[int, int, float]] = []
     for track in tracks:
         ends = [(track.x1, track.y1, track.layer), (track.x2, track.y2, track.layer)]
         numbers = [spots.setdefault(end, len(spots)) for end in ends]
-        joints.append((*numbers, track.width / (SHEET_OHM * track.length)))
+        joints.append((numbers[0], numbers[1], track.width / (SHEET_OHM * track.length)))
     for via in (via for via in drawing.vias if via.net == net):
         both = [spots[end] for layer in "FB" if (end := (via.x, via.y, layer)) in spots]
         if len(both) == 2:
-            joints.append((*both, 1e6))
+            joints.append((both[0], both[1], VIA_SIEMENS))
     siemens = np.zeros((len(spots), len(spots)))
     for a, b, value in joints:
-        siemens[[a, b], [a, b]] += value
-        siemens[[a, b], [b, a]] -= value
+        siemens[a, a] += value
+        siemens[b, b] += value
+        siemens[a, b] -= value
+        siemens[b, a] -= value
     top = min((y, number) for (at, y, layer), number in spots.items() if layer == "F" and abs(at - x) < 1e-5)[1]
     others = [number for number in range(len(spots)) if number != top]
     return float(np.linalg.inv(siemens[np.ix_(others, others)]).diagonal().max())

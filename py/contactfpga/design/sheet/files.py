@@ -61,7 +61,15 @@ def placement_list(layout: Layout) -> str:
     """Where each part lies: x to the right and y up in mm from cell (row 0, column 0), and its turn counterclockwise,
     both as seen from the top side."""
     rows = [
-        (one.reference, one.value, one.part.name, f"{one.x:.4f}", f"{-one.y + 0.0:.4f}", one.turn, "bottom" if one.back else "top")
+        (
+            one.reference,
+            one.value,
+            one.part.name,
+            f"{one.x:.4f}",
+            f"{-one.y + 0.0:.4f}",
+            one.turn,
+            "bottom" if one.back else "top",
+        )
         for one in layout.drawing.placed
     ]
     return _table([("reference", "value", "footprint", "x_mm", "y_mm", "turn_deg", "side"), *rows])
@@ -101,5 +109,7 @@ def completed(text: str, circuit: Circuit) -> str:
     before = tomllib.loads(text)
     before.pop("circuit", None)
     if {name: value for name, value in whole.items() if name != "circuit"} != before:
-        raise SheetError("the Skin's file has its circuit in a form that cannot be replaced; write it as a table [circuit]")
+        raise SheetError(
+            "the Skin's file has its circuit in a form that cannot be replaced; write it as a table [circuit]"
+        )
     return found

@@ -6,6 +6,7 @@ all of them y points up, and (0, 0) is cell (row 0, column 0).
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from contactfpga.design.sheet.drawn import (
@@ -35,7 +36,9 @@ def files(drawing: Drawing, name: str) -> dict[str, str]:
         found[f"{name}-{said}-print.gbr"] = _Plot(f"Legend,{side}").print(drawing, layer)
     found[f"{name}-edge.gbr"] = _Plot("Profile,NP").edge(drawing)
     found[f"{name}-plated.drl"] = _drill(_plated(drawing), "Plated,1,2,PTH")
-    found[f"{name}-unplated.drl"] = _drill([(hole.drill, hole.x, hole.y) for hole in drawing.holes], "NonPlated,1,2,NPTH")
+    found[f"{name}-unplated.drl"] = _drill(
+        [(hole.drill, hole.x, hole.y) for hole in drawing.holes], "NonPlated,1,2,NPTH"
+    )
     found[f"{name}.ipc"] = "\r\n".join(_ipc(drawing)) + "\r\n"
     return found
 
@@ -113,7 +116,7 @@ class _Plot:
         """The outline; the board ends at the middle of its line."""
         left, top, right, bottom = drawing.outline
         corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-        for a, b in zip(corners, corners[1:]):
+        for a, b in itertools.pairwise(corners):
             self.line(EDGE_LINE_MM, *a, *b)
         return self.text()
 
@@ -154,7 +157,9 @@ def _ipc(drawing: Drawing) -> Iterator[str]:
                 kind, hole, access = "317", f"D{round(pad.drill * 1e3):04d}P", "A00"
             else:
                 kind, hole, access = "327", " " * 6, "A02" if one.back else "A01"
-            size = "X{:04d}Y{:04d}".format(*(round(1e3 * side) for side in (one.size(pad) if not pad.round else (pad.width, 0))))
+            size = "X{:04d}Y{:04d}".format(
+                *(round(1e3 * side) for side in (one.size(pad) if not pad.round else (pad.width, 0)))
+            )
             yield f"{kind}{net:<14}   {one.reference:<6}-{pad.number:<4} {hole}{access}{_ipc_at(x, y)}{size}R000 S0"
     for via in drawing.vias:
         hole = f"D{round(VIA_DRILL_MM * 1e3):04d}P"

@@ -1,12 +1,13 @@
 """Writes a layout as a board of KiCad 6, with its project and its netlist.
 
-The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). They are written here, because the few
-forms that a sheet needs are shorter than a library's calls. Each item has a UUID made of what it is, so the same sheet
-gives the same files.
+The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). They are written here, because the
+few forms that a sheet needs are shorter than a library's calls. Each item has a UUID made of what it is, so the same
+sheet gives the same files.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
 import uuid
 from collections.abc import Iterable, Iterator
@@ -118,7 +119,9 @@ class _Writer:
             of = [_form("net", self.numbers[net], _text(net))] if net else []
             size = _form("size", _mm(pad.width), _mm(pad.height))
             of_layers = _form("layers", *map(_text, layers))
-            yield _form("pad", _text(pad.number), kind, shape, at, size, *drill, of_layers, *of, stamp(name, "pad", index))
+            yield _form(
+                "pad", _text(pad.number), kind, shape, at, size, *drill, of_layers, *of, stamp(name, "pad", index)
+            )
         yield ")"
 
     def _copper(self) -> Iterator[str]:
@@ -139,7 +142,7 @@ class _Writer:
             yield self._line((stroke.x1, stroke.y1), (stroke.x2, stroke.y2), layer, PRINT_MM, ("print", index))
         left, top, right, bottom = self.drawing.outline
         corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-        for index, (a, b) in enumerate(zip(corners, corners[1:])):
+        for index, (a, b) in enumerate(itertools.pairwise(corners)):
             yield self._line(a, b, "Edge.Cuts", 0.1, ("edge", index))
         for index, hole in enumerate(self.drawing.holes, 1):
             name, size = f"H{index}", _mm(hole.drill)
@@ -148,7 +151,9 @@ class _Writer:
             yield "(attr exclude_from_pos_files exclude_from_bom)"
             for kind, words in (("reference", name), ("value", "M3")):
                 font = "(effects (font (size 0.8 0.8) (thickness 0.12)))"
-                yield _form("fp_text", kind, _text(words), "(at 0 0)", '(layer "F.Fab")', "hide", font, self.stamp(name, kind))
+                yield _form(
+                    "fp_text", kind, _text(words), "(at 0 0)", '(layer "F.Fab")', "hide", font, self.stamp(name, kind)
+                )
             form = f'np_thru_hole circle (at 0 0) (size {size} {size}) (drill {size}) (layers "*.Cu" "*.Mask")'
             yield f'(pad "" {form} {self.stamp(name, "pad")}))'
 
@@ -176,7 +181,13 @@ def project(name: str) -> str:
         "min_via_annular_width": (VIA_MM - VIA_DRILL_MM) / 2,
         "min_via_diameter": VIA_MM,
     }
-    usual = {"name": "Default", "clearance": CLEARANCE_MM, "track_width": TRACK_MM, "via_diameter": VIA_MM, "via_drill": VIA_DRILL_MM}
+    usual = {
+        "name": "Default",
+        "clearance": CLEARANCE_MM,
+        "track_width": TRACK_MM,
+        "via_diameter": VIA_MM,
+        "via_drill": VIA_DRILL_MM,
+    }
     content = {
         "board": {"design_settings": {"rules": rules}},
         "meta": {"filename": f"{name}.kicad_pro", "version": 1},

@@ -2,8 +2,8 @@
 
 Columns run along y on the top side, through the switches. Rows run along x on the back, under the diodes. All lines
 leave at the edge above row 0, so that a sheet around a closed cylinder needs nothing at its seam: a row comes down
-between two columns on the top side, runs on the back to its first switch, and from there past all of them. So the far end of
-each row is at the last column, and the far end of each column at the last row; there the guard lines are.
+between two columns on the top side, runs on the back to its first switch, and from there past all of them. So the far
+end of each row is at the last column, and the far end of each column at the last row; there the guard lines are.
 """
 
 from __future__ import annotations
@@ -87,10 +87,10 @@ def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
 
 
 def _check(skin: Skin, switch: SwitchPart) -> None:
-    if skin.guard and skin.diodes == "none":
-        raise SheetError("diodes is 'none'; guard lines need a diode at each crossing")
     limits = smallest_pitch(skin, switch)
-    for name, pitch, limit in zip(("pitch_x_mm", "pitch_y_mm"), (skin.pitch_x_mm, skin.pitch_y_mm), limits, strict=True):
+    for name, pitch, limit in zip(
+        ("pitch_x_mm", "pitch_y_mm"), (skin.pitch_x_mm, skin.pitch_y_mm), limits, strict=True
+    ):
         if pitch < limit - 1e-9:
             raise SheetError(
                 f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm; "
@@ -130,12 +130,11 @@ class _Matrix:
         each = min(most, -(-skin.row_lines // max(gaps, 1)))
         if skin.closed and gaps * most < skin.row_lines:
             raise SheetError(
-                f"rows is {skin.rows}: {skin.row_lines} row lines, and {gaps * most} find a place between {skin.columns} "
-                f"columns at {self.px:.4g} mm around a closed cylinder; take fewer rows, or more or wider columns"
+                f"rows is {skin.rows}: {skin.row_lines} row lines, and {gaps * most} find a place between "
+                f"{skin.columns} columns at {self.px:.4g} mm around a closed cylinder; take fewer rows, or more or "
+                "wider columns"
             )
-        between = [
-            (gap + 0.5) * self.px + (k - (each - 1) / 2) * PLACE_MM for gap in range(gaps) for k in range(each)
-        ]
+        between = [(gap + 0.5) * self.px + (k - (each - 1) / 2) * PLACE_MM for gap in range(gaps) for k in range(each)]
         beside = max(self.px / 2, PLACE_MM, self.switch.half_width + VIA_MM)
         spill = max(0, skin.row_lines - len(between))
         return [-beside - k * PLACE_MM for k in reversed(range(spill))] + between[: skin.row_lines]
@@ -258,9 +257,9 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
     if skin.closed:
         if min(left - around[0], around[1] - right) < EDGE_MM - 1e-6:
             raise SheetError(
-                f"radius_mm is {skin.radius_mm:g}: connectors, shift registers and resistors lie from {left:.1f} to {right:.1f} "
-                f"mm, and the closed sheet's edges at {around[0]:.1f} and {around[1]:.1f}, {EDGE_MM} mm of them free; take fewer "
-                "lines or a larger radius"
+                f"radius_mm is {skin.radius_mm:g}: connectors, shift registers and resistors lie from {left:.1f} to "
+                f"{right:.1f} mm, and the closed sheet's edges at {around[0]:.1f} and {around[1]:.1f}, {EDGE_MM} mm of "
+                "them free; take fewer lines or a larger radius"
             )
         left, right = around
     else:

@@ -6,6 +6,7 @@ Lengths are in mm. A part is drawn as seen on its own side of the board, x to th
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterable
 
 from contactfpga.errors import ContactFPGAError
@@ -18,7 +19,8 @@ class SheetError(ContactFPGAError, ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Pad:
-    """A pad of a part; ``round`` makes ``width`` its diameter, and a ``drill`` above 0 a plated hole of that diameter."""
+    """A pad of a part. If it is ``round``, ``width`` is its diameter; a ``drill`` above 0 is the diameter of a plated
+    hole."""
 
     number: str
     x: float
@@ -100,7 +102,7 @@ DOME = SwitchPart(
     travel_mm=0.2,
     height_mm=0.3,
     closed_by=1.5,
-    column=tuple((*a, *b) for a, b in zip(_SIDES, _SIDES[1:])),
+    column=tuple((*a, *b) for a, b in itertools.pairwise(_SIDES)),
     diode=(),
     tail=0,
     reach=_LEG,
@@ -123,7 +125,7 @@ TACT = SwitchPart(
     travel_mm=0.25,
     height_mm=0.55,
     closed_by=1.5,
-    column=tuple((*a, *b) for a, b in zip(_TACT_SIDE, _TACT_SIDE[1:])),
+    column=tuple((*a, *b) for a, b in itertools.pairwise(_TACT_SIDE)),
     diode=((2.4, 1.5, 2.4, -1.5), (2.4, -1.5, 0.0, -1.5), (0.0, -1.5, *DIODE_VIA)),
     tail=2,
     reach=2.7,

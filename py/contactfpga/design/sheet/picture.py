@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import collections
+from collections.abc import Iterable, Iterator, Sequence
 
-from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, Drawing, Layer, Placed
+from contactfpga import picture_style
+from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, Drawing, Layer, Stroke, Track
 from contactfpga.design.sheet.gerber import on_layer
-from contactfpga.design.sheet.parts import Pad
 
-COLORS: dict[Layer, str] = {"B": "#3465a4", "F": "#c0392b"}
-_BOARD, _PRINT, _HOLE, _BODY = "#f4f1e8", "#222", "#fff", "#6b7a8f"
+COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
+_BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#1d232b", "#ffffff", "#6b7a8f"
 
 
 def svg(drawing: Drawing, title: str) -> str:
@@ -19,48 +20,61 @@ def svg(drawing: Drawing, title: str) -> str:
 
 def _lines(drawing: Drawing, title: str) -> Iterator[str]:
     left, top, right, bottom = drawing.outline
-    w, h = right - left, bottom - top
-    yield (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left - 1:.2f} {top - 1:.2f} {w + 2:.2f} {h + 2:.2f}" '
-        f'width="{w + 2:.2f}mm" height="{h + 2:.2f}mm" role="img">'
-    )
+    edge = (right - left) / 50
+    w, h = right - left + 2 * edge, bottom - top + 4 * edge
+    yield f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w:.2f} {h:.2f}">'
     yield f"<title>{title}</title>"
-    yield f'<rect x="{left:.3f}" y="{top:.3f}" width="{w:.3f}" height="{h:.3f}" fill="{_BOARD}" stroke="#888" stroke-width="0.2"/>'
-    for layer in COLORS:
-        yield from _copper(drawing, layer)
-    yield f'<g fill="none" stroke="{_BODY}" stroke-width="0.1">'
-    for one in drawing.placed:
-        yield _body(one)
+    yield f'<path fill="{picture_style.CARD}" d="{_box(0, 0, w, h)}"/>'
+    yield f'<g transform="translate({edge - left:.3f} {edge - top:.3f})">'
+    yield f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_box(left, top, right - left, bottom - top)}"/>'
+    yield '<g fill="none" stroke-linecap="round">'
+    for layer, (color, _) in COPPER.items():
+        yield from _copper(drawing, layer, color)
+    bodies = "".join(_body(one.x, one.y, one.turn, one.part.width, one.part.height) for one in drawing.placed)
+    yield f'<path stroke="{_BODY}" stroke-width="0.1" d="{bodies}"/>'
+    yield f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path(drawing.strokes)}"/>'
+    yield from _dots(_holes(drawing), _HOLE)
     yield "</g>"
-    yield f'<path fill="none" stroke="{_PRINT}" stroke-width="{PRINT_MM}" stroke-linecap="round" d="{_path(drawing.strokes)}"/>'
-    yield f'<g fill="{_HOLE}">'
-    for via in drawing.vias:
-        yield _circle(via.x, via.y, VIA_DRILL_MM)
-    for one in drawing.placed:
-        for pad in one.part.pads:
-            if pad.drill:
-                yield _circle(*one.spot(pad.x, pad.y), pad.drill)
-    for hole in drawing.holes:
-        yield _circle(hole.x, hole.y, hole.drill)
+    yield from _legend(left, bottom + 1.7 * edge, edge)
     yield "</g></svg>"
 
 
-def _copper(drawing: Drawing, layer: Layer) -> Iterator[str]:
-    yield f'<g fill="{COLORS[layer]}" stroke="none">'
+def _copper(drawing: Drawing, layer: Layer, color: str) -> Iterator[str]:
+    dots, boxes = [(VIA_MM, via.x, via.y) for via in drawing.vias], []
     for one in drawing.placed:
         for pad in one.part.pads:
-            if on_layer(pad, one, layer):
-                yield _pad(one, pad)
-    for via in drawing.vias:
-        yield _circle(via.x, via.y, VIA_MM)
-    yield "</g>"
-    for width in sorted({track.width for track in drawing.tracks if track.layer == layer}):
-        tracks = [track for track in drawing.tracks if track.layer == layer and track.width == width]
-        style = f'fill="none" stroke="{COLORS[layer]}" stroke-width="{width}" stroke-linecap="round"'
-        yield f'<path {style} d="{_path(tracks)}"/>'
+            x, y = one.spot(pad.x, pad.y)
+            w, h = one.size(pad)
+            if on_layer(pad, one, layer) and pad.round:
+                dots.append((w, x, y))
+            elif on_layer(pad, one, layer):
+                boxes.append(_box(x - w / 2, y - h / 2, w, h))
+    yield f'<path fill="{color}" d="{"".join(boxes)}"/>'
+    yield from _dots(dots, color)
+    tracks = [track for track in drawing.tracks if track.layer == layer]
+    for width in sorted({track.width for track in tracks}):
+        of_width = [track for track in tracks if track.width == width]
+        yield f'<path stroke="{color}" stroke-width="{width}" d="{_path(of_width)}"/>'
 
 
-def _path(lines: list) -> str:
+def _holes(drawing: Drawing) -> Iterator[tuple[float, float, float]]:
+    """Diameter and place of each."""
+    yield from ((VIA_DRILL_MM, via.x, via.y) for via in drawing.vias)
+    for one in drawing.placed:
+        yield from ((pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill)
+    yield from ((hole.drill, hole.x, hole.y) for hole in drawing.holes)
+
+
+def _dots(dots: Iterable[tuple[float, float, float]], color: str) -> Iterator[str]:
+    """Disks, as lines of no length with round ends."""
+    places = collections.defaultdict(list)
+    for diameter, x, y in dots:
+        places[diameter].append(f"M{x:.2f} {y:.2f}h0")
+    for diameter, words in places.items():
+        yield f'<path stroke="{color}" stroke-width="{diameter:g}" d="{"".join(words)}"/>'
+
+
+def _path(lines: Sequence[Track | Stroke]) -> str:
     """Joins lines that follow on each other."""
     words, last = [], None
     for line in lines:
@@ -71,18 +85,20 @@ def _path(lines: list) -> str:
     return "".join(words)
 
 
-def _circle(x: float, y: float, diameter: float) -> str:
-    return f'<circle cx="{x:.2f}" cy="{y:.2f}" r="{diameter / 2:.3g}"/>'
+def _box(x: float, y: float, w: float, h: float) -> str:
+    return f"M{x:.2f} {y:.2f}h{w:.2f}v{h:.2f}h{-w:.2f}z"
 
 
-def _pad(one: Placed, pad: Pad) -> str:
-    x, y = one.spot(pad.x, pad.y)
-    w, h = one.size(pad)
-    if pad.round:
-        return _circle(x, y, w)
-    return f'<rect x="{x - w / 2:.2f}" y="{y - h / 2:.2f}" width="{w:g}" height="{h:g}"/>'
+def _body(x: float, y: float, turn: int, width: float, height: float) -> str:
+    w, h = (height, width) if turn % 180 else (width, height)
+    return _box(x - w / 2, y - h / 2, w, h)
 
 
-def _body(one: Placed) -> str:
-    w, h = (one.part.height, one.part.width) if one.turn % 180 else (one.part.width, one.part.height)
-    return f'<rect x="{one.x - w / 2:.2f}" y="{one.y - h / 2:.2f}" width="{w:g}" height="{h:g}"/>'
+def _legend(left: float, y: float, size: float) -> Iterator[str]:
+    """A swatch and a word for each color, in letters of this size."""
+    words = [*COPPER.values(), (_BODY, "parts"), (_PRINT, "printed")]
+    for number, (color, said) in enumerate(words):
+        x = left + number * 9 * size
+        yield f'<path fill="{color}" d="{_box(x, y - 0.75 * size, size, 0.75 * size)}"/>'
+        style = f'font-family="sans-serif" font-size="{size:.2f}" fill="{_PRINT}"'
+        yield f'<text x="{x + 1.4 * size:.2f}" y="{y:.2f}" {style}>{said}</text>'

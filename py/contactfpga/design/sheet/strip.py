@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from contactfpga.boards import spec, wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import channel
-from contactfpga.design.sheet.channel import GRID_MM, Pin, on_grid
-from contactfpga.design.sheet.drawn import GND, SUPPLY, Drawing
+from contactfpga.design.sheet.channel import GRID_MM, Grid, Pin
+from contactfpga.design.sheet.drawn import GND, SUPPLY, VIA_MM, Drawing
 from contactfpga.design.sheet.parts import CAPACITOR, HC165, HC595, HEADER_PINS, RESISTOR, Part, header, smallest_header
 from contactfpga.skin import Skin
 
@@ -58,7 +58,9 @@ class _Unit:
     def place(self, drawing: Drawing, y: float) -> list[Pin]:
         """Put it into the drawing; returns its pins."""
         one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn)
-        return [Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets]
+        return [
+            Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets
+        ]
 
 
 def port(name: str, bit: int, bits: int) -> str:
@@ -68,25 +70,26 @@ def port(name: str, bit: int, bits: int) -> str:
 
 def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], base: float) -> tuple[float, ...]:
     """Draw the strip above ``base``; returns its left, top and right end in mm."""
-    below = [pin for line in lines for pin in _line(drawing, circuit, line, base)]
+    grid = Grid(max(line.x for line in lines))  # so that nothing steps nearer to the edge than the last line
+    below = [pin for line in lines for pin in _line(drawing, circuit, line, base, grid)]
     bottom = base - 4.6
     middle = (min(line.x for line in lines) + max(line.x for line in lines)) / 2
-    chips = _chips(skin, middle)
-    plugs = _connectors(skin, middle, half=bool(chips))
+    chips = _chips(skin, middle, grid)
+    plugs = _connectors(skin, middle, grid, below=bool(chips))
+    ends = [pin.x - VIA_MM / 2 for pin in below] + [max(line.x for line in lines) + _PAD]
     if chips:
-        below, bottom, ends = _registers(drawing, chips, plugs, below, bottom)
-    else:
-        ends = []
+        below, bottom, passed = _registers(drawing, chips, plugs, below, bottom)
+        ends += passed
     top = bottom - channel.height(below + _tried(plugs)) - 3.0
     pins = below + [pin for plug in plugs for pin in _plug(drawing, plug, top)]
     channel.join(drawing, pins, bottom)
     widths = [(unit.x, unit.part.width / 2) for unit in plugs + chips]
     ends += [x - half for x, half in widths] + [x + half for x, half in widths]
-    ends += [min(line.x for line in lines) - _BESIDE - _PAD, max(line.x for line in lines) + _PAD]
+    ends += [pin.x + side * VIA_MM / 2 for pin in below for side in (-1, 1)]
     return min(ends), top - plugs[0].part.height / 2, max(ends)
 
 
-def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float) -> Iterator[Pin]:
+def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Grid) -> Iterator[Pin]:
     """A line's resistors, and their tracks up to the channel."""
     x, middle = line.x, base - 1.9
     if line.used:
@@ -94,20 +97,20 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float) -> Iterat
         drawing.run(line.net, "B", (x, base), (x, middle + 0.8))
     ohms = f"{circuit.series_ohm:g}"
     drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90)
-    yield _stepped(drawing, line.pin, x, middle - 0.8)
+    yield _stepped(drawing, line.pin, x, middle - 0.8, grid)
     if line.pull:
         x -= _BESIDE
         drawing.run(line.net, "B", (line.x, middle + 0.8), (x, middle + 0.8))
         ohms = f"{circuit.row_pull_ohm if line.kind == 'row' else circuit.column_pull_ohm:g}"
         rail = SUPPLY if line.pull == "up" else GND
         drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": rail}, 90)
-        yield _stepped(drawing, rail, x, middle - 0.8)
+        yield _stepped(drawing, rail, x, middle - 0.8, grid)
 
 
-def _stepped(drawing: Drawing, net: str, x: float, y: float) -> Pin:
+def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
     """A pin of the channel: from the pad up, and aside onto the grid. Pads are more than a step of it apart, so no two
     of them come to the same place."""
-    step = on_grid(x, half=True)
+    step = grid.near(x, below=True)
     drawing.run(net, "B", (x, y), (x, y - 0.9), (step, y - 0.9))
     return Pin(net, step, y - 0.9)
 
@@ -132,8 +135,9 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
             yield Pin(pin.net, pin.x + GRID_MM, y)
 
 
-def _connectors(skin: Skin, middle: float, half: bool) -> list[_Unit]:
-    """One connector or more for the rows, and the same for the columns."""
+def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
+    """One connector or more for the rows, and the same for the columns. ``below``: there are two channels, and what is
+    above the upper one lies where pins below the lower one do."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -145,7 +149,7 @@ def _connectors(skin: Skin, middle: float, half: bool) -> list[_Unit]:
     left = middle - sum(part.width + GRID_MM for part in parts) / 2
     units = []
     for part, nets in zip(parts, found, strict=True):
-        x = on_grid(left + part.width / 2, half)
+        x = grid.near(left + part.width / 2, below)
         left += part.width + GRID_MM
         named = {str(pin + 1): net for pin, net in enumerate(nets)}
         units.append(_Unit("J", part, part.name, x, 180, named))
@@ -167,12 +171,12 @@ CHIP_STEPS = 15
 """From chip to chip. Its capacitor is at step 9."""
 
 
-def _chips(skin: Skin, middle: float) -> list[_Unit]:
+def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
     """The shift registers, each with its capacitor, and the resistor at their enable; none for a Skin without."""
     nets = list(_chip_nets(skin))
     if not nets:
         return []
-    start = on_grid(middle - len(nets) * CHIP_STEPS * GRID_MM / 2, half=False)
+    start = grid.near(middle - len(nets) * CHIP_STEPS * GRID_MM / 2, below=False)
     units = []
     for index, (part, of_pins) in enumerate(nets):
         x = start + index * CHIP_STEPS * GRID_MM
