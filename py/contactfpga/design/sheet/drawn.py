@@ -30,6 +30,10 @@ PRINT_MM = 0.12
 MASK_MM = 0.05
 """By how much the opening of the solder mask is larger than its pad, on each side."""
 
+BOARDS = {"plane": (1.6, 1.53, 4.4), "cylinder": (0.2, 0.1, 3.4)}
+"""By the Skin's surface: thickness of the board and distance of its two copper layers in mm, and permittivity. A plane
+is FR-4, a cylinder a polyimide flex."""
+
 GND = "GND"
 SUPPLY = "3V3"
 

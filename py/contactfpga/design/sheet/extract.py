@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet.drawn import TRACK_MM, Drawing
+from contactfpga.design.sheet.drawn import BOARDS, TRACK_MM, Drawing
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SwitchPart
 from contactfpga.skin import Skin
@@ -31,8 +31,6 @@ from contactfpga.skin import Skin
 EPS0_PF_MM = 8.8541878e-3
 SHEET_OHM = 4.9e-4
 """Of a square of copper of 35 um, 1 oz per square foot, at 20 degrees Celsius: 1.72e-8 ohm m over 35 um."""
-BOARDS = {"plane": (1.53, 4.4), "cylinder": (0.1, 3.4)}
-"""Distance of the two copper layers in mm, and permittivity: FR-4 of 1.6 mm, and a polyimide flex of 0.1 mm."""
 VIA_SIEMENS = 1e3
 """A via: 1 mohm."""
 PIN_PF = 10.0
@@ -60,7 +58,7 @@ class Extracted:
 def extracted(layout: Layout, cable_m: float = 0.3) -> Extracted:
     """The circuit of a layout whose connectors have ``cable_m`` of ribbon cable."""
     skin, switch = layout.skin, layout.switch
-    h, eps = BOARDS[skin.surface]
+    _, h, eps = BOARDS[skin.surface]
     e = (eps + 1) / 2
     rows, columns = _line_ohms(layout, "row"), _line_ohms(layout, "column")
     crossing = _crossings(layout, h, eps, e)

@@ -14,6 +14,7 @@ from pathlib import Path
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import gerber, kicad, picture
 from contactfpga.design.sheet.caps import Caps
+from contactfpga.design.sheet.drawn import BOARDS
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
 
@@ -26,7 +27,7 @@ def write(folder: Path, layout: Layout, caps: Caps, skin_file: str) -> list[str]
     drawing, skin = layout.drawing, layout.skin
     title = f"contactfpga sheet {skin.rows}x{skin.columns} {skin.fingerprint.hex()}"
     texts = {
-        f"{NAME}.kicad_pcb": kicad.board(drawing, title),
+        f"{NAME}.kicad_pcb": kicad.board(drawing, title, BOARDS[skin.surface][0]),
         f"{NAME}.kicad_pro": kicad.project(NAME),
         f"{NAME}.net": kicad.netlist(drawing),
         **gerber.files(drawing, NAME),

@@ -60,8 +60,8 @@ def _mm(value: float) -> str:
 
 
 class _Writer:
-    def __init__(self, drawing: Drawing, title: str):
-        self.drawing, self.title = drawing, title
+    def __init__(self, drawing: Drawing, title: str, thickness_mm: float):
+        self.drawing, self.title, self.thickness_mm = drawing, title, thickness_mm
         left, top, _, _ = drawing.outline
         self.dx, self.dy = PAGE_MM - left, PAGE_MM - top
         self.numbers = {net: number for number, net in enumerate(drawing.nets(), 1)}
@@ -74,7 +74,7 @@ class _Writer:
 
     def board(self) -> Iterator[str]:
         yield "(kicad_pcb (version 20211014) (generator contactfpga)"
-        yield _form("general", _form("thickness", 1.6))
+        yield _form("general", _form("thickness", self.thickness_mm))
         left, top, right, bottom = self.drawing.outline
         yield _form("paper", _text("User"), _mm(right - left + 2 * PAGE_MM), _mm(bottom - top + 2 * PAGE_MM))
         yield _form("title_block", _form("title", _text(self.title)))
@@ -164,9 +164,9 @@ class _Writer:
         return _form("gr_line", *ends, _form("layer", _text(layer)), _form("width", width), self.stamp(*what))
 
 
-def board(drawing: Drawing, title: str) -> str:
+def board(drawing: Drawing, title: str, thickness_mm: float = 1.6) -> str:
     """The text of the .kicad_pcb file."""
-    return "\n".join(_Writer(drawing, title).board()) + "\n"
+    return "\n".join(_Writer(drawing, title, thickness_mm).board()) + "\n"
 
 
 def project(name: str) -> str:
