@@ -1,0 +1,82 @@
+"""Joins pins above a strip of the board with pins below it: each net on a level of its own across the strip.
+
+This is channel routing with the left-edge rule (Hashimoto and Stevens, 1971). Levels run on the top side, and from
+each pin a track leads to its level on the back. Pins below lie on whole steps of a :class:`Grid`, pins above half a
+step beside them, so that no two of these tracks ever meet and no rule about their order is needed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable
+
+from contactfpga.design.sheet.drawn import CLEARANCE_MM, GND, POWER_MM, SUPPLY, TRACK_MM, VIA_MM, Drawing
+
+GRID_MM = 1.27
+LEVEL_MM = VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
+"""From level to level: a via beside a track."""
+APART_MM = VIA_MM + CLEARANCE_MM
+"""Between the ends of two nets on one level."""
+POWERED = (GND, SUPPLY)
+"""Nets whose levels are wider and first."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Pin:
+    """Where a net comes to the channel; ``y`` is the place on the back from which its track starts."""
+
+    net: str
+    x: float
+    y: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Grid:
+    """Places along the channel, :data:`GRID_MM` apart; ``origin`` is a place of pins below."""
+
+    origin: float
+
+    def near(self, x: float, below: bool) -> float:
+        """The place nearest to x for a pin below, or for one above."""
+        shift = self.origin if below else self.origin + GRID_MM / 2
+        return round((x - shift) / GRID_MM) * GRID_MM + shift
+
+
+def levels(pins: Iterable[Pin]) -> dict[str, int]:
+    """The level of each net with two pins or more, 0 at the bottom; nets that share one are apart."""
+    ends: dict[str, tuple[float, float, int]] = {}
+    for pin in pins:
+        low, high, count = ends.get(pin.net, (math.inf, -math.inf, 0))
+        ends[pin.net] = min(low, pin.x), max(high, pin.x), count + 1
+    routed = sorted((net for net in ends if ends[net][2] > 1), key=lambda net: (*ends[net], net))
+    found: dict[str, int] = {}
+    filled: list[float] = []
+    for net in (net for net in routed if net in POWERED):
+        found[net] = len(filled)
+        filled += [math.inf, math.inf]  # wide tracks take two
+    for net in (net for net in routed if net not in POWERED):
+        low, high, _ = ends[net]
+        level = next((k for k, end in enumerate(filled) if low - end >= APART_MM), len(filled))
+        filled[level:] = [high, *filled[level + 1 :]]
+        found[net] = level
+    return found
+
+
+def height(pins: Iterable[Pin]) -> float:
+    """Of the channel that joins these pins, in mm."""
+    found = levels(pins)
+    return LEVEL_MM * (max((level + (net in POWERED) for net, level in found.items()), default=0) + 2)
+
+
+def join(drawing: Drawing, pins: list[Pin], bottom: float) -> None:
+    """Draw the tracks; the channel reaches from ``bottom`` up by its :func:`height`."""
+    for net, level in levels(pins).items():
+        powered = net in POWERED
+        y = bottom - LEVEL_MM * (level + 1 + powered / 2)
+        own = sorted({(pin.x, pin.y) for pin in pins if pin.net == net})
+        for x, start in own:
+            drawing.run(net, "B", (x, start), (x, y))
+            drawing.via(net, x, y)
+        places = [(x, y) for x in sorted({x for x, _ in own})]
+        drawing.run(net, "F", *places, width=POWER_MM if powered else TRACK_MM)

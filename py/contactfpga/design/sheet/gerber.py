@@ -1,0 +1,172 @@
+"""Writes a layout as what a board house takes: Gerber layers, drill files, and the netlist for its electrical test.
+
+Gerber X2 (Ucamco, The Gerber Layer Format Specification, 2021), Excellon drill files in millimeters, and IPC-D-356A. In
+all of them y points up, and (0, 0) is cell (row 0, column 0).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from contactfpga.design.sheet.drawn import (
+    MASK_MM,
+    PRINT_MM,
+    VIA_DRILL_MM,
+    VIA_MM,
+    Drawing,
+    Layer,
+    Placed,
+)
+from contactfpga.design.sheet.parts import Pad
+
+NAMES: dict[Layer, str] = {"F": "top", "B": "bottom"}
+EDGE_LINE_MM = 0.1
+
+
+def files(drawing: Drawing, name: str) -> dict[str, str]:
+    """The text of each file by its name."""
+    found = {}
+    for layer, said in NAMES.items():
+        number = f"L{1 if layer == 'F' else 2}"
+        side = "Top" if layer == "F" else "Bot"
+        found[f"{name}-{said}-copper.gbr"] = _Plot(f"Copper,{number},{side}").copper(drawing, layer)
+        found[f"{name}-{said}-mask.gbr"] = _Plot(f"Soldermask,{side}", negative=True).pads(drawing, layer, MASK_MM)
+        found[f"{name}-{said}-paste.gbr"] = _Plot(f"Paste,{side}").pads(drawing, layer, 0.0, pasted=True)
+        found[f"{name}-{said}-print.gbr"] = _Plot(f"Legend,{side}").print(drawing, layer)
+    found[f"{name}-edge.gbr"] = _Plot("Profile,NP").edge(drawing)
+    found[f"{name}-plated.drl"] = _drill(_plated(drawing), "Plated,1,2,PTH")
+    found[f"{name}-unplated.drl"] = _drill(
+        [(hole.drill, hole.x, hole.y) for hole in drawing.holes], "NonPlated,1,2,NPTH"
+    )
+    found[f"{name}.ipc"] = "\r\n".join(_ipc(drawing)) + "\r\n"
+    return found
+
+
+def on_layer(pad: Pad, one: Placed, layer: Layer) -> bool:
+    """Whether a pad has copper there."""
+    return bool(pad.drill) or one.back == (layer == "B")
+
+
+class _Plot:
+    """One Gerber file: its apertures, and what is drawn with each."""
+
+    def __init__(self, function: str, negative: bool = False):
+        self.head = [
+            "%TF.GenerationSoftware,contactfpga,sheet*%",
+            f"%TF.FileFunction,{function}*%",
+            f"%TF.FilePolarity,{'Negative' if negative else 'Positive'}*%",
+            "%FSLAX46Y46*%",
+            "%MOMM*%",
+            "%LPD*%",
+        ]
+        self.drawn: dict[str, list[str]] = {}
+
+    def line(self, width: float, x1: float, y1: float, x2: float, y2: float) -> None:
+        """A line with round ends."""
+        self.drawn.setdefault(f"C,{width:.6f}", []).extend([_at(x1, y1, 2), _at(x2, y2, 1)])
+
+    def flash(self, shape: str, x: float, y: float) -> None:
+        """A pad: ``C,diameter`` or ``R,widthXheight``."""
+        self.drawn.setdefault(shape, []).append(_at(x, y, 3))
+
+    def text(self) -> str:
+        """The whole file."""
+        shapes = list(enumerate(self.drawn, 10))
+        lines = [*self.head, *(f"%ADD{code}{shape}*%" for code, shape in shapes), "G01*"]
+        for code, shape in shapes:
+            lines += [f"D{code}*", *self.drawn[shape]]
+        return "\n".join([*lines, "M02*"]) + "\n"
+
+    def _pad(self, one: Placed, pad: Pad, grown: float) -> None:
+        w, h = (size + 2 * grown for size in one.size(pad))
+        self.flash(f"C,{w:.6f}" if pad.round else f"R,{w:.6f}X{h:.6f}", *one.spot(pad.x, pad.y))
+
+    def copper(self, drawing: Drawing, layer: Layer) -> str:
+        """Pads, tracks and vias of a side."""
+        for one in drawing.placed:
+            for pad in one.part.pads:
+                if on_layer(pad, one, layer):
+                    self._pad(one, pad, 0.0)
+        for via in drawing.vias:
+            self.flash(f"C,{VIA_MM:.6f}", via.x, via.y)
+        for track in drawing.tracks:
+            if track.layer == layer:
+                self.line(track.width, track.x1, track.y1, track.x2, track.y2)
+        return self.text()
+
+    def pads(self, drawing: Drawing, layer: Layer, grown: float, pasted: bool = False) -> str:
+        """Openings of the mask, each pad larger by ``grown``, or of the stencil for those that get paste."""
+        for one in drawing.placed:
+            for pad in one.part.pads:
+                if on_layer(pad, one, layer) and (one.part.pasted or not pasted):
+                    self._pad(one, pad, grown)
+        for hole in drawing.holes if not pasted else ():
+            self.flash(f"C,{hole.drill:.6f}", hole.x, hole.y)
+        return self.text()
+
+    def print(self, drawing: Drawing, layer: Layer) -> str:
+        """What is printed on a side."""
+        for stroke in drawing.strokes:
+            if stroke.layer == layer:
+                self.line(PRINT_MM, stroke.x1, stroke.y1, stroke.x2, stroke.y2)
+        return self.text()
+
+    def edge(self, drawing: Drawing) -> str:
+        """The outline; the board ends at the middle of its line."""
+        left, top, right, bottom = drawing.outline
+        corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
+        for a, b in itertools.pairwise(corners):
+            self.line(EDGE_LINE_MM, *a, *b)
+        return self.text()
+
+
+def _at(x: float, y: float, code: int) -> str:
+    return f"X{round(x * 1e6)}Y{round(-y * 1e6)}D{code:02d}*"
+
+
+def _plated(drawing: Drawing) -> list[tuple[float, float, float]]:
+    """Diameter and place of each plated hole."""
+    holes = [(VIA_DRILL_MM, via.x, via.y) for via in drawing.vias]
+    for one in drawing.placed:
+        holes += [(pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill]
+    return holes
+
+
+def _drill(holes: list[tuple[float, float, float]], function: str) -> str:
+    sizes = sorted({size for size, _, _ in holes})
+    lines = ["M48", f"; #@! TF.FileFunction,{function}", "FMAT,2", "METRIC,TZ"]
+    lines += [f"T{tool}C{size:.3f}" for tool, size in enumerate(sizes, 1)]
+    lines += ["%", "G90", "G05"]
+    for tool, size in enumerate(sizes, 1):
+        lines.append(f"T{tool}")
+        lines += [f"X{x:.6f}Y{-y + 0.0:.6f}" for one, x, y in holes if one == size]
+    return "\n".join([*lines, "T0", "M30"]) + "\n"
+
+
+def _ipc(drawing: Drawing) -> Iterator[str]:
+    """IPC-D-356A: a record of 80 columns for each pad and via, in units of 1 um."""
+    yield "C  contactfpga"
+    yield "P  JOB   contactfpga"
+    yield "P  UNITS CUST 1"
+    for one in drawing.placed:
+        for pad in one.part.pads:
+            net = one.nets.get(pad.number, "N/C")
+            x, y = one.spot(pad.x, pad.y)
+            if pad.drill:
+                kind, hole, access = "317", f"D{round(pad.drill * 1e3):04d}P", "A00"
+            else:
+                kind, hole, access = "327", " " * 6, "A02" if one.back else "A01"
+            size = "X{:04d}Y{:04d}".format(
+                *(round(1e3 * side) for side in (one.size(pad) if not pad.round else (pad.width, 0)))
+            )
+            yield f"{kind}{net:<14}   {one.reference:<6}-{pad.number:<4} {hole}{access}{_ipc_at(x, y)}{size}R000 S0"
+    for via in drawing.vias:
+        hole = f"D{round(VIA_DRILL_MM * 1e3):04d}P"
+        size = f"X{round(VIA_MM * 1e3):04d}Y0000"
+        yield f"317{via.net:<14}   VIA   -     {hole}A00{_ipc_at(via.x, via.y)}{size}R000 S3"
+    yield "999"
+
+
+def _ipc_at(x: float, y: float) -> str:
+    return f"X{round(1e3 * x):+07d}Y{round(-1e3 * y):+07d}"

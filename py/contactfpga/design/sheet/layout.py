@@ -1,0 +1,280 @@
+"""Where everything on a sheet lies: the matrix of a Skin on two copper layers, with its strip and its outline.
+
+Columns run along y on the top side, through the switches. Rows run along x on the back, under the diodes. All lines
+leave at the edge above row 0, so that a sheet around a closed cylinder needs nothing at its seam: a row comes down
+between two columns on the top side, runs on the back to its first switch, and from there past all of them. So the far
+end of each row is at the last column, and the far end of each column at the last row; there the guard lines are.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from contactfpga.boards import wiring
+from contactfpga.design.circuit import Circuit
+from contactfpga.design.sheet import strip
+from contactfpga.design.sheet.drawn import CLEARANCE_MM, EDGE_MM, TRACK_MM, VIA_MM, Drawing, Hole
+from contactfpga.design.sheet.parts import DIODE, DIODE_VIA, SheetError, SwitchPart, find_switch
+from contactfpga.design.sheet.strip import PLACE_MM, Line, port
+from contactfpga.skin import Skin
+
+FITTED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5_600.0)
+"""Resistors of a Skin whose file states no circuit (docs/maker.md)."""
+
+MARGIN_MM = 7.0
+"""Board beyond the parts, with the mounting holes in it."""
+HOLE_MM = 3.2
+"""For M3."""
+
+_DIODE_AT = -0.2, 0.5
+"""Middle of a cell's diode; its pads are 1.1 mm to the left and right."""
+_ROW_Y = 2.0
+_FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
+"""The track that brings a row to its first switch: far enough for a via on it."""
+_ROW_START = -2.0
+_CELL_HEIGHT = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - DIODE_VIA[1] + VIA_MM / 2
+"""Of what is on the back."""
+_GUARD_ROW_Y = 4.2
+"""From the last row to the guard row."""
+_GUARD_DIODE_X = -0.35
+"""From the guard column to its diodes."""
+_GUARD_EDGE = 0.7
+"""From the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """A sheet with everything in its place."""
+
+    skin: Skin
+    circuit: Circuit
+    """Values of its resistors."""
+    switch: SwitchPart
+    drawing: Drawing
+    lines: tuple[Line, ...]
+    """From left to right, as they leave the matrix."""
+
+
+def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
+    """Lay out the sheet of a Skin.
+
+    ``part`` names the switch; ``margin_mm`` is the board beyond its parts. Raises :class:`SheetError` for cells that
+    are finer than their parts, and for lines that find no place around a closed cylinder.
+    """
+    switch, fitted = find_switch(part), circuit or FITTED
+    _check(skin, switch)
+    matrix = _Matrix(skin, switch)
+    lines = matrix.lines()
+    drawing = Drawing()
+    base = -skin.pitch_y_mm / 2 - 0.4
+    matrix.draw(drawing, base)
+    left, top, right = strip.draw(drawing, skin, fitted, lines, base)
+    _outline(drawing, skin, (left, top, right), margin_mm)
+    _numbers(drawing, skin, switch)
+    return Layout(skin, fitted, switch, drawing, tuple(lines))
+
+
+def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
+    """The finest pitch in mm, along x and along y, at which the cells of a Skin hold their parts."""
+    wide = switch.part.width + CLEARANCE_MM
+    high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, _CELL_HEIGHT)
+    if skin.columns > 1:
+        wide = max(wide, 2 * switch.half_width + VIA_MM + 2 * CLEARANCE_MM, 2 * PLACE_MM)
+    if skin.closed and skin.guard:
+        wide = max(wide, 2 * (switch.half_width + CLEARANCE_MM + TRACK_MM / 2 + _GUARD_EDGE))
+    return wide, high
+
+
+def _check(skin: Skin, switch: SwitchPart) -> None:
+    limits = smallest_pitch(skin, switch)
+    for name, pitch, limit in zip(
+        ("pitch_x_mm", "pitch_y_mm"), (skin.pitch_x_mm, skin.pitch_y_mm), limits, strict=True
+    ):
+        if pitch < limit - 1e-9:
+            raise SheetError(
+                f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm; "
+                "choose a larger pitch or a smaller part"
+            )
+
+
+class _Matrix:
+    """The cells and lines of a Skin, and where its rows come down."""
+
+    def __init__(self, skin: Skin, switch: SwitchPart):
+        self.skin, self.switch = skin, switch
+        self.px, self.py = skin.pitch_x_mm, skin.pitch_y_mm
+        self.last_x = (skin.columns - 1) * self.px
+        edge = self.px / 2 - _GUARD_EDGE if skin.closed else self.px / 2
+        self.guard_x = self.last_x + edge
+        self.masked = set(skin.mask)
+        self.risers = self._risers()
+
+    def row_y(self, row: int) -> float:
+        """Middle of a row's cells; the guard row's is the last."""
+        return row * self.py if row < self.skin.rows else (self.skin.rows - 1) * self.py + _GUARD_ROW_Y
+
+    def row_net(self, row: int) -> str:
+        """Name of a row's net."""
+        return f"ROW{row}" if row < self.skin.rows else "ROW_GUARD"
+
+    def column_net(self, column: int) -> str:
+        """Name of a column's net."""
+        return f"COL{column}" if column < self.skin.columns else "COL_GUARD"
+
+    def _risers(self) -> list[float]:
+        """Where each row comes down, from left to right: between columns, and on a plane also left of them."""
+        skin, gaps = self.skin, self.skin.columns - 1
+        width = self.px - 2 * self.switch.half_width - VIA_MM - 2 * CLEARANCE_MM
+        most = min(math.floor(self.px / PLACE_MM + 1e-9) - 1, math.floor(width / PLACE_MM + 1e-9) + 1) if gaps else 0
+        each = min(most, -(-skin.row_lines // max(gaps, 1)))
+        if skin.closed and gaps * most < skin.row_lines:
+            raise SheetError(
+                f"rows is {skin.rows}: {skin.row_lines} row lines, and {gaps * most} find a place between "
+                f"{skin.columns} columns at {self.px:.4g} mm around a closed cylinder; take fewer rows, or more or "
+                "wider columns"
+            )
+        between = [(gap + 0.5) * self.px + (k - (each - 1) / 2) * PLACE_MM for gap in range(gaps) for k in range(each)]
+        beside = max(self.px / 2, PLACE_MM, self.switch.half_width + VIA_MM)
+        spill = max(0, skin.row_lines - len(between))
+        return [-beside - k * PLACE_MM for k in reversed(range(spill))] + between[: skin.row_lines]
+
+    def lines(self) -> list[Line]:
+        """All lines where they leave the matrix, from left to right."""
+        skin = self.skin
+        rows, columns = wiring.row_lines(skin), wiring.column_lines(skin)
+        found = []
+        for row, number in enumerate(skin.line_of_row):
+            pin, pull = port("rows", number, skin.row_lines), rows[number].pull
+            found.append(Line(self.row_net(row), pin, self.risers[row], "row", pull, bool(self._ends(row))))
+        for column, number in enumerate(skin.line_of_column):
+            pin, pull = port("columns", number, skin.column_lines), columns[number].pull
+            x = column * self.px if column < skin.columns else self.guard_x
+            used = column == skin.columns or self._last(column) >= 0
+            found.append(Line(self.column_net(column), pin, x, "column", pull, used))
+        return sorted(found, key=lambda line: line.x)
+
+    def _ends(self, row: int) -> list[float]:
+        """Where along x something hangs on a row, from its start on."""
+        found = [column for column in range(self.skin.columns) if (row, column) not in self.masked]
+        ends = [column * self.px + _DIODE_AT[0] + 1.1 for column in found]
+        return [*ends, self.guard_x + _GUARD_DIODE_X] if self.skin.guard and row < self.skin.rows else ends
+
+    def _last(self, column: int) -> int:
+        """The last row at which something hangs on a column, the guard row counted; -1 for none."""
+        if self.skin.guard:
+            return self.skin.rows
+        return max((row for row in range(self.skin.rows) if (row, column) not in self.masked), default=-1)
+
+    def draw(self, drawing: Drawing, base: float) -> None:
+        """Draw all cells, and the lines up to ``base``."""
+        for column in range(self.skin.columns):
+            if self._last(column) >= 0:
+                x = column * self.px
+                drawing.run(self.column_net(column), "F", (x, base), (x, -self.switch.reach))
+        for row in range(self.skin.rows):
+            for column in range(self.skin.columns):
+                self._cell(drawing, row, column)
+        if self.skin.guard:
+            self._guard_column(drawing, base)
+            for column in range(self.skin.columns):
+                self._guard_cell(drawing, column)
+        for row in range(self.skin.row_lines):
+            self._row(drawing, row, base)
+
+    def _cell(self, drawing: Drawing, row: int, column: int) -> None:
+        x, y, net = column * self.px, self.row_y(row), self.column_net(column)
+        reach, last = self.switch.reach, self._last(column)
+        if row < min(last, self.skin.rows - 1):
+            drawing.run(net, "F", (x, y + reach), (x, y + self.py - reach))
+        if (row, column) in self.masked:
+            if row < last:
+                drawing.run(net, "F", (x, y - reach), (x, y + reach))
+            return
+        node = self.row_net(row) if self.skin.diodes == "none" else f"N{row}_{column}"
+        drawing.place("SW", self.switch.part, self.switch.part.name, (x, y), {"1": net, "2": node}, back=False)
+        column_tracks = self.switch.column[: len(self.switch.column) - (self.switch.tail if row == last else 0)]
+        for tracks, name in ((column_tracks, net), (self.switch.diode, node)):
+            for x1, y1, x2, y2 in tracks:
+                drawing.run(name, "F", (x + x1, y + y1), (x + x2, y + y2))
+        self._to_row(drawing, x, y, node, self.row_net(row))
+
+    def _to_row(self, drawing: Drawing, x: float, y: float, node: str, row: str) -> None:
+        """From the via of a cell through its diode to its row."""
+        via = x + DIODE_VIA[0], y + DIODE_VIA[1]
+        right = x + _DIODE_AT[0] + 1.1
+        drawing.via(node, *via)
+        if self.skin.diodes == "none":
+            drawing.run(node, "B", via, (right, via[1]), (right, y + _ROW_Y))
+            return
+        middle = x + _DIODE_AT[0], y + _DIODE_AT[1]
+        self._diode(drawing, middle, node, row, 180)
+        drawing.run(node, "B", via, (middle[0] - 1.1, via[1]), (middle[0] - 1.1, middle[1]))
+        drawing.run(row, "B", (right, middle[1]), (right, y + _ROW_Y))
+
+    def _diode(self, drawing: Drawing, middle: tuple[float, float], node: str, row: str, turn: int) -> None:
+        """``turn``: with its cathode toward the row."""
+        low = self.skin.diodes == "col2row"
+        nets = {"1": row, "2": node} if low else {"1": node, "2": row}
+        drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360)
+
+    def _guard_cell(self, drawing: Drawing, column: int) -> None:
+        """A column's end, with its diode to the guard row."""
+        x, y, net = column * self.px, self.row_y(self.skin.rows), self.column_net(column)
+        end = (self.skin.rows - 1) * self.py + self.switch.reach
+        drawing.run(net, "F", (x, end), (x, y + DIODE_VIA[1]))
+        self._to_row(drawing, x, y, net, self.row_net(self.skin.rows))
+
+    def _guard_column(self, drawing: Drawing, base: float) -> None:
+        """The guard column, with a diode to the end of each row."""
+        x, net = self.guard_x, self.column_net(self.skin.columns)
+        drawing.run(net, "F", (x, base), *((x, self.row_y(row)) for row in range(self.skin.rows)))
+        for row in range(self.skin.rows):
+            y, at = self.row_y(row), x + _GUARD_DIODE_X
+            drawing.via(net, x, y)
+            drawing.run(net, "B", (at, y - 1.1), (x, y - 1.1), (x, y))
+            self._diode(drawing, (at, y), net, self.row_net(row), 90)
+            drawing.run(self.row_net(row), "B", (at, y + 1.1), (at, y + _ROW_Y))
+
+    def _row(self, drawing: Drawing, row: int, base: float) -> None:
+        x, y, net = self.risers[row], self.row_y(row), self.row_net(row)
+        along = [(end, y + _ROW_Y) for end in self._ends(row)]
+        if not along:
+            return
+        if x < _ROW_START:
+            foot = x, y + _ROW_Y
+            drawing.run(net, "B", foot, *along)
+        else:
+            foot = x, y + _FEED_Y
+            drawing.run(net, "B", foot, (_ROW_START, foot[1]), (_ROW_START, y + _ROW_Y), *along)
+        drawing.via(net, *foot)
+        drawing.run(net, "F", foot, (x, base))
+
+
+def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: float) -> None:
+    left, top, right = ends
+    around = -skin.pitch_x_mm / 2, (skin.columns - 0.5) * skin.pitch_x_mm
+    if skin.closed:
+        if min(left - around[0], around[1] - right) < EDGE_MM - 1e-6:
+            raise SheetError(
+                f"radius_mm is {skin.radius_mm:g}: connectors, shift registers and resistors lie from {left:.1f} to "
+                f"{right:.1f} mm, and the closed sheet's edges at {around[0]:.1f} and {around[1]:.1f}, {EDGE_MM} mm of "
+                "them free; take fewer lines or a larger radius"
+            )
+        left, right = around
+    else:
+        left, right = min(left, around[0]) - margin_mm, max(right, around[1]) + margin_mm
+    bottom = (skin.rows - 1) * skin.pitch_y_mm + max(skin.pitch_y_mm / 2, skin.guard * (_GUARD_ROW_Y + 3.2))
+    drawing.outline = left, top - margin_mm, right, bottom + margin_mm
+    inset = margin_mm / 2
+    for y in (drawing.outline[1] + inset, drawing.outline[3] - inset):
+        drawing.holes += [Hole(x, y, HOLE_MM) for x in (left + inset, right - inset)]
+
+
+def _numbers(drawing: Drawing, skin: Skin, switch: SwitchPart) -> None:
+    """Print the numbers of rows and columns beside the first cells."""
+    beside = (switch.half_width + skin.pitch_x_mm / 2) / 2
+    for column in range(skin.columns):
+        drawing.number(column, column * skin.pitch_x_mm + 1.0, -skin.pitch_y_mm / 2 - 0.2)
+    for row in range(skin.rows):
+        drawing.number(row, -beside, row * skin.pitch_y_mm, upright=False, height=0.7)

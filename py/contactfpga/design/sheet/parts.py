@@ -1,0 +1,190 @@
+"""The parts of a sheet and the copper that each is soldered to: pads, body, and what to order.
+
+Lengths are in mm. A part is drawn as seen on its own side of the board, x to the right and y down.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterable
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import shown
+
+
+class SheetError(ContactFPGAError, ValueError):
+    """A sheet that cannot be made of its parts; the message names the value and the limit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Pad:
+    """A pad of a part. If it is ``round``, ``width`` is its diameter; a ``drill`` above 0 is the diameter of a plated
+    hole."""
+
+    number: str
+    x: float
+    y: float
+    width: float
+    height: float
+    round: bool = False
+    drill: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A part that is placed on the sheet."""
+
+    name: str
+    """Of its footprint, such as ``R_0603``."""
+    order: str
+    """What to order, in words for the parts list."""
+    pads: tuple[Pad, ...]
+    width: float
+    """Of the area that no other part may enter."""
+    height: float
+    pasted: bool = True
+    """Its pads get solder paste; not so for holes and for the contacts of a dome."""
+    marks: tuple[tuple[float, float, float, float], ...] = ()
+    """Printed lines (x, y, x, y) that show the first pin, or a cathode."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SwitchPart:
+    """A switch of the matrix, with the top-side copper that joins its pads.
+
+    The column comes in at (0, -reach) and leaves at (0, reach). Pads numbered 1 belong to the column, pads numbered 2
+    to the diode, whose via lies at :data:`DIODE_VIA`.
+    """
+
+    part: Part
+    force_n: float
+    """At which it closes."""
+    travel_mm: float
+    height_mm: float
+    """Of the free switch above the board."""
+    closed_by: float
+    """Side or diameter of the plunger that presses it."""
+    column: tuple[tuple[float, float, float, float], ...]
+    """Tracks (x, y, x, y) from one end of the column to the other; pieces meet at their ends."""
+    diode: tuple[tuple[float, float, float, float], ...]
+    """Tracks from pads numbered 2 to the via of the diode."""
+    tail: int
+    """Of the column's tracks, so many at the end only lead on to the next cell."""
+    reach: float
+    half_width: float
+    """The copper of the cell reaches this far to the left and right of its middle."""
+    open_pf: float
+    """Between its two contacts while it is open."""
+
+
+DIODE_VIA = 0.0, -0.6
+"""In a cell: where the diode's track changes to the back."""
+
+_LEG = 1.66
+"""The legs of a dome whose legs span 5 mm stand on a circle of 2.35 mm radius."""
+_SIDES = [(-_LEG, -_LEG), (0.0, -_LEG), (_LEG, -_LEG), (_LEG, _LEG), (0.0, _LEG), (-_LEG, _LEG), (-_LEG, -_LEG)]
+
+DOME = SwitchPart(
+    Part(
+        "DOME_5MM_4LEG",
+        "metal dome, round, 5 mm, four legs, 0.4 N +-10 %, 0.2 mm travel, held by an adhesive sheet; to be ordered by "
+        "these values, no catalog number was checked",
+        (
+            *(Pad("1", x * _LEG, y * _LEG, 1.2, 1.2, round=True) for x in (-1, 1) for y in (-1, 1)),
+            Pad("2", 0.0, 0.0, 2.0, 2.0, round=True),
+        ),
+        5.0,
+        5.0,
+        pasted=False,
+    ),
+    force_n=0.4,
+    travel_mm=0.2,
+    height_mm=0.3,
+    closed_by=1.5,
+    column=tuple((*a, *b) for a, b in itertools.pairwise(_SIDES)),
+    diode=(),
+    tail=0,
+    reach=_LEG,
+    half_width=_LEG + 0.6,
+    open_pf=0.6,  # a disk of 5 mm at 0.3 mm of air: eps0 pi 2.5^2 / 0.3 mm
+)
+
+_TACT_SIDE = [(0.0, -2.7), (-2.4, -2.7), (-2.4, -1.5), (-2.4, 1.5), (-2.4, 2.7), (0.0, 2.7)]
+
+TACT = SwitchPart(
+    Part(
+        "TACT_4.5MM",
+        "E-Switch TL3315NF100Q: tact switch, 4.5x4.5 mm, 1 N (100 gf); compare its drawing with these pads, they "
+        "were drawn without it",
+        (*(Pad(n, x, y, 1.2, 0.9) for n, x in (("1", -2.4), ("2", 2.4)) for y in (-1.5, 1.5)),),
+        6.2,
+        4.7,
+    ),
+    force_n=1.0,
+    travel_mm=0.25,
+    height_mm=0.55,
+    closed_by=1.5,
+    column=tuple((*a, *b) for a, b in itertools.pairwise(_TACT_SIDE)),
+    diode=((2.4, 1.5, 2.4, -1.5), (2.4, -1.5, 0.0, -1.5), (0.0, -1.5, *DIODE_VIA)),
+    tail=2,
+    reach=2.7,
+    half_width=3.0,
+    open_pf=0.5,
+)
+
+SWITCHES = {"dome": DOME, "tact": TACT}
+"""The switches that a sheet can be laid out for, by the name that the command takes."""
+
+
+def find_switch(name: str) -> SwitchPart:
+    """The switch of this name. Raises :class:`SheetError` for a name that is not registered."""
+    if name not in SWITCHES:
+        raise SheetError(f"part is {shown(name)}; it must be one of {', '.join(SWITCHES)}")
+    return SWITCHES[name]
+
+
+def _pair(reach: float, width: float, height: float) -> tuple[Pad, Pad]:
+    return Pad("1", -reach, 0.0, width, height), Pad("2", reach, 0.0, width, height)
+
+
+DIODE = Part(
+    "D_SOD-323",
+    "Schottky diode BAT54WS, SOD-323; pad 1 is the cathode",
+    _pair(1.1, 0.8, 0.6),
+    3.3,
+    1.4,
+    marks=((-1.75, -0.5, -1.75, 0.5),),
+)
+RESISTOR = Part("R_0603", "resistor, 0603, 1 %", _pair(0.8, 0.8, 0.8), 2.7, 1.3)
+CAPACITOR = Part("C_0603", "capacitor, 0603, X7R, 16 V", _pair(0.8, 0.8, 0.8), 2.7, 1.3)
+
+
+def _soic16(order: str) -> Part:
+    """Pins 1 to 8 below from the left, 9 to 16 above from the right, 1.27 mm apart (JEDEC MS-012)."""
+    places = [(k * 1.27 - 4.445, 2.475) for k in range(8)] + [(4.445 - k * 1.27, -2.475) for k in range(8)]
+    pads = (Pad(str(number + 1), x, y, 0.6, 1.95) for number, (x, y) in enumerate(places))
+    return Part("SOIC-16", order, tuple(pads), 10.4, 7.4, marks=((-5.3, 1.2, -5.3, 3.2),))
+
+
+HC595 = _soic16("74HC595, SOIC-16")
+HC165 = _soic16("74HC165, SOIC-16")
+
+HEADER_PINS = 10, 14, 16, 20, 26, 34, 40
+"""Pins of the shrouded headers that there are."""
+
+
+def header(pins: int) -> Part:
+    """A shrouded header of two rows, 2.54 mm apart, for a ribbon cable: odd pins below, even pins above, from the
+    left."""
+    first = -(pins // 2 - 1) * 1.27
+    places = [(first + k // 2 * 2.54, 1.27 - k % 2 * 2.54) for k in range(pins)]
+    pads = (Pad(str(k + 1), x, y, 1.7, 1.7, round=True, drill=1.0) for k, (x, y) in enumerate(places))
+    mark = (first - 1.2, 2.6, first + 1.2, 2.6)
+    order = f"shrouded header, 2x{pins // 2} pins, 2.54 mm, keyed, for a ribbon cable"
+    return Part(f"IDC_2x{pins // 2:02d}", order, tuple(pads), pins // 2 * 2.54 + 7.7, 9.2, pasted=False, marks=(mark,))
+
+
+def smallest_header(pins: int, sizes: Iterable[int] = HEADER_PINS) -> int:
+    """Pins of the smallest header that has as many."""
+    return min(size for size in sizes if size >= pins)

@@ -1,0 +1,104 @@
+"""Draws a layout as an SVG picture, as seen from the top side through the board."""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Iterable, Iterator, Sequence
+
+from contactfpga import picture_style
+from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, Drawing, Layer, Stroke, Track
+from contactfpga.design.sheet.gerber import on_layer
+
+COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
+_BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#1d232b", "#ffffff", "#6b7a8f"
+
+
+def svg(drawing: Drawing, title: str) -> str:
+    """The text of the file; a user unit is a millimeter."""
+    return "\n".join([*_lines(drawing, title), ""])
+
+
+def _lines(drawing: Drawing, title: str) -> Iterator[str]:
+    left, top, right, bottom = drawing.outline
+    edge = (right - left) / 50
+    w, h = right - left + 2 * edge, bottom - top + 4 * edge
+    yield f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w:.2f} {h:.2f}">'
+    yield f"<title>{title}</title>"
+    yield f'<path fill="{picture_style.CARD}" d="{_box(0, 0, w, h)}"/>'
+    yield f'<g transform="translate({edge - left:.3f} {edge - top:.3f})">'
+    yield f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_box(left, top, right - left, bottom - top)}"/>'
+    yield '<g fill="none" stroke-linecap="round">'
+    for layer, (color, _) in COPPER.items():
+        yield from _copper(drawing, layer, color)
+    bodies = "".join(_body(one.x, one.y, one.turn, one.part.width, one.part.height) for one in drawing.placed)
+    yield f'<path stroke="{_BODY}" stroke-width="0.1" d="{bodies}"/>'
+    yield f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path(drawing.strokes)}"/>'
+    yield from _dots(_holes(drawing), _HOLE)
+    yield "</g>"
+    yield from _legend(left, bottom + 1.7 * edge, edge)
+    yield "</g></svg>"
+
+
+def _copper(drawing: Drawing, layer: Layer, color: str) -> Iterator[str]:
+    dots, boxes = [(VIA_MM, via.x, via.y) for via in drawing.vias], []
+    for one in drawing.placed:
+        for pad in one.part.pads:
+            x, y = one.spot(pad.x, pad.y)
+            w, h = one.size(pad)
+            if on_layer(pad, one, layer) and pad.round:
+                dots.append((w, x, y))
+            elif on_layer(pad, one, layer):
+                boxes.append(_box(x - w / 2, y - h / 2, w, h))
+    yield f'<path fill="{color}" d="{"".join(boxes)}"/>'
+    yield from _dots(dots, color)
+    tracks = [track for track in drawing.tracks if track.layer == layer]
+    for width in sorted({track.width for track in tracks}):
+        of_width = [track for track in tracks if track.width == width]
+        yield f'<path stroke="{color}" stroke-width="{width}" d="{_path(of_width)}"/>'
+
+
+def _holes(drawing: Drawing) -> Iterator[tuple[float, float, float]]:
+    """Diameter and place of each."""
+    yield from ((VIA_DRILL_MM, via.x, via.y) for via in drawing.vias)
+    for one in drawing.placed:
+        yield from ((pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill)
+    yield from ((hole.drill, hole.x, hole.y) for hole in drawing.holes)
+
+
+def _dots(dots: Iterable[tuple[float, float, float]], color: str) -> Iterator[str]:
+    """Disks, as lines of no length with round ends."""
+    places = collections.defaultdict(list)
+    for diameter, x, y in dots:
+        places[diameter].append(f"M{x:.2f} {y:.2f}h0")
+    for diameter, words in places.items():
+        yield f'<path stroke="{color}" stroke-width="{diameter:g}" d="{"".join(words)}"/>'
+
+
+def _path(lines: Sequence[Track | Stroke]) -> str:
+    """Joins lines that follow on each other."""
+    words, last = [], None
+    for line in lines:
+        if (line.x1, line.y1) != last:
+            words.append(f"M{line.x1:.2f} {line.y1:.2f}")
+        words.append(f"L{line.x2:.2f} {line.y2:.2f}")
+        last = line.x2, line.y2
+    return "".join(words)
+
+
+def _box(x: float, y: float, w: float, h: float) -> str:
+    return f"M{x:.2f} {y:.2f}h{w:.2f}v{h:.2f}h{-w:.2f}z"
+
+
+def _body(x: float, y: float, turn: int, width: float, height: float) -> str:
+    w, h = (height, width) if turn % 180 else (width, height)
+    return _box(x - w / 2, y - h / 2, w, h)
+
+
+def _legend(left: float, y: float, size: float) -> Iterator[str]:
+    """A swatch and a word for each color, in letters of this size."""
+    words = [*COPPER.values(), (_BODY, "parts"), (_PRINT, "printed")]
+    for number, (color, said) in enumerate(words):
+        x = left + number * 9 * size
+        yield f'<path fill="{color}" d="{_box(x, y - 0.75 * size, size, 0.75 * size)}"/>'
+        style = f'font-family="sans-serif" font-size="{size:.2f}" fill="{_PRINT}"'
+        yield f'<text x="{x + 1.4 * size:.2f}" y="{y:.2f}" {style}>{said}</text>'

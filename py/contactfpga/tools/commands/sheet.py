@@ -1,0 +1,121 @@
+"""`contactfpga sheet`: the sheet of a Skin as files to order, and what its lines come to as a circuit."""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+from contactfpga import terminal
+from contactfpga.design.circuit import load_checked
+from contactfpga.design.cover import load_cover
+from contactfpga.design.sheet import SWITCHES, lay_out
+from contactfpga.design.sheet.drawn import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
+from contactfpga.design.sheet.layout import MARGIN_MM
+from contactfpga.skin import Skin
+from contactfpga.tools.console import numbers, outputs
+
+EXTRA = None
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("skin", metavar="SKIN.toml", help="Skin to lay out, with its tables [circuit] and [cover].")
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", default="build/sheet", help="Folder for the files (default: build/sheet)."
+    )
+    part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
+    parser.add_argument("--part", choices=tuple(SWITCHES), default="dome", help=part)
+    margin = f"Board beyond the parts, in mm (default: {MARGIN_MM:g})."
+    parser.add_argument(
+        "--margin", type=numbers.number(MARGIN_MM, 100, "mm"), default=MARGIN_MM, metavar="MM", help=margin
+    )
+    cable = "Length of the ribbon cables, in m (default: 0.3)."
+    parser.add_argument("--cable", type=numbers.number(0, 10, "m"), default=0.3, metavar="M", help=cable)
+    parser.add_argument(
+        "--check", action="store_true", help="Have KiCad 6 check the board; status 1 if it finds anything."
+    )
+    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 1 if KiCad was asked and found something."""
+    from contactfpga.design.sheet import check, files
+    from contactfpga.design.sheet.caps import caps
+    from contactfpga.design.sheet.extract import extracted
+
+    folder = outputs.folder(args.output)
+    skin = Skin.load(args.skin)
+    cover, circuit = load_cover(args.skin), load_checked(args.skin, skin)
+    layout = lay_out(skin, circuit, args.part, args.margin)
+    side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
+    layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
+    text = files.completed(Path(args.skin).read_text(encoding="utf-8"), found.circuit)
+    names = files.write(folder, layout, layer, text)
+    problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.check else None
+    left, top, right, bottom = layout.drawing.outline
+    answer: dict[str, Any] = {
+        "folder": str(folder),
+        "files": names,
+        "board_mm": [round(right - left, 3), round(bottom - top, 3)],
+        "parts": collections.Counter(one.part.name for one in layout.drawing.placed),
+        "caps": {
+            "count": len(layer.centers),
+            "side_mm": round(layer.side_mm, 6),
+            "gap_mm": round(layer.gap_mm, 6),
+            "plunger_mm": layer.plunger_mm,
+            "below_mm": layer.below_mm,
+        },
+        "circuit": {
+            name: getattr(found.circuit, name) for name in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm")
+        },
+        "extracted": {name: value for name, value in dataclasses.asdict(found).items() if name != "circuit"},
+        "kicad": problems,
+    }
+    if args.json:
+        print(json.dumps(answer))
+    else:
+        _show(answer, skin)
+    return 1 if problems else 0
+
+
+def _show(answer: dict[str, Any], skin: Skin) -> None:
+    width, height = answer["board_mm"]
+    terminal.say(
+        f"{skin.rows}x{skin.columns} at {skin.pitch_x_mm:.4g} x {skin.pitch_y_mm:.4g} mm: board of {width:.1f} x "
+        f"{height:.1f} mm, two copper layers, tracks and clearances of {TRACK_MM} and {CLEARANCE_MM} mm, vias of "
+        f"{VIA_MM}/{VIA_DRILL_MM} mm",
+        hang=2,
+    )
+    terminal.say("parts: " + ", ".join(f"{count} {name}" for name, count in answer["parts"].items()), hang=2)
+    cap = answer["caps"]
+    terminal.say(
+        f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
+        f"{cap['plunger_mm']:g} mm; {cap['below_mm']:g} mm above the switch's body when it is pressed to its end",
+        hang=2,
+    )
+    found = answer["extracted"]
+    terminal.say(
+        "lines: rows {:.2f} to {:.2f} ohm, columns {:.2f} to {:.2f} ohm; a row to a column {:.2f} to {:.2f} pF, to the "
+        "next row {:.2f} pF, a column to the next {:.2f} pF".format(
+            *found["row_ohm"],
+            *found["column_ohm"],
+            *found["crossing_pf"],
+            found["row_neighbor_pf"],
+            found["column_neighbor_pf"],
+        ),
+        hang=2,
+    )
+    for name, value in answer["circuit"].items():
+        terminal.say(f"  {name} = {value:g}")
+    terminal.say(
+        f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
+    )
+    terminal.say(f"next: contactfpga settle --skin {answer['folder']}/skin.toml", hang=2)
+    if answer["kicad"] is not None:
+        terminal.say(f"KiCad: {len(answer['kicad'])} findings")
+        for finding in answer["kicad"]:
+            terminal.say(f"  {finding}", hang=4)

@@ -1,0 +1,166 @@
+"""What the Gerbers' copper and drill join is what the Skin's wiring table says, traced by another library."""
+
+import dataclasses
+import random
+import re
+
+import pytest
+from sample import sample
+
+pytest.importorskip("gerbonara", reason="gerbonara is not installed")
+pytest.importorskip("cv2", reason="OpenCV is not installed")
+
+from traced_board import TracedBoard, lines_of
+
+from contactfpga import Skin
+from contactfpga.boards import BOARDS, wiring
+from contactfpga.design.sheet import files, lay_out
+from contactfpga.design.sheet.caps import caps
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
+
+TILE = {"pitch_x_mm": 6.4, "pitch_y_mm": 6.4}
+CLOSED = {"surface": "cylinder", "closed": True}
+REGISTERS = {"row_drive": "74hc595", "column_read": "74hc165"}
+
+
+def shuffled(count, seed):
+    return tuple(random.Random(seed).sample(range(count), count))
+
+
+SKINS = {
+    "8x8": (Skin(rows=8, columns=8, **TILE), "dome"),
+    "16x16 guard": (Skin(guard=True, **TILE), "dome"),
+    "12x20 registers": (Skin(rows=12, columns=20, **REGISTERS), "dome"),
+    "24x32 closed": (Skin(rows=24, columns=32, radius_mm=40.0, **CLOSED), "dome"),
+    "12x20 chains": (Skin(rows=12, columns=20, row_chains=3, column_chains=2, guard=True, **REGISTERS), "tact"),
+    "16x16 595": (Skin(row_drive="74hc595", column_order=shuffled(16, 1), row_order=shuffled(16, 2), **TILE), "dome"),
+    "10x9 165": (Skin(rows=10, columns=9, column_read="74hc165", diodes="row2col", guard=True), "tact"),
+    "6x5 reversal": (
+        Skin(rows=6, columns=5, scan="reversal", precharge_us=0.25, guard=True, row_order=shuffled(6, 3)),
+        "dome",
+    ),
+    "9x12 closed guard": (Skin(rows=9, columns=12, radius_mm=16.0, guard=True, pitch_y_mm=5.5, **CLOSED), "dome"),
+    "7x4 bare": (Skin(rows=7, columns=4, diodes="none", connectivity=4), "dome"),
+    "masked": (Skin(rows=5, columns=5, mask=(*((r, 2) for r in range(5)), *((4, c) for c in (0, 1, 3, 4)))), "tact"),
+    "1x1": (Skin(rows=1, columns=1), "dome"),
+    "20x2": (Skin(rows=20, columns=2, scan="reversal", precharge_us=0.25, diodes="row2col"), "dome"),
+    "1x40": (Skin(rows=1, columns=40, guard=True), "dome"),
+}
+QUICK = {"8x8", "16x16 guard", "12x20 registers", "6x5 reversal", "10x9 165", "9x12 closed guard", "masked", "1x1"}
+SLOW = {"24x32 closed"}
+
+
+def written(folder, skin, part="dome"):
+    layout = lay_out(skin, part=part)
+    files.write(folder, layout, caps(skin, layout.switch), "")
+    return layout
+
+
+def wide_board(skin):
+    """A board with a pin for every wire of any sheet."""
+    pins = tuple(f"J:{number}" for number in range(130))
+    return dataclasses.replace(BOARDS["ulx3s-85f"], row_side=pins, column_side=pins, clock_hz=skin.clock_hz)
+
+
+def check_against_the_wiring_table(board, skin, series=33.0, pulls=None):
+    """The traced board against :func:`contactfpga.boards.wiring.wires` and ``outputs``."""
+    pulls = pulls or {"row": 5600.0, "column": 22000.0}
+    assert board.disagreements() == []
+    rows, columns = lines_of(board, skin)
+    lines = {f"row {n}": one for n, one in rows.items()} | {f"column {n}": one for n, one in columns.items()}
+    wires = board.connectors
+    supply, ground = wires["3V3"], wires["GND"]
+    assert supply != ground
+    guarded(board, skin, rows, columns, lines)
+
+    def leads(pin, line):
+        """From a pin through the series resistor to the line, and its pull."""
+        ends = [(other, ohms) for other, ohms in board.resistors[pin] if other not in (supply, ground)]
+        ((copper, ohms),) = ends
+        assert ohms == series
+        assert copper == lines.setdefault(line.leads_to, copper), line
+        at = {(other, ohms) for other, ohms in board.resistors[copper] if other in (supply, ground)}
+        rail = {"up": supply, "down": ground}
+        assert at == ({(rail[line.pull], pulls[line.kind])} if line.pull else set()), line
+
+    chips = named_chips(board, skin, wires)
+    seen = set()
+    for wire in wiring.wires(wide_board(skin), skin):
+        if wire.line.kind:
+            leads(wires[wire.port], wire.line)
+        elif found := re.match(r"[\w/']+ (\d+) of (every|chip 0, chain (\d+),) (74HC\d+)", wire.line.leads_to):
+            pin, which, chain, kind = found.groups()
+            for (name, of_chain, number), chip in chips.items():
+                if name == kind and (which == "every" or (of_chain, number) == (int(chain), 0)):
+                    assert board.pad(chip, pin) == wires[wire.port], wire
+            if "10 kΩ" in wire.line.leads_to:
+                assert (supply, 10_000.0) in board.resistors[wires[wire.port]]
+        else:
+            continue
+        seen.add(wire.port)
+    assert seen == set(wires) - {"3V3", "GND"}
+    used = set()
+    for output in wiring.outputs(skin):
+        leads(board.pad(chips[output.chip, output.chain, output.number], output.pin), output.line)
+        used.add((chips[output.chip, output.chain, output.number], output.pin))
+    ties(board, chips, used, supply, ground)
+    assert len(set(lines.values())) == len(lines)
+
+
+def guarded(board, skin, rows, columns, lines):
+    """Guard lines: a diode from the guard column to each row and from each column to the guard row, and no other."""
+    flip = skin.diodes == "row2col"
+    pairs = {(cathode, anode) if flip else (anode, cathode) for anode, cathode in board.diodes}
+    between = {(a, b) for a, b in pairs if b in rows.values() and a not in columns.values()}
+    switched = skin.rows * skin.columns - len(skin.mask)
+    if skin.diodes == "none":
+        assert pairs == set()
+        return
+    assert len(board.diodes) == switched + skin.guard * (skin.rows + skin.columns)
+    if not skin.guard:
+        return
+    nodes = {board.pad(name, 2) for name in board.parts("SW")}
+    ((guard_column),) = {a for a, b in between if a not in nodes}
+    ((guard_row),) = {b for a, b in pairs if b not in rows.values()}
+    assert {b for a, b in pairs if a == guard_column} == set(rows.values())
+    assert {a for a, b in pairs if b == guard_row} == set(columns.values())
+    lines |= {"guard row": guard_row, "guard column": guard_column}
+
+
+def named_chips(board, skin, wires):
+    """Reference of each shift register by (kind, chain, number), found by following its chain from the connector."""
+    ways = {"74HC595": ("row_data", skin.row_chains, 14, 9), "74HC165": ("column_data", skin.column_chains, 9, 10)}
+    found = {}
+    for kind, (port, chains, first, after) in ways.items():
+        names = [name for name in board.parts("U") if board.placed[name][0] == kind]
+        starts = {board.pad(name, first): name for name in names}
+        for chain in range(chains if names else 0):
+            copper, number = wires[port if chains == 1 else f"{port}[{chain}]"], 0
+            while copper in starts:
+                found[kind, chain, number] = name = starts.pop(copper)
+                copper, number = board.pad(name, after), number + 1
+        assert not starts, f"{kind} in no chain"
+    return found
+
+
+def ties(board, chips, used, supply, ground):
+    """Supplies and inputs that are held, as docs/boards.md lists them; 100 nF at each chip."""
+    held = {"74HC595": {8: ground, 16: supply, 10: supply}, "74HC165": {8: ground, 16: supply, 15: ground}}
+    for (kind, chain, number), name in chips.items():
+        pins = dict(held[kind])
+        if kind == "74HC165":
+            pins |= {pin: ground for pin in (3, 4, 5, 6, 11, 12, 13, 14) if (name, pin) not in used}
+            if (kind, chain, number + 1) not in chips:
+                pins[10] = ground
+        assert {pin: board.pad(name, pin) for pin in pins} == pins
+    for name in board.parts("C"):
+        assert {board.pad(name, 1), board.pad(name, 2)} == {supply, ground}
+    assert len(board.parts("C")) == len(chips)
+
+
+@pytest.mark.parametrize("name", sample(list(SKINS), quick=QUICK, slow=SLOW))
+def test_copper_is_the_wiring_table(tmp_path, name):
+    skin, part = SKINS[name]
+    written(tmp_path, skin, part)
+    check_against_the_wiring_table(TracedBoard(tmp_path), skin)
