@@ -10,20 +10,24 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga import terminal
+from contactfpga.design import kits
 from contactfpga.design.circuit import load_checked
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import SWITCHES, lay_out
 from contactfpga.design.sheet.drawn import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
 from contactfpga.design.sheet.layout import MARGIN_MM
+from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.tools.console import numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs
 
 EXTRA = None
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument("skin", metavar="SKIN.toml", help="Skin to lay out, with its tables [circuit] and [cover].")
+    lay = "Skin to lay out, with its tables [circuit] and [cover]."
+    parser.add_argument("skin", metavar="SKIN.toml", nargs="?", help=lay)
+    flags.kit(parser)
     parser.add_argument(
         "-o", "--output", metavar="DIR", default="build/sheet", help="Folder for the files (default: build/sheet)."
     )
@@ -47,13 +51,15 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.design.sheet.caps import caps
     from contactfpga.design.sheet.extract import extracted
 
-    folder = outputs.folder(args.output)
-    skin = Skin.load(args.skin)
-    cover, circuit = load_cover(args.skin), load_checked(args.skin, skin)
+    folder, file = outputs.folder(args.output), flags.sheet_file(args)
+    if file is None:
+        raise ContactFPGAError(f"name a Skin's file, or a kit: --kit {' or --kit '.join(kits.names())}")
+    skin = Skin.load(file)
+    cover, circuit = load_cover(file), load_checked(file, skin)
     layout = lay_out(skin, circuit, args.part, args.margin)
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
     layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
-    text = files.completed(Path(args.skin).read_text(encoding="utf-8"), found.circuit)
+    text = files.completed(Path(file).read_text(encoding="utf-8"), found.circuit)
     names = files.write(folder, layout, layer, text)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.check else None
     left, top, right, bottom = layout.drawing.outline

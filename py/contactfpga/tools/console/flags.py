@@ -41,6 +41,11 @@ def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
 def sheet(parser: argparse.ArgumentParser, skin: str) -> None:
     """A Skin's file or a kit's name; ``skin``: the help of the former."""
     parser.add_argument("--skin", metavar="FILE", help=skin)
+    kit(parser)
+
+
+def kit(parser: argparse.ArgumentParser) -> None:
+    """A kit by its name."""
     parser.add_argument("--kit", metavar="NAME", help="The sheet of this kit (docs/kits.md).")
 
 
@@ -57,10 +62,10 @@ def board(args: argparse.Namespace) -> BoardSpec | None:
     """The board that ``--board`` or its argument names, or that of ``--kit``; None where neither is given."""
     if not args.kit:
         return find(args.board) if args.board else None
-    kit = kits.kit(args.kit)
-    if args.board and args.board != kit.board.name:
-        raise ContactFPGAError(f"the kit {args.kit!r} is for {kit.board.name}, not {args.board}; leave the board out")
-    return kit.board
+    found = kits.kit(args.kit).board
+    if args.board and args.board != found.name:
+        raise ContactFPGAError(f"the kit {args.kit!r} is for {found.name}, not {args.board}; leave the board out")
+    return found
 
 
 def design(parser: argparse.ArgumentParser, skin: str) -> None:
