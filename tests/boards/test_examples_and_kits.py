@@ -12,6 +12,8 @@ from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.design import buildable, kits
 from contactfpga.design.circuit import Circuit, CircuitError, check, check_times, load_circuit
+from contactfpga.design.sheet import lay_out
+from contactfpga.design.sheet.extract import extracted
 from contactfpga.skin import SkinError
 from contactfpga.tools import cli
 from contactfpga_hdl.board import build
@@ -63,6 +65,17 @@ def test_a_kit_is_complete(name):
     assert kit.skin == Skin.load(kit.skin_path), "the host reads the file without a board"
     assert all(part.count > 0 and part.what for part in kit.parts)
     assert (kit.skin.guard, kit.skin.alive, kit.skin.fail_safe) == (True, True, True)
+
+
+@pytest.mark.parametrize("name", kits.names())
+def test_the_circuit_that_a_kit_states_covers_that_of_its_sheet(name):
+    """Lines of the layout, with 0.3 m of cable, are no slower than the Skin's times were chosen for."""
+    kit = kits.kit(name)
+    stated = load_circuit(kit.skin_path)
+    found = extracted(lay_out(kit.skin, stated), 0.3).circuit
+    for value in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm"):
+        assert getattr(stated, value) >= getattr(found, value) > 0, value
+    check_times(found, kit.skin)
 
 
 def test_a_kit_that_is_not_there_is_told_with_those_that_are(capsys):
