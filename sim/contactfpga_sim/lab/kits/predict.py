@@ -170,7 +170,7 @@ def _cover(kit: Kit) -> Iterator[Prediction]:
     pitch_m = 1e-3 * skin.pitch_x_mm
     rng = np.random.default_rng(2)
     covers = [nominal, *(drawn_cover(nominal, rng) for _ in range(DRAWS))]
-    closing = np.array([_closing_n(cover, pitch_m, seed) for seed, cover in enumerate(covers)])
+    closing = np.array([closing_n(cover, pitch_m, seed) for seed, cover in enumerate(covers)])
     command = f"cover felt --kit {kit.name}"
     for number, (x, y) in enumerate(PLACES):
         what = f"force of a fingertip whose middle is {x:g} and {y:g} pitches from a switch's when it is felt"
@@ -185,7 +185,7 @@ def _cover(kit: Kit) -> Iterator[Prediction]:
     yield _made("felt_share", what, "%", shares, "cover", command)
 
 
-def _closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
+def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
     """The force that closes a first switch, at each of :data:`PLACES`; the first cover's switches have no spread."""
     if not seed:
         cover = dataclasses.replace(cover, switch=dataclasses.replace(cover.switch, spread=0.0))
