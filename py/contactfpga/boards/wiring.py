@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 from collections.abc import Iterator, Sequence
 
@@ -115,6 +116,23 @@ def outputs(skin: Skin) -> list[Output]:
     if skin.column_read != "direct":
         found += _chained("74HC165", COLUMN_INPUTS, skin.column_chains, column_lines(skin))
     return found
+
+
+def parts(skin: Skin) -> dict[str, int]:
+    """How many of each part the sheet takes, without connectors."""
+    lines = [*row_lines(skin), *column_lines(skin)]
+    cells = skin.rows * skin.columns - len(skin.mask)
+    chips = collections.Counter(chip for chip, *_ in {(one.chip, one.chain, one.number) for one in outputs(skin)})
+    guards = len(lines) - skin.rows - skin.columns and skin.rows + skin.columns
+    found = {
+        "switches": cells,
+        "diodes": 0 if skin.diodes == "none" else cells + guards,
+        "series resistors": len(lines),
+        "pull resistors": sum(bool(line.pull) for line in lines),
+        **chips,
+        "capacitors of 100 nF": chips.total(),
+    }
+    return {name: count for name, count in found.items() if count}
 
 
 def row_lines(skin: Skin) -> list[Connection]:

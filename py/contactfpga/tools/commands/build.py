@@ -177,6 +177,9 @@ class WiringTable:
         _show([head, *rows])
         chips = ("sheet", "chip", "chain", "number", "output", "leads to", "series", "pull")
         _show([chips, *((sheet, *one.place, *self._end(one.line)) for sheet, one in self._outputs())])
+        for sheet, skin in self._sheets:
+            counted = ", ".join(f"{count} {name}" for name, count in wiring.parts(skin).items())
+            terminal.say(f"{sheet and f'sheet {sheet}: '}{counted}", hang=2)
         if self.circuit is None:
             terminal.say("Resistors have values once the Skin's file states them in its table [circuit].", hang=2)
         terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
@@ -189,6 +192,7 @@ class WiringTable:
                 | self._dict(wire)
                 for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
             ],
+            "parts": [wiring.parts(skin) for _, skin in self._sheets],
             "outputs": [
                 ({"sheet": int(sheet)} if sheet else {})
                 | {"chip": one.chip, "chain": one.chain, "number": one.number, "output": one.name, "pin": one.pin}
