@@ -16,7 +16,14 @@ from contactfpga.tools.commands.build import WiringTable, ohms
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 
-CHAINED = {"precharge_us": 0, "rows": 20, "columns": 12, "row_drive": "74hc595", "column_read": "74hc165", "release_us": 4.0}
+CHAINED = {
+    "precharge_us": 0,
+    "rows": 20,
+    "columns": 12,
+    "row_drive": "74hc595",
+    "column_read": "74hc165",
+    "release_us": 4.0,
+}
 CHANGES = {
     "as shipped": {},
     "direct": {"rows": 4, "columns": 7, "row_drive": "direct"},

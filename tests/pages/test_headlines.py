@@ -10,7 +10,7 @@ MOST = 5
 
 
 def headlines() -> list[list[str]]:
-    """The fields of each row of the README's table of figures: what, starter kit, fast kit, what it is compared with."""
+    """The fields of each row of the README's table of figures: what, starter kit, fast kit, compared with what."""
     (section,) = re.findall(
         r"^## Simulated\n(.*?)^## ", (ROOT / "README.md").read_text(), flags=re.DOTALL | re.MULTILINE
     )

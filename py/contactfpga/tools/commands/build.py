@@ -45,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     board = flags.board(args)
     if board is None:
-        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {' or --kit '.join(kits.names())}")
+        boards, known = ", ".join(BOARDS), " or --kit ".join(kits.names())
+        raise ContactFPGAError(f"name a board, {boards}, or a kit: --kit {known}")
     design = flags.designed(args, board.skin, board.load)
     if args.check:
         return _check(args, board, design)
@@ -101,7 +102,9 @@ def _show_check(board: BoardSpec, answer: dict[str, Any], stated: bool, size: li
     for name, problem in answer["problems"].items():
         terminal.say(f"{name:13}{problem or 'fits'}", hang=13)
     if not stated:
-        terminal.say("circuit      not stated: add a table [circuit] and its levels and times are checked, too", hang=13)
+        terminal.say(
+            "circuit      not stated: add a table [circuit] and its levels and times are checked, too", hang=13
+        )
     if "unsolved" in answer:
         terminal.say(f"no values were found that fit together: {answer['unsolved']}", hang=2)
         return

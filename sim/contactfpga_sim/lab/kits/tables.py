@@ -65,7 +65,8 @@ def headline(found: list[KitFigures]) -> str:
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
-            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB, worst / median",
+            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB, "
+            "worst / median",
             *decision,
             "6,000 us for the paper's sheet and control together",
         ),
@@ -74,7 +75,11 @@ def headline(found: list[KitFigures]) -> str:
             *byte,
             "up to 1,000 us until the next scan of a 1 kHz array",
         ),
-        ("[Closed switch to the pin `contact`](docs/kits.md#from-the-finger-to-your-code), worst / median", *pin, "the same"),
+        (
+            "[Closed switch to the pin `contact`](docs/kits.md#from-the-finger-to-your-code), worst / median",
+            *pin,
+            "the same",
+        ),
         (
             "[Scenes of two to five fingers miscounted](docs/chart.md#every-method), 95 % interval",
             *(f"**{fingers}**",) * 2,
@@ -182,7 +187,9 @@ def pins_table() -> str:
                 )
             )
         )
-    return writer.table(("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines)
+    return writer.table(
+        ("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines
+    )
 
 
 def _reversal(skin: Skin) -> Skin:
