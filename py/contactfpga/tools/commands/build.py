@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     board = flags.board(args)
     if board is None:
-        boards, known = ", ".join(BOARDS), " or --kit ".join(kits.names())
-        raise ContactFPGAError(f"name a board, {boards}, or a kit: --kit {known}")
+        known = " or --kit ".join(kits.names())
+        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {known}")
     design = flags.designed(args, board.skin, board.load)
     if args.check:
         return _check(args, board, design)
