@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """What the Skin's file says, or of the board's own Skin what it is made of, if it works and its times are enough."""
+    """Of the Skin's file, or of the board's own Skin; raises CircuitError where it cannot work or times are too short."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)
