@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """Of the Skin's file, or of the board's own Skin; raises CircuitError where it cannot work or times are too short."""
+    """That of the Skin's file, or of the board's own Skin. Raises CircuitError where it cannot work, or where times are
+    too short for it."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)

@@ -15,6 +15,7 @@ from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
 from contactfpga.skin import Skin
+from contactfpga.tools.commands.build import ohms
 from contactfpga_hdl.board import build, placed
 from contactfpga_sim.lab import latency, writer
 from contactfpga_sim.lab.finger import stages
@@ -65,8 +66,8 @@ def headline(found: list[KitFigures]) -> str:
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
-            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB, "
-            "worst / median",
+            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB with 0.1 ms "
+            "assumed for the host, worst / median",
             *decision,
             "6,000 us for the paper's sheet and control together",
         ),
@@ -206,16 +207,12 @@ def parts_table() -> str:
         layout = lay_out(kit.skin, load_circuit(kit.skin_path))
         counted = collections.Counter((one.part.order, one.value) for one in layout.drawing.placed)
         for (order, value), count in counted.items():
-            lines.append(writer.line((name, "sheet", str(count), order, ohms(value))))
+            shown = ohms(float(value)) if value.isdigit() else ""
+            lines.append(writer.line((name, "sheet", str(count), order, shown)))
         for other in kit.parts:
             maker = " ".join(filter(None, (other.maker, other.number)))
             lines.append(writer.line((name, "beside it", str(other.count), other.what, maker)))
     return writer.table(("kit", "where", "count", "what", "value or maker's number"), lines)
-
-
-def ohms(value: str) -> str:
-    """The value of a part in words; a number is a resistance in ohms."""
-    return f"{value} Ω" if value.isdigit() else ""
 
 
 def predictions_table() -> str:
