@@ -9,10 +9,11 @@ import pytest
 from sample import sample
 
 from contactfpga.boards import BOARDS, wiring
+from contactfpga.boards.wiring import ohms
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import lay_out
 from contactfpga.tools import cli
-from contactfpga.tools.commands.build import WiringTable, ohms
+from contactfpga.tools.commands.build import WiringTable
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 

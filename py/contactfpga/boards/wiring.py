@@ -176,3 +176,11 @@ def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Se
         chain, place = divmod(index, length)
         name, pin = names[place % len(names)]
         yield Output(chip, chain, place // len(names), name, pin, line)
+
+
+def ohms(value: float) -> str:
+    """A resistance as it is printed on a resistor's bag."""
+    for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
+        if value >= limit:
+            return f"{value / limit:g} {unit}"
+    return f"{value:g} Ω"

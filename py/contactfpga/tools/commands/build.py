@@ -13,7 +13,7 @@ from typing import Any
 from contactfpga import terminal
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
-from contactfpga.boards.wiring import Connection, Output, Wire
+from contactfpga.boards.wiring import Connection, Output, Wire, ohms
 from contactfpga.design import buildable, kits
 from contactfpga.design.circuit import Circuit, CircuitError, check_times, load_checked, load_circuit
 from contactfpga.errors import UNSOLVED, ContactFPGAError
@@ -245,11 +245,3 @@ def _show(rows: Sequence[Sequence[str]]) -> None:
     if len(rows) > 1:
         filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
         tables.show(list(zip(*filled, strict=True)), texts=range(len(filled)))
-
-
-def ohms(value: float) -> str:
-    """A resistance as it is printed on a resistor's bag."""
-    for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
-        if value >= limit:
-            return f"{value / limit:g} {unit}"
-    return f"{value:g} Ω"

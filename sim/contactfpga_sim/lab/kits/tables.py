@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.boards import BOARDS
+from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
 from contactfpga.skin import Skin
-from contactfpga.tools.commands.build import ohms
 from contactfpga_hdl.board import build, placed
 from contactfpga_sim.lab import latency, writer
 from contactfpga_sim.lab.finger import stages
@@ -66,8 +66,8 @@ def headline(found: list[KitFigures]) -> str:
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
-            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB with 0.1 ms "
-            "assumed for the host, worst / median",
+            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB "
+            "with 0.1 ms assumed for the host, worst / median",
             *decision,
             "6,000 us for the paper's sheet and control together",
         ),
