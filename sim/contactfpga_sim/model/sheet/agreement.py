@@ -156,7 +156,7 @@ def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) 
 
 
 SCHOTTKY_GAP = "EG=0.69 XTI=2"
-"""What SPICE takes to make a Schottky diode's current follow its temperature; at 27 degrees Celsius it changes nothing."""
+"""By which SPICE makes a Schottky diode's current follow its temperature; at 27 degrees Celsius it changes nothing."""
 
 
 def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: float = 27.0) -> str:
