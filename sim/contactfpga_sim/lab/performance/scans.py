@@ -38,15 +38,7 @@ SETTINGS = {
     "reference, 1 Mbaud": Skin(baud=1_000_000),
     "32x32": Skin(rows=32, columns=32),
     "64x64": Skin(rows=64, columns=64),
-    "64x64, 74HC595 and 74HC165, 4 us release": Skin(
-        rows=64,
-        columns=64,
-        release_us=4.0,
-        row_drive="74hc595",
-        row_chains=2,
-        column_read="74hc165",
-        column_chains=4,
-    ),
+    "`icebreaker-64x64.toml`, which can be built": Skin.load(examples() / "icebreaker-64x64.toml"),
 }
 
 
