@@ -209,7 +209,7 @@ def _coverage(watch: Watch) -> list[Finding]:
     if not seen.any():
         return [Finding("fault", "no switch read pressed; was the sheet touched?")]
     if never:
-        return [Finding("fault", f"{_dark(seen, never)} never read pressed: not touched, or dead")]
+        return [Finding("fault", f"{dark(seen, never)} never read pressed: not touched, or dead")]
     return [Finding("ok", "every switch read pressed at least once")]
 
 
@@ -219,8 +219,8 @@ def _without_mask(skin: Skin | None) -> list[Finding]:
     return [Finding("note", "the mask of this board is not known, so absent switches look dead; give --skin FILE")]
 
 
-def _dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
-    """Whole lines first: these are broken wires rather than dead switches."""
+def dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
+    """The names of switches that ``never`` read pressed, of all that were ``seen``. Whole lines first: these are broken wires rather than dead switches."""
     rows = sorted({row for row, _ in never if not seen[row].any()})
     columns = sorted({column for _, column in never if not seen[:, column].any()})
     left = [(row, column) for row, column in never if row not in rows and column not in columns]
