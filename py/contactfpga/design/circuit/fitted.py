@@ -26,7 +26,7 @@ PROBABILITY = 0.95
 """With which the intervals hold, all at once."""
 LEAST_LINES = 3
 """Rows, and columns, that must have been measured."""
-ROUNDS, CLOSE, STEP = 20, 1e-6, 1e-3
+ROUNDS, CLOSE, STEP = 20, 1e-4, 1e-3
 """Of Gauss and Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares."""
 DRAWS = 20_000
 """By which the factor of the intervals is found."""

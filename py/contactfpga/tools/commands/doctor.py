@@ -176,15 +176,15 @@ def _watch(args: argparse.Namespace) -> int:
             for suspicion in watch.update(zones):
                 found.append(suspicion)
                 if not silent:
-                    _say(_suspected(suspicion))
+                    _say(suspected(suspicion))
 
         def render(zones: Zones, room: Any) -> Any:
             from contactfpga.tools.console import views  # rich, which scripts do without
 
-            return views.watch_view(board, watch, [_line(_suspected(one)) for one in found], zones, room)
+            return views.watch_view(board, watch, [_line(suspected(one)) for one in found], zones, room)
 
         seconds, end = live.follow(board, args, take, None if args.json else render)
-        findings = [*map(_suspected, found), *_coverage(watch), *_without_mask(skin), *end]
+        findings = [*map(suspected, found), *_coverage(watch), *_without_mask(skin), *end]
     mask_line = watch.mask_line
     faults = sum(finding.verdict == "fault" for finding in findings)
     if args.json:
@@ -198,7 +198,8 @@ def _watch(args: argparse.Namespace) -> int:
     return min(faults, 1)
 
 
-def _suspected(suspicion: Suspicion) -> Finding:
+def suspected(suspicion: Suspicion) -> Finding:
+    """What a watch noticed."""
     return Finding("fault" if suspicion.kind in FAULTS else "note", suspicion.sentence)
 
 
@@ -258,11 +259,11 @@ def _self_test(args: argparse.Namespace) -> int:
                 if finding not in known:
                     known.append(finding)
                     if not args.json:
-                        _say(_tested(finding))
+                        _say(tested(finding))
         end = _tests_end(known, tests, pressed, last)
     faults = sum(finding.kind == "fault" for finding in known)
     if args.json:
-        found = [finding._asdict() for finding in [*map(_tested, known), *end]]
+        found = [finding._asdict() for finding in [*map(tested, known), *end]]
         answer = {"faults": faults, "findings": found, "tests": tests, "pressed": sorted(pressed)}
         print(json.dumps(answer), flush=True)
         return min(faults, 1)
@@ -294,5 +295,6 @@ def _tests_end(
         yield Finding("ok", "every switch was pressed in a self-test")
 
 
-def _tested(finding: LineFinding) -> Finding:
+def tested(finding: LineFinding) -> Finding:
+    """What a self-test found."""
     return Finding("fault" if finding.kind == "fault" else "note", finding.sentence)
