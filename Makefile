@@ -61,6 +61,11 @@ endif
 bitstream: $(VENV)/.stamp-boards ## build a bitstream: make bitstream BOARD=icebreaker [SKIN=file.toml]
 	$(VENV)/bin/contactfpga build $(call quoted,BOARD) $(if $(value SKIN),--skin $(call quoted,SKIN)) $(ARGS)
 
+KIT ?= starter
+kit: $(VENV)/.stamp-boards ## write the sheet to order and the bitstream of a kit into build/kits: [KIT=fast]
+	$(VENV)/bin/contactfpga sheet --kit $(call quoted,KIT) -o build/kits/$(call quoted,KIT)/sheet
+	$(VENV)/bin/contactfpga build --kit $(call quoted,KIT) --output build/kits/$(call quoted,KIT) $(ARGS)
+
 bitstreams: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## build one for every board and check size and timing
 	$(PY) -m pytest -m campaign $(ARGS) tests/boards/test_bitstream.py
 

@@ -164,6 +164,22 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "kits",
+        title="The kits, from the finger to the host",
+        page="kits.md",
+        minutes=12,
+        sections={
+            "kits": Section("tables:headline", page="../README.md"),
+            "times": Section("tables:times_table"),
+            "built": Section("tables:built_table"),
+            "pins": Section("tables:pins_table"),
+            "parts": Section("tables:parts_table", sample="tables:parts_table"),
+            "predictions": Section("tables:predictions_table", sample="tables:predictions_table"),
+        },
+        compute="tables:compute",
+        extra="boards",
+    ),
+    Study(
         "maker",
         title="The maker's sheet: diodes, pull-ups, series resistors and the schematic",
         page="maker.md",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 
+from contactfpga.design import kits
 from contactfpga.design.cover import felt as touches
 from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.felt import Felt, Force, Sheet
@@ -13,7 +14,7 @@ from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin
 from contactfpga.tools.commands import cover
 from contactfpga.tools.commands.cover import MM, say, table
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import flags, numbers
 
 EXTRA = None
 
@@ -23,7 +24,8 @@ M = 1e-3
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
-    parser.add_argument("skin", metavar="SKIN", help="TOML file of a Skin with a table [cover].")
+    parser.add_argument("skin", metavar="SKIN", nargs="?", help="TOML file of a Skin with a table [cover].")
+    flags.kit(parser)
     finger = parser.add_argument_group("finger, an ellipse whose size does not depend on its force")
     for name, usual in (("--length", touches.LENGTH_M), ("--width", touches.WIDTH_M)):
         side = f"Its {name.strip('-')} (default: {usual:g})."
@@ -45,6 +47,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
+    args.skin = flags.sheet_file(args)
+    if args.skin is None:
+        raise CoverError(f"name a Skin's file, or a kit: --kit {' or --kit '.join(kits.names())}")
     skin, laid = Skin.load(args.skin, trust=args.trust), load_cover(args.skin)
     if laid is None or laid.model == "patch":
         what = "has no table [cover]" if laid is None else "has the model 'patch'"

@@ -1,0 +1,222 @@
+"""Predictions of a kit with 95 % intervals.
+
+Times of the gateware and the bridge are exact up to the crystal and the chance of which touches are tried. Values of
+circuit and cover are computed for draws of what parts and makers leave open (:func:`drawn_circuit`,
+:func:`drawn_cover`), 2.5 to 97.5 % of them being the interval. How far parts scatter was assumed, not measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import datetime
+import math
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from contactfpga.design import kits, predictions
+from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed
+from contactfpga.design.cover import load_cover
+from contactfpga.design.cover.cells import Cells
+from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force, Sheet, feel
+from contactfpga.design.cover.patch import Ellipse
+from contactfpga.design.cover.press import Cover, Load
+from contactfpga.design.kits import Kit
+from contactfpga.design.predictions import Prediction
+from contactfpga.design.sheet import lay_out
+from contactfpga.design.sheet.extract import extracted
+from contactfpga.driver import health
+from contactfpga.inputs.files import write_text
+from contactfpga_sim.lab.finger import stages
+from contactfpga_sim.lab.spread import Times
+from contactfpga_sim.lab.usb import BridgeSettings, delivered
+
+DRAWS = 200
+TOUCHES = 100
+"""That a builder makes to measure a median or a worst time."""
+CRYSTAL = 1e-4
+"""By which a board's clock may be off."""
+PRESSED_N = 2.0
+PLACES = tuple((x / 4, y / 4) for y in range(3) for x in range(3))
+"""Of a finger's middle, in pitches from that of a switch, x and y: on it, between two, among four, and halfway."""
+AROUND = 7
+"""Rows and columns of the sheet that those places are computed on: others take nothing of a finger's force."""
+
+
+def predicted(kit: Kit) -> dict[str, Prediction]:
+    """All predictions of a kit, by name; takes a minute or two."""
+    found = [*_times(kit), *_circuit(kit), *_cover(kit)]
+    return {one.name: one for one in found}
+
+
+def _made(name: str, what: str, unit: str, values: Sequence[float], model: str, command: str) -> Prediction:
+    """The first value with the interval of the others, which is widened to hold it, to five digits."""
+    low, high = np.quantile(values[1:] or values, [0.025, 0.975])
+    value, low, high = (float(f"{one:.5g}") for one in (values[0], min(low, values[0]), max(high, values[0])))
+    today = datetime.date.today()
+    return Prediction(name, what, unit, value, low, high, model, f"contactfpga {command}", today, _commit())
+
+
+def _commit() -> str:
+    done = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
+
+
+def _times(kit: Kit) -> Iterator[Prediction]:
+    """Of the board and its bridge: what a builder finds who makes :data:`TOUCHES` touches."""
+    command = f"latency --kit {kit.name} --exact"
+    bridge = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
+    found = stages.measure(kit.skin, bridge, host_touches=0)
+    board, us = found.board, kit.skin.clock_hz / 1e6
+    usb = Times.mixed(delivered(bridge, kit.skin.clock_hz, one.stream, one.byte) for one in board.recorded)
+    each = {
+        "contact": ("the pin `contact`", "gateware", Times.of([one.pin / us for one in board.recorded])),
+        "last_byte": ("the last byte on the wire", "gateware", Times.of([one.last / us for one in board.recorded])),
+        "host": ("the host's USB controller", "bridge", usb),
+    }
+    rng = np.random.default_rng(0)
+    for name, (where, model, times) in each.items():
+        for statistic, share in (("median", 0.5), ("worst", 1.0)):
+            tried = rng.random((DRAWS, TOUCHES))
+            shares = np.quantile(tried, share, axis=1)
+            values = [times.quantile(share), *(times.quantile(one) for one in shares)]
+            near = [values[0] * (1 - CRYSTAL), values[0] * (1 + CRYSTAL)]
+            said = f"touch to {where}, {statistic} of {TOUCHES} touches"
+            yield _made(f"{name}_{statistic}_us", said, "us", values + near, model, command)
+    rate = board.frames_per_s
+    yield _made(
+        "frames_per_s", "frames while a contact moves", "1/s", [rate, 0.99 * rate, 1.01 * rate], "gateware", command
+    )
+    yield _made("frame_bytes", "bytes of a frame with one contact", "bytes", [board.bytes], "gateware", command)
+    edges = [1.0, 1 - CRYSTAL, 1 + CRYSTAL]
+    yield _made("alive_ms", "time between two edges of `alive`", "ms", edges, "gateware", f"build --kit {kit.name}")
+
+
+def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
+    """One of the sheets that the same files may become: lines within 30 %, pins within 25, pulls and series resistors
+    within 1, switches from 1 ohm to the stated, and the diode's capacitance within 30 and its current by 3."""
+    near = lambda share: float(rng.uniform(1 - share, 1 + share))  # noqa: E731
+    diode = dataclasses.replace(
+        circuit.diode,
+        junction_pf=circuit.diode.junction_pf * near(0.3),
+        saturation_a=circuit.diode.saturation_a * math.exp(rng.uniform(-1, 1) * math.log(3)),
+    )
+    return circuit.replace(
+        line_pf=circuit.line_pf * near(0.3),
+        crossing_pf=circuit.crossing_pf * near(0.3),
+        neighbor_pf=circuit.neighbor_pf * near(0.3),
+        line_ohm=circuit.line_ohm * near(0.2),
+        pin_ohm=circuit.pin_ohm * near(0.25),
+        series_ohm=circuit.series_ohm * near(0.01),
+        column_pull_ohm=circuit.column_pull_ohm * near(0.01),
+        row_pull_ohm=circuit.row_pull_ohm * near(0.01),
+        switch_ohm=math.exp(rng.uniform(0, math.log(circuit.switch_ohm))),
+        supply_v=circuit.supply_v * near(0.03),
+        diode=diode,
+    )
+
+
+def _circuit(kit: Kit) -> Iterator[Prediction]:
+    """Times, levels and currents of the lines that the layout has, at the worst pattern."""
+    skin, stated = kit.skin, load_circuit(kit.skin_path)
+    nominal = extracted(lay_out(skin, stated)).circuit
+    rng = np.random.default_rng(1)
+    drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
+    needs = [needed(one, skin.rows, skin.columns, skin.diodes) for one in drawn]
+    values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
+        "settle_us": ("a row selected until the slowest column reads right", "us", lambda one: 1e6 * one.settle.seconds),
+        "precharge_us": ("columns driven until they are charged", "us", lambda one: 1e6 * one.precharge.seconds),
+        "pulled_release_us": (
+            "pull-ups alone lift the columns after a pressed row",
+            "us",
+            lambda one: 1e6 * one.pulled_release.seconds,
+        ),
+        "pressed_v": ("a pressed column while its whole row is pressed", "V", lambda one: one.pressed.level_v),
+        "unpressed_v": ("a column that neighbors pull after a precharge", "V", lambda one: one.unpressed_v),
+        "row_ma": ("the pin of a row whose switches are all pressed", "mA", lambda one: one.pressed.pin_ma),
+        "row_peak_ma": ("the pin of a row while lines are charged", "mA", lambda one: one.row_peak_ma),
+        "column_peak_ma": ("the pin of a column while it is charged", "mA", lambda one: one.column_peak_ma),
+    }
+    if skin.reads_rows:
+        values |= {
+            "project_us": ("rows let go until all read right", "us", lambda one: 1e6 * one.project.seconds),
+            "touched_v": ("a touched row while one column feeds all rows", "V", lambda one: one.touched.level_v),
+            "feeding_ma": ("the pin of a column that feeds all rows", "mA", lambda one: one.touched.pin_ma),
+        }
+    command = f"settle --kit {kit.name} --margin 1"
+    for name, (what, unit, of) in values.items():
+        yield _made(name, what, unit, [of(one) for one in needs], "circuit", command)
+
+
+def drawn_cover(cover: Cover, rng: np.random.Generator) -> Cover:
+    """One of the covers that the same parts may become: the domes of a batch within 10 % of their force and 25 of their
+    travel, foam within 30 % of its modulus and 10 of its thickness."""
+    near = lambda share: float(rng.uniform(1 - share, 1 + share))  # noqa: E731
+    switch = dataclasses.replace(
+        cover.switch, force_n=cover.switch.force_n * near(0.1), travel_m=cover.switch.travel_m * near(0.25)
+    )
+    return dataclasses.replace(
+        cover, switch=switch, modulus_pa=cover.modulus_pa * near(0.3), thickness_m=cover.thickness_m * near(0.1)
+    )
+
+
+def _cover(kit: Kit) -> Iterator[Prediction]:
+    """Forces of a fingertip of 12 x 10 mm that the sheet feels."""
+    skin, nominal = kit.skin, load_cover(kit.skin_path)
+    assert nominal is not None
+    pitch_m = 1e-3 * skin.pitch_x_mm
+    rng = np.random.default_rng(2)
+    covers = [nominal, *(drawn_cover(nominal, rng) for _ in range(DRAWS))]
+    closing = np.array([closing_n(cover, pitch_m, seed) for seed, cover in enumerate(covers)])
+    command = f"cover felt --kit {kit.name}"
+    for number, (x, y) in enumerate(PLACES):
+        what = f"force of a fingertip whose middle is {x:g} and {y:g} pitches from a switch's when it is felt"
+        yield _made(f"closing_{number}_n", what, "N", list(closing[:, number]), "cover", command)
+    sheet = Sheet(skin.rows, skin.columns, pitch_m, 1e-3 * skin.pitch_y_mm)
+    felt = [feel(cover, sheet, places=400) for cover in covers[: 1 + DRAWS // 10]]
+    for name, what in (("half", "half of all fingertips"), ("most", "99 % of all fingertips")):
+        values = [force.value_n for one in felt if isinstance(force := getattr(one, name), Force)]
+        yield _made(f"felt_{name}_n", f"force from which {what} are felt, anywhere", "N", values, "cover", command)
+    shares = [float((100 * (one <= PRESSED_N)).mean()) for one in closing]
+    what = f"touches of {PRESSED_N:g} N that are felt, at those nine places"
+    yield _made("felt_share", what, "%", shares, "cover", command)
+
+
+def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
+    """The force that closes a first switch, at each of :data:`PLACES`; the first cover's switches have no spread."""
+    if not seed:
+        cover = dataclasses.replace(cover, switch=dataclasses.replace(cover.switch, spread=0.0))
+    cells = Cells(cover, AROUND, AROUND, pitch_m, pitch_m, seed)
+    middle = AROUND // 2 * pitch_m
+    found = []
+    for x, y in PLACES:
+        finger = Ellipse(LENGTH_M / 2, WIDTH_M / 2, middle + x * pitch_m, middle + y * pitch_m, 0.0)
+        taken = cells.forces_n([Load((finger,), 1.0)])
+        with np.errstate(divide="ignore"):
+            found.append((cells.thresholds_n / np.where(taken > 0, taken, np.nan)))
+    return np.nanmin(np.array(found), axis=(1, 2))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Add to each kit's file what is predicted now, where it differs from what was."""
+    parser = argparse.ArgumentParser(description="Add predictions that have changed to a kit's file.")
+    parser.add_argument("kit", nargs="*", metavar="KIT", help="Default: all.")
+    for name in parser.parse_args(argv).kit or kits.names():
+        kit = kits.kit(name)
+        path = kit.folder / predictions.FILE
+        before = path.read_text(encoding="utf-8") if path.exists() else HEAD.format(name=name)
+        write_text(path, predictions.added(before, predicted(kit)))
+        print(path)
+    return 0
+
+
+HEAD = """# What the {name} kit will be found to do, if the models are right; 95 % intervals. Nobody has built it yet.
+# A prediction that changes is a new entry at the end: nothing above is edited.
+#     python -m contactfpga_sim.lab.kits.predict {name}
+"""
+
+if __name__ == "__main__":
+    sys.exit(main())

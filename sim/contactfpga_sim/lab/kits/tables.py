@@ -1,0 +1,226 @@
+"""Tables of docs/kits.md and of the README: what the kits come to."""
+
+from __future__ import annotations
+
+import collections
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from contactfpga.boards import BOARDS
+from contactfpga.design import kits, predictions
+from contactfpga.design.circuit import load_circuit
+from contactfpga.design.kits import Kit
+from contactfpga.design.sheet import lay_out
+from contactfpga.driver import health
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import build, placed
+from contactfpga_sim.lab import latency, writer
+from contactfpga_sim.lab.finger import stages
+from contactfpga_sim.lab.finger.stages import Finger
+from contactfpga_sim.lab.spread import Spread
+from contactfpga_sim.lab.usb import BridgeSettings
+
+NAMES = ("starter", "fast")
+"""In the order of the tables."""
+SEEDS = (1, 2, 3, 4, 5)
+"""Of place and route; the slowest counts."""
+COVER = "| run, 6.4 mm, tiles |"
+PAPER = "| run, 6.4 mm, paper |"
+ARM = "| tiles | 6.4 | 0.4 | 5 |"
+ARM_PAPER = "| flush, point force | 10 | 1 | 5 |"
+
+
+class KitFigures(NamedTuple):
+    """What is computed of a kit."""
+
+    kit: Kit
+    finger: Finger
+    built: tuple[placed.Report, ...]
+
+
+def compute() -> list[KitFigures]:
+    """Both kits, measured and built."""
+    return [_figures(kits.kit(name)) for name in NAMES]
+
+
+def _figures(kit: Kit) -> KitFigures:
+    settings = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
+    finger = stages.measure(kit.skin, settings, host_touches=0)
+    with tempfile.TemporaryDirectory() as folder:
+        reports = tuple(build.build(kit.skin, kit.board, Path(folder), seed) for seed in SEEDS)
+    return KitFigures(kit, finger, reports)
+
+
+def _worst_first(us: Spread, digits: int = 0) -> str:
+    return f"{us.worst:,.{digits}f} / {us.median:,.{digits}f} us"
+
+
+def headline(found: list[KitFigures]) -> str:
+    """The README's table: worst first, both kits, and what they are compared with."""
+    decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
+    fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
+    arm, paper_arm = (_worst_force(start) for start in (ARM, ARM_PAPER))
+    rows = [
+        ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
+        (
+            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB, worst / median",
+            *decision,
+            "6,000 us for the paper's sheet and control together",
+        ),
+        (
+            "[Closed switch to the last byte on the wire](docs/kits.md#from-the-finger-to-your-code), worst / median",
+            *byte,
+            "up to 1,000 us until the next scan of a 1 kHz array",
+        ),
+        ("[Closed switch to the pin `contact`](docs/kits.md#from-the-finger-to-your-code), worst / median", *pin, "the same"),
+        (
+            "[Scenes of two to five fingers miscounted](docs/chart.md#every-method), 95 % interval",
+            *(f"**{fingers}**",) * 2,
+            f"{paper_fingers} with the paper's switch and foam at this pitch",
+        ),
+        (
+            "[Peak force on a human arm](docs/arm.md#touches-anywhere) that an arm runs into anywhere, worst / mean",
+            *(f"**{arm} N**",) * 2,
+            f"{paper_arm} N with the paper's sheet",
+        ),
+    ]
+    return writer.table_of(rows)
+
+
+def _shown(one: KitFigures) -> tuple[str, str, str]:
+    finger, digits = one.finger, 1 if one.kit.name == "fast" else 0
+    return (
+        f"**{_worst_first(finger.decision_us)}**",
+        f"**{_worst_first(finger.board.touch_to_last_byte_us, digits)}**",
+        f"**{_worst_first(finger.board.touch_to_contact_us, 2 if digits else 0)}**",
+    )
+
+
+def _of_page(page: str, start: str, column: int) -> str:
+    """A cell of the row of a page's table that begins like this, up to a semicolon."""
+    text = Path("docs", page).read_text(encoding="utf-8")
+    found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
+    return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
+
+
+def _worst_force(start: str) -> str:
+    """Of an arm's touches by UART, worst before mean."""
+    text = Path("docs/arm.md").read_text(encoding="utf-8")
+    line = next(line for line in text.splitlines() if line.startswith(start))
+    mean, worst = line.strip("|").split("|")[5].split(" / ")
+    return f"{worst.strip()} / {mean.strip()}"
+
+
+def times_table(found: list[KitFigures]) -> str:
+    """Each stage of each kit."""
+    return writer.table(
+        ("kit", "stage", "median, us", "99 %, us", "worst, us"),
+        (writer.line(row) for one in found for row in _stages(one)),
+    )
+
+
+def _stages(one: KitFigures) -> Iterator[tuple[str, ...]]:
+    finger = one.finger
+    for stage, us in (
+        ("closed switch to the pin `contact`", finger.board.touch_to_contact_us),
+        ("closed switch to the last byte on the wire", finger.board.touch_to_last_byte_us),
+        ("last byte to the host's USB controller", finger.bridge_us),
+        ("closed switch to the host's USB controller", finger.usb_us),
+        (f"closed switch to the decision, {stages.ASSUMED_HOST_US:g} us assumed for the host", finger.decision_us),
+    ):
+        yield (one.kit.name, stage, *(f"{value:,.2f}" for value in (us.median, us.p99, us.worst)))
+
+
+def built_table(found: list[KitFigures]) -> str:
+    """What each kit takes of its FPGA; Fmax is that of the slowest of :data:`SEEDS`."""
+    lines = []
+    for one in found:
+        first, slowest = one.built[0], min(one.built, key=lambda report: report.fmax_mhz)
+        margin = slowest.fmax_mhz / slowest.needed_mhz
+        lines.append(
+            writer.line(
+                (
+                    one.kit.name,
+                    one.kit.board.fpga,
+                    f"{first.luts[0]:,} of {first.luts[1]:,}",
+                    f"{first.block_rams[0]} of {first.block_rams[1]}",
+                    f"{slowest.fmax_mhz:.1f} MHz",
+                    f"{slowest.needed_mhz:.0f} MHz, {margin:.2f} times",
+                )
+            )
+        )
+    return writer.table(("kit", "FPGA", "LUT4", "block RAMs", f"Fmax, slowest of {len(SEEDS)} seeds", "needed"), lines)
+
+
+def pins_table() -> str:
+    """What an iCEBreaker's 23 pins can serve, with guard lines and `alive` where there is room."""
+    kit = kits.kit("starter").skin
+    cases = {
+        "16x16, rows on registers, columns driven back (the kit)": kit,
+        "the same, pull-ups of 22 kΩ alone": kit.replace(precharge_us=0.0, release_us=4.0),
+        "16x16, rows and columns on registers, 22 kΩ": kit.replace(
+            precharge_us=0.0, release_us=4.0, column_read="74hc165"
+        ),
+        "10x10, each line on a pin, columns driven back": kit.replace(rows=10, columns=10, row_drive="direct"),
+        "10x10, each line on a pin, line reversal": _reversal(kit),
+    }
+    lines = []
+    for name, skin in cases.items():
+        BOARDS["icebreaker"].check(skin)
+        found = latency.measure(skin, touches=49)
+        wires = sum(len(pins) for pins in BOARDS["icebreaker"].pins(skin).values())
+        lines.append(
+            writer.line(
+                (
+                    name,
+                    str(wires),
+                    f"{skin.rows * skin.columns}",
+                    _worst_first(found.touch_to_contact_us, 1),
+                    _worst_first(found.touch_to_last_byte_us, 1),
+                )
+            )
+        )
+    return writer.table(("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines)
+
+
+def _reversal(skin: Skin) -> Skin:
+    fast = kits.kit("fast").skin
+    times = {name: getattr(fast, name) for name in ("scan", "settle_us", "release_us", "project_us", "send")}
+    return skin.replace(rows=10, columns=10, row_drive="direct", **times)
+
+
+def parts_table() -> str:
+    """What to buy for each kit: the sheet's own parts by count, and what stands in kit.toml."""
+    lines = []
+    for name in NAMES:
+        kit = kits.kit(name)
+        layout = lay_out(kit.skin, load_circuit(kit.skin_path))
+        counted = collections.Counter((one.part.order, one.value) for one in layout.drawing.placed)
+        for (order, value), count in counted.items():
+            lines.append(writer.line((name, "sheet", str(count), order, ohms(value))))
+        for other in kit.parts:
+            maker = " ".join(filter(None, (other.maker, other.number)))
+            lines.append(writer.line((name, "beside it", str(other.count), other.what, maker)))
+    return writer.table(("kit", "where", "count", "what", "value or maker's number"), lines)
+
+
+def ohms(value: str) -> str:
+    """The value of a part in words; a number is a resistance in ohms."""
+    return f"{value} Ω" if value.isdigit() else ""
+
+
+def predictions_table() -> str:
+    """The newest prediction of each name, beside each other."""
+    both = {name: predictions.load(kits.kit(name)) for name in NAMES}
+    lines = []
+    for key in dict.fromkeys(key for found in both.values() for key in found):
+        any_one = next(found[key] for found in both.values() if key in found)
+        cells = [_interval(both[name][key]) if key in both[name] else "" for name in NAMES]
+        lines.append(writer.line((f"`{key}`", any_one.what, any_one.unit, *cells)))
+    return writer.table(("name", "what", "unit", *NAMES), lines)
+
+
+def _interval(one: predictions.Prediction) -> str:
+    return f"{one.value:g} ({one.low:g} to {one.high:g})"

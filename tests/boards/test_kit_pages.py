@@ -1,0 +1,97 @@
+"""Predictions of the kits and the pages written from them."""
+
+import dataclasses
+import datetime
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga.design import kits, predictions
+from contactfpga.design.circuit import load_circuit, needed
+from contactfpga.design.cover import load_cover
+from contactfpga.design.kits import KitError
+from contactfpga.design.predictions import Prediction
+from contactfpga.design.sheet import lay_out
+from contactfpga.design.sheet.extract import extracted
+from contactfpga_sim.lab import latency
+from contactfpga_sim.lab.kits import predict
+
+ONE = Prediction(
+    "settle_us", "what", "us", 1.0, 0.5, 2.0, "circuit", "contactfpga settle", datetime.date(2026, 11, 24), "abc"
+)
+
+
+@pytest.mark.parametrize("name", kits.names())
+def test_a_kit_has_predictions_of_each_model(name):
+    found = predictions.load(kits.kit(name))
+    assert len(found) >= 25
+    assert {one.model for one in found.values()} == {"gateware", "bridge", "circuit", "cover"}
+    for one in found.values():
+        assert one.low <= one.value <= one.high
+        assert one.command.startswith("contactfpga ")
+        assert re.fullmatch("[0-9a-f]{8}", one.commit)
+
+
+@pytest.mark.parametrize("name", kits.names())
+def test_predictions_are_what_is_computed_today(name):
+    """The cheap ones, each by other means than the file's: circuit by its model, times by a part of the touches."""
+    kit = kits.kit(name)
+    found = predictions.load(kit)
+    circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
+    needs = needed(circuit, kit.skin.rows, kit.skin.columns)
+    assert found["settle_us"].value == pytest.approx(1e6 * needs.settle.seconds, rel=1e-4)
+    assert found["row_ma"].value == pytest.approx(needs.pressed.pin_ma, rel=1e-4)
+    some = latency.measure(kit.skin, touches=12)
+    assert some.touch_to_last_byte_us.worst <= found["last_byte_worst_us"].high
+    assert some.bytes == found["frame_bytes"].value
+    felt = predict.closing_n(load_cover(kit.skin_path), 1e-3 * kit.skin.pitch_x_mm, 0)
+    for number, force in enumerate(felt):
+        assert found[f"closing_{number}_n"].value == pytest.approx(force, rel=1e-4)
+
+
+def test_draws_are_spread_about_what_is_stated():
+    kit = kits.kit("starter")
+    circuit, cover = load_circuit(kit.skin_path), load_cover(kit.skin_path)
+    rng = np.random.default_rng(5)
+    lines = np.array([predict.drawn_circuit(circuit, rng).line_pf for _ in range(200)]) / circuit.line_pf
+    forces = np.array([predict.drawn_cover(cover, rng).switch.force_n for _ in range(200)]) / cover.switch.force_n
+    for drawn, share in ((lines, 0.3), (forces, 0.1)):
+        assert 1 - share <= drawn.min() < 1 - 0.9 * share
+        assert 1 + 0.9 * share < drawn.max() <= 1 + share
+
+
+def test_a_changed_prediction_is_a_new_entry_and_no_edit():
+    text = predictions.added("# head\n", {"settle_us": ONE})
+    assert predictions.added(text, {"settle_us": dataclasses.replace(ONE, commit="def")}) == text
+    changed = predictions.added(text, {"settle_us": dataclasses.replace(ONE, value=1.5)})
+    assert changed.startswith(text.rstrip())
+    entries = tomllib.loads(changed)["prediction"]
+    assert [entry["value"] for entry in entries] == [1.0, 1.5]
+    assert Prediction(**entries[0]) == ONE
+
+
+def test_a_file_that_is_wrong_is_refused(tmp_path):
+    kit = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
+    file = tmp_path / predictions.FILE
+    file.write_text(predictions.added("", {"settle_us": dataclasses.replace(ONE, low=1.2)}))
+    with pytest.raises(KitError, match="settle_us is 1, outside its interval 1.2 to 2"):
+        predictions.load(kit)
+    file.write_text("[[prediction]]\nnome = 1\n")
+    with pytest.raises(KitError, match="unknown key 'nome' in \\[prediction\\]; known are name, what"):
+        predictions.load(kit)
+
+
+def test_the_newest_entry_counts(tmp_path):
+    kit = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
+    text = predictions.added("", {"settle_us": ONE})
+    (tmp_path / predictions.FILE).write_text(predictions.added(text, {"settle_us": dataclasses.replace(ONE, value=1.5)}))
+    assert predictions.load(kit)["settle_us"].value == 1.5
+
+
+def test_the_pages_name_both_kits():
+    page = Path("docs/kits.md").read_text(encoding="utf-8")
+    for name in kits.names():
+        assert f"`examples/kits/{name}/`" in page
