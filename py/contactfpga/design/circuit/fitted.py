@@ -26,11 +26,15 @@ PROBABILITY = 0.95
 """With which the intervals hold, all at once."""
 LEAST_LINES = 3
 """Rows, and columns, that must have been measured."""
-ROUNDS, CLOSE, STEP = 20, 1e-4, 1e-3
-"""Of Gauss and Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares."""
+ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
+"""Of Gauss and Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares; times of
+the model jump by some 1e-4 with the steps of its method."""
 DRAWS = 20_000
 """By which the factor of the intervals is found."""
 HARMONICS = 6
+SCATTER = 1.5
+"""Lines scatter if their means vary by this many times what their cells explain."""
+MOST_FREEDOM = 1e6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -172,38 +176,40 @@ def _rounding_variance(clocks: np.ndarray) -> float:
     return off / float(clocks.mean() - 0.5) ** 2
 
 
-def _mean_variance(cells: np.ndarray) -> tuple[float, list[tuple[float, int]]]:
-    """Of the mean of (rows, columns) of cells that rows and columns move: analysis of variance in two ways. Also its
-    parts, each with its degrees of freedom."""
+def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
+    """Of the mean of (rows, columns) of cells that rows and columns move, and its degrees of freedom after Satterthwaite:
+    analysis of variance in two ways. Lines that scatter no more than their cells make them are taken not to scatter."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean
     rest = cells - mean - by_row[:, None] - by_column[None]
-    row, column, both = (
-        (float((by_row**2).sum()) / (rows - 1) / rows, rows - 1),
-        (float((by_column**2).sum()) / (columns - 1) / columns, columns - 1),
-        (float((rest**2).sum()) / ((rows - 1) * (columns - 1)) / rest.size, (rows - 1) * (columns - 1)),
-    )
-    return max(row[0] + column[0] - both[0], both[0]), [row, column, both]
+    freedom = (rows - 1) * (columns - 1)
+    both = float((rest**2).sum()) / freedom / rest.size
+    variance, doubt = both, both**2 / freedom
+    for lines in (by_row, by_column):
+        part = float((lines**2).sum()) / (len(lines) - 1) / len(lines)
+        if part > SCATTER * both:
+            variance += part - both
+            doubt += part**2 / (len(lines) - 1)
+    return variance, variance**2 / doubt if doubt else math.inf
 
 
 def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, n) of the means of (n, rows, columns), with the variances that rounding adds, and (n,) degrees of freedom
-    after Satterthwaite."""
+    """(n, n) of the means of (n, rows, columns), with the variances that rounding adds, and (n,) degrees of freedom."""
     count = len(cells)
     covariance, degrees = np.empty((count, count)), np.empty(count)
     alone = [_mean_variance(each) for each in cells]
-    for one in range(count):
+    for one, (variance, freedom) in enumerate(alone):
         for other in range(one):
             both = _mean_variance(cells[one] + cells[other])[0]
-            limit = math.sqrt(alone[one][0] * alone[other][0])
-            shared = float(np.clip((both - alone[one][0] - alone[other][0]) / 2, -limit, limit))
+            limit = math.sqrt(variance * alone[other][0])
+            shared = float(np.clip((both - variance - alone[other][0]) / 2, -limit, limit))
             covariance[one, other] = covariance[other, one] = shared
-        variance, parts = alone[one]
         covariance[one, one] = variance + rounding[one]
-        doubt = sum(part**2 / freedom for part, freedom in parts)
-        degrees[one] = max(min(freedom for _, freedom in parts), covariance[one, one] ** 2 / max(doubt, 1e-300))
-    return covariance, np.minimum(degrees, 1e6)
+        degrees[one] = MOST_FREEDOM
+        if variance:
+            degrees[one] = min(MOST_FREEDOM, freedom * (covariance[one, one] / variance) ** 2)
+    return covariance, degrees
 
 
 def _factor(covariance: np.ndarray, degrees: np.ndarray) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
+import math
 import sys
 from collections.abc import Iterator
 
@@ -56,10 +57,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def _measured(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
-    try:
-        return name, number_in(value) if equals and name else float("nan") / 0
-    except (ValueError, ZeroDivisionError):
-        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} is no NAME=VALUE, such as closing_0_n=0.42") from None
+    number = number_in(value) if equals and name else math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} is no NAME=VALUE, such as closing_0_n=0.42")
+    return name, number
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     skin = bring_up_skin(kit)
     if args.skin_output:
         return _write_skin(kit, skin, args.skin_output)
-    predicted = predictions.load(kit)
+    predicted = predictions.load(kit) if (kit.folder / predictions.FILE).exists() else {}
     _check_names(args.measured, predicted)
     when = datetime.date.today()
     path = outputs.file(args.output or f"bringup-{kit.name}-{when.isoformat()}.md")
