@@ -13,7 +13,7 @@ from contactfpga.design.circuit.fitted import FittedCircuit, SettleReading, fit_
 from contactfpga.driver import health
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
-from contactfpga.errors import ContactFPGAError
+from contactfpga.errors import ContactFPGAError, ReadTimeout
 from contactfpga.instruments.bounce import Bounce
 from contactfpga.instruments.self_test import LineFinding, SelfTest, untried
 from contactfpga.instruments.settling import NEAR, Settling
@@ -96,12 +96,16 @@ def link(bench: Bench) -> Step:
     bench.person.asked("nothing", "Touch nothing, and let nothing lie on the sheet.")
     found = [*health.hello(board), *_counted(bench)]
     stats = board.stats
-    answers_ms = 1e3 * np.array([_answer_s(bench) for _ in range(READS)])
-    median, slowest = (float(np.quantile(answers_ms, share, method="inverted_cdf")) for share in (0.5, 0.99))
-    found.append(Finding("ok", f"an answer takes {median:.2f} ms in half of the cases, {slowest:.2f} ms in 99 %"))
-    broken = stats.lost + stats.damaged.total()
-    share = broken / max(1, stats.frames + broken)
-    measured = {"answer_ms": median, "answer_99_ms": slowest, "lost_share": share}
+    share = stats.lost / max(1, stats.frames + stats.lost)
+    measured = {"lost_share": share}
+    try:
+        answers_ms = 1e3 * np.array([_answer_s(bench) for _ in range(READS)])
+    except ReadTimeout as error:
+        found.append(Finding("fault", f"an answer did not come: {error}"))
+    else:
+        median, slowest = (float(np.quantile(answers_ms, part, method="inverted_cdf")) for part in (0.5, 0.99))
+        found.append(Finding("ok", f"an answer takes {median:.2f} ms in half of the cases, {slowest:.2f} ms in 99 %"))
+        measured |= {"answer_ms": median, "answer_99_ms": slowest}
     stop = ""
     if share > MOST_LOST:
         stop = f"{100 * share:.0f} % of the frames are lost; mend the link first: baud, cable, ground, USB hub"
