@@ -96,7 +96,9 @@ def test_a_sound_sheet_that_tests_itself_passes_all_steps():
 
 
 def test_slow_lines_are_named_and_left_out_of_the_fit():
-    found, bench = brought_up(Faults(slow_columns=(2,)), circuit=CIRCUIT, scatter=0.03, only=[steps.settling, steps.circuit])
+    found, bench = brought_up(
+        Faults(slow_columns=(2,)), circuit=CIRCUIT, scatter=0.03, only=[steps.settling, steps.circuit]
+    )
     slow, short = faults_of(found)
     assert slow == "slow column 2: a long or thin line, a cold joint, or a weak pin"
     assert short.startswith("settle_us = 6 leaves too little room")

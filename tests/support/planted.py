@@ -10,15 +10,17 @@ from contactfpga.design.circuit import Circuit
 from contactfpga.tools.commands.bringup import steps
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.scenes.hand import Hand
+from contactfpga_sim.model.sheet.matrix import Shorts
 
 SIZE = 8
 SKIN = Skin(rows=SIZE, columns=SIZE, report="cells", guard=True, settle_us=6.0, precharge_us=0.5)
+LARGE = SKIN.replace(rows=12, columns=12, settle_us=10.0)
 CIRCUIT = Circuit(line_pf=150, pin_ohm=85, series_ohm=200, switch_ohm=1000)
 TESTED = Skin(
     rows=4, columns=4, report="cells", scan="reversal", guard=True, self_test=True, settle_us=2.0, precharge_us=0.25
 )
-HOLDS_S = 0.1
-"""Of the hand, what it keeps doing."""
+HOLDS_S = 5.0
+"""At most, what the hand keeps doing."""
 
 
 @dataclasses.dataclass
@@ -43,7 +45,7 @@ class Faults:
 
 
 BOUNCE_S, CHATTER_S = 3e-3, 0.6e-3
-SLOW = 4.0
+SLOW = 2.6
 
 
 class FaultySwitches:
@@ -99,7 +101,7 @@ class PlantedBoard(VirtualBoard):
 class Person:
     """Has the hand do what is asked."""
 
-    stuck_s = 0.03
+    stuck_s, rest_s = 0.03, 0.01
 
     def __init__(self, hand):
         self._hand = hand
@@ -122,3 +124,36 @@ def brought_up(faults=None, skin=SKIN, circuit=None, scatter=0.0, seed=0, only=N
 def faults_of(found):
     """All sentences that tell a fault."""
     return [one.sentence for step in found.values() for one in step.findings if one.verdict == "fault"]
+
+
+def drawn(seed):
+    """A sheet of :data:`LARGE` with one fault, or none, and values of its circuit that are drawn: the kind and the
+    faults, what the sentences that are expected begin with, and the circuit."""
+    rng = np.random.default_rng(1000 + seed)
+    row, column = (int(line) for line in rng.integers(0, LARGE.rows, 2))
+    beside = (column + 1) % LARGE.columns
+    joined = tuple(sorted((column, beside)))
+    alike = f"columns {joined[0]} and {joined[1]} always read alike: "
+    never = f"cell ({row}, {column}) never read pressed: "
+    pressed = f"cell ({row}, {column}) pressed "
+    slow = "a long or thin line"
+    kinds = {
+        "nothing": (Faults(), []),
+        "open row": (Faults(rows_open=(row,)), [f"row {row} open: ", f"row {row} never read pressed: "]),
+        "open column": (
+            Faults(columns_open=(column,)),
+            [f"column {column} open: ", f"column {column} never read pressed: "],
+        ),
+        "open guard row": (Faults(rows_open=(LARGE.rows,)), ["guard row open: "]),
+        "open guard column": (Faults(columns_open=(LARGE.columns,)), ["guard column open: "]),
+        "stuck switch": (Faults(stuck=((row, column),)), [f"{pressed}though nothing touches: ", f"{pressed}for "]),
+        "dead switch": (Faults(dead=((row, column),)), [never]),
+        "bouncing switch": (Faults(bouncing=((row, column),)), [f"cell ({row}, {column}) bounces for "]),
+        "slow row": (Faults(slow_rows=(row,)), [f"slow row {row}: {slow}"]),
+        "slow column": (Faults(slow_columns=(column,)), [f"slow column {column}: {slow}"]),
+        "joined columns": (Faults(shorts=Shorts(columns=(joined,))), [alike]),
+        "lossy link": (Faults(lost=0.0005), [" lost, "]),
+    }
+    name = [*kinds][seed % len(kinds)]
+    circuit = CIRCUIT.replace(line_pf=float(rng.uniform(110, 200)), switch_ohm=float(rng.uniform(500, 2000)))
+    return name, *kinds[name], circuit

@@ -32,7 +32,7 @@ the model jump by some 1e-4 with the steps of its method."""
 DRAWS = 20_000
 """By which the factor of the intervals is found."""
 HARMONICS = 6
-SCATTER = 1.5
+SCATTER = 2.0
 """Lines scatter if their means vary by this many times what their cells explain."""
 MOST_FREEDOM = 1e6
 

@@ -30,16 +30,19 @@ EXTRA = None
 
 SECONDS = 60.0
 """That each step which asks for a touch lasts at most, where the user names no time."""
-STUCK_S = 10.0
+STUCK_S, REST_S = 10.0, 1.0
+"""Of a person, see :class:`Person`."""
 REHEARSAL = "sim://"
 """This port is a virtual board of the kit that a hand touches as the steps ask."""
-REHEARSED_S = 0.15
-"""Simulated, for what the hand keeps doing."""
+REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
+"""Simulated: at most, for what the hand keeps doing, and over which frames are counted."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    port = "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
+    port = (
+        "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
+    )
     parser.add_argument("port", nargs="?", metavar="PORT", help=port)
     flags.kit(parser)
     own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
@@ -98,7 +101,9 @@ def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
     path = outputs.file(name, "--skin-output")
     text = kit.skin_path.read_text(encoding="utf-8")
     tables = text[text.index("\n[") :] if "\n[" in text else ""
-    write_text(path, f"# The {kit.name} kit's Skin for `contactfpga bringup`: it sends every cell.\n{skin.to_toml()}{tables}")
+    write_text(
+        path, f"# The {kit.name} kit's Skin for `contactfpga bringup`: it sends every cell.\n{skin.to_toml()}{tables}"
+    )
     board = kit.board.name
     terminal.say(
         f"{path} is written. Next: contactfpga build {board} --skin {path}, contactfpga flash {board}, then contactfpga "
@@ -132,7 +137,7 @@ def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
             )
         bench = Bench(board, skin, person, load_circuit(kit.skin_path), args.seconds or 1.0, args.timeout)
         if isinstance(person, _Hand):
-            bench.seconds = REHEARSED_S
+            bench.seconds = REHEARSED_LINK_S
         for step in _until_lost(steps.run(bench)):
             _add(args, report, step, board.port)
         report.fitted = bench.fitted
@@ -169,20 +174,20 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
 class _Hand:
     """Does on a virtual board what the steps ask."""
 
-    stuck_s = 0.1
+    stuck_s, rest_s = 0.1, 0.02
 
     def __init__(self, hand: object):
         self._hand = hand
 
     def asked(self, does: str, words: str) -> float:
         """See :class:`Person`."""
-        return self._hand.does(does) or REHEARSED_S  # type: ignore[attr-defined, no-any-return]
+        return self._hand.does(does) or REHEARSED_S  # type: ignore[attr-defined]
 
 
 class _Reader:
     """Somebody who reads what to do."""
 
-    stuck_s = STUCK_S
+    stuck_s, rest_s = STUCK_S, REST_S
 
     def __init__(self, args: argparse.Namespace):
         self._args = args

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -25,8 +25,6 @@ from contactfpga.zones.zone import Zones
 
 READS = 50
 """Frames that are asked for to see how long an answer takes."""
-REST_S = 1.0
-"""Without a touch after which a step ends in which all was touched."""
 MOST_LOST = 0.1
 """Share of the frames from which on the link is too bad to measure anything else."""
 WATCHED_S = 0.1
@@ -38,6 +36,9 @@ class Person(Protocol):
 
     stuck_s: float
     """A switch that stays pressed for so long while others come and go is stuck."""
+
+    rest_s: float
+    """Without anything new a step ends after so long, once it has what it needs."""
 
     def asked(self, does: str, words: str) -> float:
         """Ask for something, and return once it has begun, with the seconds that it may take at most. ``does``:
@@ -206,8 +207,8 @@ class _Alike:
         if self._last is not None and (zones.cells == self._last).all():
             return
         self._last = zones.cells
-        each = [(lines[:, None] != lines[None]).any(axis=2) for lines in (zones.cells, zones.cells.T)]
-        seen = [lines.any(axis=1) for lines in (zones.cells, zones.cells.T)]
+        each: list[np.ndarray] = [(lines[:, None] != lines[None]).any(axis=2) for lines in (zones.cells, zones.cells.T)]
+        seen: list[np.ndarray] = [lines.any(axis=1) for lines in (zones.cells, zones.cells.T)]
         self._differ = [before | now for before, now in zip(self._differ or each, each, strict=True)]
         self._seen = [before | now for before, now in zip(self._seen or seen, seen, strict=True)]
 
@@ -221,7 +222,9 @@ class _Alike:
 
 def diodes(bench: Bench) -> Step:
     """The self-test while switches are pressed, which shows bridged diodes."""
-    seconds = bench.person.asked("ruler", "Press a ruler's edge along each column, one after the other, half a second each.")
+    seconds = bench.person.asked(
+        "ruler", "Press a ruler's edge along each column, one after the other, half a second each."
+    )
     known: dict[LineFinding, None] = {}
     pressed: frozenset[tuple[int, int]] = frozenset()
     until_s, last = bench.board.clock() + seconds, None
@@ -232,17 +235,23 @@ def diodes(bench: Bench) -> Step:
     assert isinstance(last, SelfTest)
     found = [doctor.tested(finding) for finding in known]
     if left := untried(last, pressed):
-        found.append(Finding("note", f"{left} switches were not pressed in a self-test, so their diodes are not tested"))
+        found.append(
+            Finding("note", f"{left} switches were not pressed in a self-test, so their diodes are not tested")
+        )
     elif not found:
         found.append(Finding("ok", "no diode is bridged"))
     faulty = any(finding.verdict == "fault" for finding in found)
-    stop = "a diode is bridged or lines are joined: pins may drive against each other; mend that first" if faulty else ""
+    stop = (
+        "a diode is bridged or lines are joined: pins may drive against each other; mend that first" if faulty else ""
+    )
     return Step("diodes", tuple(found), stop=stop)
 
 
 def bounce(bench: Bench) -> Step:
     """How long switches bounce, pressed column by column."""
-    seconds = bench.person.asked("ruler", "Press a ruler's edge along each column, one after the other, half a second each.")
+    seconds = bench.person.asked(
+        "ruler", "Press a ruler's edge along each column, one after the other, half a second each."
+    )
     seen = Bounce(bench.board.hello.send == "on_change")
     _follow(bench, seen.update, seconds, lambda: len(seen.longest()) == bench.skin.rows * bench.skin.columns)
     seen.finish()
@@ -252,10 +261,16 @@ def bounce(bench: Bench) -> Step:
         return Step("bounce", tuple(found))
     press_us, release_us = (float(max(seen.times_us(way), default=0)) for way in (True, False))
     for cell, us in seen.slow().items():
-        found.append(Finding("fault", f"{named([cell])} bounces for {us / 1000:.2f} ms, far longer than others: replace"))
+        found.append(
+            Finding("fault", f"{named([cell])} bounces for {us / 1000:.2f} ms, far longer than others: replace")
+        )
     proposal = seen.proposal()
     within = f"press within {press_us / 1000:.2f} ms, release within {release_us / 1000:.2f} ms"
-    advice = "no debounce is needed" if proposal is None else f"a debounce that hides it: {', '.join(proposal.lines.splitlines())}"
+    advice = (
+        "no debounce is needed"
+        if proposal is None
+        else f"a debounce that hides it: {', '.join(proposal.lines.splitlines())}"
+    )
     found.append(Finding("ok", f"{len(seen.longest())} switches {within}; {advice}"))
     return Step("bounce", tuple(found), {"press_us": press_us, "release_us": release_us})
 
@@ -268,7 +283,7 @@ def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: 
         take(zones)
         if zones.pressed or not whole():
             rest_us = zones.time_us
-        if zones.time_us - rest_us > 1e6 * REST_S:
+        if zones.time_us - rest_us > 1e6 * bench.person.rest_s:
             return
         zones = bench.board.next(bench.timeout)
 
@@ -282,22 +297,19 @@ def settling(bench: Bench) -> Step:
     found: list[Finding] = []
     measured: dict[str, float] = {}
     wanted = (
-        ("card", "Lay a stiff card over the first half of the columns, on all rows, and press it down.", skin.columns // 2),
-        ("plate", "Lay a plate over the whole sheet and press it down.", skin.columns),
+        ("card", "Lay a stiff card over the first half of the columns, on all rows, and press it down."),
+        ("plate", "Lay a plate over the whole sheet and press it down."),
     )
-    for does, words, columns in wanted:
+    for does, words in wanted:
         seconds = bench.person.asked(does, words)
         bench.images[does] = image = settle.settling(bench.board, skin)
-        cells = skin.rows * columns - sum(column < columns for _, column in skin.mask)
-
-        def enough(image: Settling = image, cells: int = cells) -> bool:
-            return image.next_clocks() is None and int((image.clocks > 0).sum()) >= cells
-
-        _, end = settle.follow(bench.board, image, bench.timeout, seconds, enough=enough)
+        _, end = settle.follow(bench.board, image, bench.timeout, seconds, enough=_Rested(bench, image))
         found += end
         known = image.clocks[image.clocks > 0]
         if not len(known):
-            found.append(Finding("fault", f"no cell read pressed for long enough under the {does}; press it down evenly"))
+            found.append(
+                Finding("fault", f"no cell read pressed for long enough under the {does}; press it down evenly")
+            )
             continue
         found.append(Finding("ok", f"{len(known)} cells under the {does}: {known.max() / per_us:.3f} us at most"))
     if "plate" in bench.images and (plate := bench.images["plate"].clocks).any():
@@ -305,8 +317,24 @@ def settling(bench: Bench) -> Step:
         measured["settle_us_step"] = 1 / per_us
         found += _slow(bench.images["plate"], per_us)
         if plate.max() > NEAR * skin.derived.settle_clocks:
-            found.append(Finding("fault", f"settle_us = {skin.settle_us:g} leaves too little room; `contactfpga wire --settle`"))
+            found.append(
+                Finding("fault", f"settle_us = {skin.settle_us:g} leaves too little room; `contactfpga wire --settle`")
+            )
     return Step("settle times", tuple(found), measured)
+
+
+class _Rested:
+    """Whether an image has all that is pressed, and has had it for as long as a person rests."""
+
+    def __init__(self, bench: Bench, image: Settling):
+        self._bench, self._image = bench, image
+        self._since_s = bench.board.clock()
+
+    def __call__(self) -> bool:
+        now_s = self._bench.board.clock()
+        if self._image.next_clocks() is not None or not self._image.clocks.any():
+            self._since_s = now_s
+        return now_s - self._since_s > self._bench.person.rest_s
 
 
 def _slow(image: Settling, per_us: int) -> Iterator[Finding]:
@@ -328,14 +356,16 @@ def circuit(bench: Bench) -> Step:
     skin = bench.skin
     if bench.stated is None:
         return Step("circuit", (Finding("note", "the kit states no [circuit] to compare with"),))
-    guard = int(skin.guard)
-    widths = {"card": skin.columns // 2 + guard, "plate": skin.columns + guard}
-    readings = [
-        SettleReading(widths[does], _without_slow(image), image.first) for does, image in bench.images.items()
-    ]
+    faults = bench.board.faults
+    alone = faults is not None and "guard column open" in faults.names
+    broken = () if faults is None or alone else faults.rows_open
+    guard = skin.guard and not alone
+    readings = [_reading(image, broken, guard) for image in bench.images.values() if image.clocks.any()]
     fast = [one for one in readings if (one.clocks[one.clocks > 0] <= one.first).any()]
     found = [
-        Finding("note", f"with {one.pressed} switches pressed in a row, cells are too fast for the board's clock to tell")
+        Finding(
+            "note", f"with {one.pressed} switches pressed in a row, cells are too fast for the board's clock to tell"
+        )
         for one in fast
     ]
     try:
@@ -355,11 +385,14 @@ def circuit(bench: Bench) -> Step:
     return Step("circuit", tuple(found), {one.name: one.value for one in bench.fitted.values})
 
 
-def _without_slow(image: Settling) -> np.ndarray:
-    """Lines that are broken say nothing of the others."""
+def _reading(image: Settling, broken: Sequence[int], guard: bool) -> SettleReading:
+    """Rows with as many pressed switches as most; lines that are slow or broken say nothing of the others. ``guard``: each
+    row pulls a guard column too."""
+    counts = (image.clocks > 0).sum(axis=1)
+    usual = int(np.bincount(counts[counts > 0]).argmax())
     clocks, slow = image.clocks.copy(), image.slow()
-    clocks[slow.rows], clocks[:, slow.columns] = 0, 0
-    return clocks
+    clocks[counts != usual], clocks[[*slow.rows, *broken]], clocks[:, slow.columns] = 0, 0, 0
+    return SettleReading(usual + guard, clocks, image.first)
 
 
 def steps_for(skin: Skin) -> list[Callable[[Bench], Step]]:
@@ -367,4 +400,3 @@ def steps_for(skin: Skin) -> list[Callable[[Bench], Step]]:
     if skin.report != "cells":
         return [link, lines]
     return [link, lines, switches, *[diodes] * skin.self_test, bounce, settling, circuit]
-
