@@ -23,7 +23,7 @@ from contactfpga.design.circuit.values import LIMITS, Circuit, CircuitError
 NAMES = ("line_pf", "switch_ohm")
 """Fields of :class:`Circuit` that are fitted, in this order, as many as there are readings that tell something."""
 PROBABILITY = 0.95
-"""With which the intervals hold, all at once."""
+"""With which intervals hold by default, all at once."""
 LEAST_LINES = 3
 """Rows, and columns, that must have been measured."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
@@ -57,7 +57,7 @@ class FittedValue:
     value: float
     low: float
     high: float
-    """All intervals of a fit together cover the true values with :data:`PROBABILITY`."""
+    """All intervals of a fit together cover the true values with its probability."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,9 +81,16 @@ def settle_s(circuit: Circuit, rows: int, columns: int, diodes: str, pressed: in
 
 
 def fit_circuit(
-    stated: Circuit, readings: Sequence[SettleReading], clock_hz: int, rows: int, columns: int, diodes: str = "col2row"
+    stated: Circuit,
+    readings: Sequence[SettleReading],
+    clock_hz: float,
+    rows: int,
+    columns: int,
+    diodes: str = "col2row",
+    probability: float = PROBABILITY,
 ) -> FittedCircuit:
-    """The circuit of a sheet with so many lines, guard lines among them, from one or two readings.
+    """The circuit of a sheet with so many lines, guard lines among them, from one or two readings. ``probability``: with
+    which the intervals hold, all at once.
 
     Raises :class:`CircuitError` where the readings do not tell: with fewer than three rows or columns that were measured
     as a whole, with cells that are faster than the board's first sample, or where no values of the circuit would do."""
@@ -113,7 +120,7 @@ def fit_circuit(
     weights = np.linalg.inv(slopes)
     spread = np.array([_rounding_variance(each) for each in clocks])
     covariance, degrees = _covariance(np.tensordot(weights, middles, 1), weights**2 @ spread)
-    factor = _factor(covariance, degrees)
+    factor = _factor(covariance, degrees, probability)
     fitted = []
     for name, value, sigma in zip(names, values, np.sqrt(np.diagonal(covariance)), strict=True):
         least, most, _ = LIMITS[name]
@@ -212,11 +219,11 @@ def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np
     return covariance, degrees
 
 
-def _factor(covariance: np.ndarray, degrees: np.ndarray) -> float:
-    """By how many standard deviations all of the values are off at most, with :data:`PROBABILITY`."""
+def _factor(covariance: np.ndarray, degrees: np.ndarray, probability: float) -> float:
+    """By how many standard deviations all of the values are off at most, with this probability."""
     rng = np.random.default_rng(0)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
     normal = rng.multivariate_normal(np.zeros(len(sigma)), correlation, DRAWS, method="eigh")
     scale = np.sqrt(rng.chisquare(degrees, (DRAWS, len(degrees))) / degrees)
-    return float(np.quantile(np.abs(normal / scale).max(axis=1), PROBABILITY))
+    return float(np.quantile(np.abs(normal / scale).max(axis=1), probability))

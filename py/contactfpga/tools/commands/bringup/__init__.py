@@ -6,12 +6,17 @@ import argparse
 import datetime
 import json
 import math
+import re
+import statistics
 import sys
 from collections.abc import Iterator
 
 from contactfpga import terminal
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
+from contactfpga.design.circuit.fitted import PROBABILITY
+from contactfpga.design.cover import load_cover
+from contactfpga.design.cover.fitted import FittedForce, fit_force
 from contactfpga.design.kits import Kit
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
@@ -28,6 +33,8 @@ from contactfpga.tools.console import flags, interrupt, numbers, outputs
 
 EXTRA = None
 
+CLOSING = re.compile(r"closing_\w+_n")
+"""Names of predictions that are forces at which a switch closes."""
 SECONDS = 60.0
 """That each step which asks for a touch lasts at most, where the user names no time."""
 STUCK_S, REST_S = 10.0, 1.0
@@ -81,7 +88,8 @@ def run(args: argparse.Namespace) -> int:
     report = Report(kit, skin, when)
     with interrupt.usual_end():
         _lead(args, kit, report)
-    measured = {name: value for step in report.steps for name, value in step.measured.items()} | dict(args.measured)
+    report.force = _force(kit, predicted, args.measured)
+    measured = {name: value for step in report.steps for name, value in step.measured.items()} | _medians(args.measured)
     report.grades = graded(predicted, measured)
     report.not_measured = [one for name, one in predicted.items() if name not in measured]
     write_text(path, report.to_markdown())
@@ -120,6 +128,25 @@ def _check_names(measured: list[tuple[str, float]], predicted: dict[str, predict
             raise ContactFPGAError(f"--measured {name}: the kit predicts nothing of this name; it predicts {known}")
 
 
+def _medians(measured: list[tuple[str, float]]) -> dict[str, float]:
+    return {name: statistics.median(value for other, value in measured if other == name) for name, _ in measured}
+
+
+def _closing(measured: list[tuple[str, float]]) -> list[tuple[str, float]]:
+    return [(name, value) for name, value in measured if CLOSING.fullmatch(name)]
+
+
+def _force(
+    kit: Kit, predicted: dict[str, predictions.Prediction], measured: list[tuple[str, float]]
+) -> FittedForce | None:
+    """What closing forces that somebody measured say of the switches; None where there are none, or no cover."""
+    cover, closing = load_cover(kit.skin_path), _closing(measured)
+    if cover is None or not closing:
+        return None
+    pairs = [(predicted[name].value, value) for name, value in closing]
+    return fit_force(cover.switch.force_n, pairs, math.sqrt(PROBABILITY))
+
+
 def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
     """Through all steps that can be made."""
     try:
@@ -136,6 +163,8 @@ def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
                 "--skin-output FILE` writes the Skin that sends cells, then build and flash it"
             )
         bench = Bench(board, skin, person, load_circuit(kit.skin_path), args.seconds or 1.0, args.timeout)
+        if _closing(args.measured):
+            bench.probability = math.sqrt(PROBABILITY)  # the other half of the doubt is the cover's
         if isinstance(person, _Hand):
             bench.seconds = REHEARSED_LINK_S
         for step in _until_lost(steps.run(bench)):

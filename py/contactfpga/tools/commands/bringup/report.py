@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import platform
 from collections.abc import Iterable, Mapping
@@ -9,14 +10,15 @@ from typing import Any, NamedTuple
 
 from contactfpga import __version__
 from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit
+from contactfpga.design.cover.fitted import FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup.steps import Step
 
 NOT_FITTED = (
-    "[cover] is not fitted: a board does not feel forces. Close switches with known weights, or with a kitchen scale, and "
-    "give what you find by --measured, such as --measured closing_0_n=0.42."
+    "[cover] is not fitted: a board does not feel forces. Press single switches through a kitchen scale until they close, "
+    "and give three forces or more of the kit's predictions: --measured closing_0_n=0.42 --measured closing_0_n=0.38 ..."
 )
 
 
@@ -60,6 +62,7 @@ class Report:
         self.grades: list[Graded] = []
         self.not_measured: list[Prediction] = []
         self.fitted: FittedCircuit | None = None
+        self.force: FittedForce | None = None
 
     @property
     def faults(self) -> int:
@@ -100,6 +103,7 @@ class Report:
                 one.name: {"value": one.value, "low": one.low, "high": one.high}
                 for one in (self.fitted.values if self.fitted else ())
             },
+            "switch_force_n": None if self.force is None else dataclasses.asdict(self.force),
         }
 
     def to_markdown(self) -> str:
@@ -132,14 +136,20 @@ class Report:
             yield f"\nNot measured: {', '.join(one.name for one in self.not_measured)}."
 
     def _tables(self) -> Iterable[str]:
-        if self.fitted is not None:
-            share = f"{100 * PROBABILITY:.0f} %"
-            yield f"\n## Fitted\n\nAll intervals together hold with {share}; lines scatter about these values.\n\n```toml"
-            yield "[circuit]"
-            for one in self.fitted.values:
-                yield f"{one.name} = {one.value:.4g}    # {one.low:.4g} to {one.high:.4g}"
+        rows = [
+            ("circuit", one.name, one.value, one.low, one.high) for one in (self.fitted.values if self.fitted else ())
+        ]
+        if self.force is not None:
+            rows.append(("cover.switch", "force_n", self.force.value, self.force.low, self.force.high))
+        if rows:
+            yield f"\n## Fitted\n\nAll intervals together hold with {100 * PROBABILITY:.0f} %.\n\n```toml"
+            for table in dict.fromkeys(row[0] for row in rows):
+                yield f"[{table}]"
+                for _, name, value, low, high in (row for row in rows if row[0] == table):
+                    yield f"{name} = {value:.4g}    # {low:.4g} to {high:.4g}"
             yield "```"
-        yield f"\n{NOT_FITTED}"
+        if self.force is None:
+            yield f"\n{NOT_FITTED}"
 
 
 def _one_line(text: str) -> str:

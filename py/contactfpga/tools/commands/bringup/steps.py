@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from contactfpga.design.circuit import Circuit, CircuitError
-from contactfpga.design.circuit.fitted import FittedCircuit, SettleReading, fit_circuit
+from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit, SettleReading, fit_circuit
 from contactfpga.driver import health
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
@@ -75,6 +75,8 @@ class Bench:
     """Over which frames are counted."""
     timeout: float = 1.0
     """Of each frame, in s."""
+    probability: float = PROBABILITY
+    """With which the intervals of the circuit hold, all at once."""
     images: dict[str, Settling] = dataclasses.field(default_factory=dict)
     fitted: FittedCircuit | None = None
 
@@ -372,7 +374,8 @@ def circuit(bench: Bench) -> Step:
         usable = [one for one in readings if one not in fast]
         if not usable:
             raise CircuitError("no settle image tells anything")
-        bench.fitted = fit_circuit(bench.stated, usable, skin.clock_hz, skin.row_lines, skin.column_lines, skin.diodes)
+        lines = skin.row_lines, skin.column_lines
+        bench.fitted = fit_circuit(bench.stated, usable, skin.clock_hz, *lines, skin.diodes, bench.probability)
     except ContactFPGAError as error:
         found.append(Finding("note", f"[circuit] is not fitted: {error}"))
         return Step("circuit", tuple(found))
