@@ -77,17 +77,19 @@ def test_a_file_that_is_wrong_is_refused(tmp_path):
     kit = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
     file = tmp_path / predictions.FILE
     file.write_text(predictions.added("", {"settle_us": dataclasses.replace(ONE, low=1.2)}))
-    with pytest.raises(KitError, match="settle_us is 1, outside its interval 1.2 to 2"):
+    with pytest.raises(KitError, match=r"settle_us is 1, outside its interval 1\.2 to 2"):
         predictions.load(kit)
     file.write_text("[[prediction]]\nnome = 1\n")
-    with pytest.raises(KitError, match="unknown key 'nome' in \\[prediction\\]; known are name, what"):
+    with pytest.raises(KitError, match=r"unknown key 'nome' in \[prediction\]; known are name, what"):
         predictions.load(kit)
 
 
 def test_the_newest_entry_counts(tmp_path):
     kit = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
     text = predictions.added("", {"settle_us": ONE})
-    (tmp_path / predictions.FILE).write_text(predictions.added(text, {"settle_us": dataclasses.replace(ONE, value=1.5)}))
+    (tmp_path / predictions.FILE).write_text(
+        predictions.added(text, {"settle_us": dataclasses.replace(ONE, value=1.5)})
+    )
     assert predictions.load(kit)["settle_us"].value == 1.5
 
 

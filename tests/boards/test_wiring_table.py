@@ -1,5 +1,6 @@
 """The wiring table of `contactfpga build`: every pin of the constraints once, and lines where they are soldered."""
 
+import collections
 import itertools
 import json
 import re
@@ -8,13 +9,22 @@ import pytest
 from sample import sample
 
 from contactfpga.boards import BOARDS, wiring
+from contactfpga.boards.wiring import ohms
 from contactfpga.design.circuit import Circuit
+from contactfpga.design.sheet import lay_out
 from contactfpga.tools import cli
-from contactfpga.tools.commands.build import WiringTable, ohms
+from contactfpga.tools.commands.build import WiringTable
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 
-CHAINED = {"precharge_us": 0, "rows": 20, "columns": 12, "row_drive": "74hc595", "column_read": "74hc165", "release_us": 4.0}
+CHAINED = {
+    "precharge_us": 0,
+    "rows": 20,
+    "columns": 12,
+    "row_drive": "74hc595",
+    "column_read": "74hc165",
+    "release_us": 4.0,
+}
 CHANGES = {
     "as shipped": {},
     "direct": {"rows": 4, "columns": 7, "row_drive": "direct"},
@@ -219,3 +229,17 @@ def test_a_circuit_without_series_resistors_names_none():
     wires = wiring.wires(board, board.skin)
     table = WiringTable(board, board.skin, Circuit(), sites.wire_sites(board, wires))
     assert {one["series_ohm"] for one in table.to_dict()["wires"]} == {None}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_counts_of_parts_are_those_of_the_layout(name):
+    skin = skin_of(BOARDS["ulx3s-85f"], name)
+    placed = collections.Counter(one.part.name for one in lay_out(skin, Circuit()).drawing.placed)
+    counted = wiring.parts(skin)
+    enable = skin.row_drive != "direct"  # a resistor of its own
+    assert placed["DOME_5MM_4LEG"] == counted["switches"] == skin.rows * skin.columns - len(skin.mask)
+    assert placed["D_SOD-323"] == counted.get("diodes", 0)
+    assert placed["R_0603"] - enable == counted["series resistors"] + counted.get("pull resistors", 0)
+    chips = {chip: counted.get(chip, 0) for chip in ("74HC595", "74HC165")}
+    assert placed["SOIC-16"] == placed["C_0603"] == sum(chips.values()) == counted.get("capacitors of 100 nF", 0)
+    assert chips["74HC595"] == skin.row_chains * -(-skin.row_lines // (8 * skin.row_chains)) * enable

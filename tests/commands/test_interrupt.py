@@ -234,3 +234,26 @@ def test_an_interrupt_says_what_was_kept(capsys):
 
     assert interrupt.guarded(body) == 130
     assert capsys.readouterr().err == "contactfpga: interrupted; 3 of 7 are kept\n"
+
+
+@pytest.mark.parametrize("moment", range(2 * len(interrupt.SIGNALS)))
+def test_a_signal_while_listening_begins_or_ends_is_no_traceback(moment, monkeypatch):
+    """One comes right after each change of a handler, to ours and back to what it was."""
+    changed, right = [], signal.signal
+
+    def change(number, handler):
+        before = right(number, handler)
+        changed.append(number)
+        if len(changed) == moment + 1 and signal.getsignal(signal.SIGINT) is interrupt._interrupt:
+            signal.raise_signal(signal.SIGINT)
+        return before
+
+    monkeypatch.setattr(signal, "signal", change)
+    try:
+        status = interrupt.guarded(lambda: 0)
+    finally:
+        monkeypatch.undo()
+        for number in interrupt.SIGNALS:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+    assert status in (0, 130)
+    assert moment or status == 130

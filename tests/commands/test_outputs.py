@@ -30,7 +30,10 @@ def places(tmp_path):
 INTO_A_FOLDER = [
     leaf for leaf in leaves() if "--output" in options(leaf) and options(leaf)["--output"].metavar == "DIR"
 ]
-COMMANDS = {leaf.prog: called(leaf) for leaf in INTO_A_FOLDER} | {"arm, charts": ["study", "arm", "--charts"]}
+COMMANDS = {leaf.prog: called(leaf) for leaf in INTO_A_FOLDER} | {
+    "arm, charts": ["study", "arm", "--charts"],
+    "contactfpga build": ["build", "icebreaker"],
+}
 
 
 @pytest.mark.parametrize("where", ["a file", "below a file", "a device"])

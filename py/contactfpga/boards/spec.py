@@ -11,6 +11,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from contactfpga.boards import pll
 from contactfpga.skin import Skin, SkinError
@@ -104,7 +105,7 @@ class BoardSpec:
     """File in constraints/; boards with the same pins share it."""
     skin: Skin
     """A sheet that fits, built unless another one is given."""
-    circuit: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    circuit: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """What that sheet is made of: the values of its table ``[circuit]``."""
     uart: tuple[str, str] | None = None
     """Connector pins of an external bridge, where the board receives and where it sends; None: it has one on board."""

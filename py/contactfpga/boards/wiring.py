@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 from collections.abc import Iterator, Sequence
 
@@ -117,6 +118,23 @@ def outputs(skin: Skin) -> list[Output]:
     return found
 
 
+def parts(skin: Skin) -> dict[str, int]:
+    """How many of each part the sheet takes, without connectors."""
+    lines = [*row_lines(skin), *column_lines(skin)]
+    cells = skin.rows * skin.columns - len(skin.mask)
+    chips = collections.Counter(chip for chip, *_ in {(one.chip, one.chain, one.number) for one in outputs(skin)})
+    guards = len(lines) - skin.rows - skin.columns and skin.rows + skin.columns
+    found = {
+        "switches": cells,
+        "diodes": 0 if skin.diodes == "none" else cells + guards,
+        "series resistors": len(lines),
+        "pull resistors": sum(bool(line.pull) for line in lines),
+        **chips,
+        "capacitors of 100 nF": chips.total(),
+    }
+    return {name: count for name, count in found.items() if count}
+
+
 def row_lines(skin: Skin) -> list[Connection]:
     """What is soldered to each row's line; the guard row's is the last one."""
     pull = ("down" if skin.selects_low else "up") if skin.reads_rows else ""
@@ -158,3 +176,11 @@ def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Se
         chain, place = divmod(index, length)
         name, pin = names[place % len(names)]
         yield Output(chip, chain, place // len(names), name, pin, line)
+
+
+def ohms(value: float) -> str:
+    """A resistance as it is printed on a resistor's bag."""
+    for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
+        if value >= limit:
+            return f"{value / limit:g} {unit}"
+    return f"{value:g} Ω"

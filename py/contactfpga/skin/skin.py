@@ -158,8 +158,8 @@ class Skin:
         """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
         ``[circuit]`` are not the Skin's: :func:`contactfpga.design.cover.load_cover` and
         :func:`contactfpga.design.circuit.load_circuit` read them. A file that names a module, such as
-        ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code. ``usual``: values of fields that the file
-        leaves out, instead of their defaults."""
+        ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code.
+        ``usual``: values of fields that the file leaves out, instead of their defaults."""
         values = tomlfile.load(path, SkinError)
         with trusted(trust):
             refuse_modules(values, str(path))

@@ -111,8 +111,8 @@ def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str
 
 
 def check_times(circuit: Circuit, skin: Skin) -> None:
-    """Raise :class:`CircuitError` where a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`. Takes
-    some 3 seconds at 64x64."""
+    """Raise :class:`CircuitError` where a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`.
+    Takes some 3 seconds at 64x64."""
     wanted = recommended_us(skin, needed(circuit, skin.rows, skin.columns, skin.diodes))
     short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
     if not short:

@@ -13,7 +13,7 @@ from typing import Any
 from contactfpga import terminal
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
-from contactfpga.boards.wiring import Connection, Output, Wire
+from contactfpga.boards.wiring import Connection, Output, Wire, ohms
 from contactfpga.design import buildable, kits
 from contactfpga.design.circuit import Circuit, CircuitError, check_times, load_checked, load_circuit
 from contactfpga.errors import UNSOLVED, ContactFPGAError
@@ -45,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     board = flags.board(args)
     if board is None:
-        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {' or --kit '.join(kits.names())}")
+        known = " or --kit ".join(kits.names())
+        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {known}")
     design = flags.designed(args, board.skin, board.load)
     if args.check:
         return _check(args, board, design)
@@ -62,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """What the Skin's file says, or of the board's own Skin what it is made of, if it works and its times are enough."""
+    """That of the Skin's file, or of the board's own Skin. Raises CircuitError where it cannot work, or where times are
+    too short for it."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)
@@ -101,7 +103,9 @@ def _show_check(board: BoardSpec, answer: dict[str, Any], stated: bool, size: li
     for name, problem in answer["problems"].items():
         terminal.say(f"{name:13}{problem or 'fits'}", hang=13)
     if not stated:
-        terminal.say("circuit      not stated: add a table [circuit] and its levels and times are checked, too", hang=13)
+        terminal.say(
+            "circuit      not stated: add a table [circuit] and its levels and times are checked, too", hang=13
+        )
     if "unsolved" in answer:
         terminal.say(f"no values were found that fit together: {answer['unsolved']}", hang=2)
         return
@@ -177,6 +181,9 @@ class WiringTable:
         _show([head, *rows])
         chips = ("sheet", "chip", "chain", "number", "output", "leads to", "series", "pull")
         _show([chips, *((sheet, *one.place, *self._end(one.line)) for sheet, one in self._outputs())])
+        for sheet, skin in self._sheets:
+            counted = ", ".join(f"{count} {name}" for name, count in wiring.parts(skin).items())
+            terminal.say(f"{sheet and f'sheet {sheet}: '}{counted}", hang=2)
         if self.circuit is None:
             terminal.say("Resistors have values once the Skin's file states them in its table [circuit].", hang=2)
         terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
@@ -189,6 +196,7 @@ class WiringTable:
                 | self._dict(wire)
                 for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
             ],
+            "parts": [wiring.parts(skin) for _, skin in self._sheets],
             "outputs": [
                 ({"sheet": int(sheet)} if sheet else {})
                 | {"chip": one.chip, "chain": one.chain, "number": one.number, "output": one.name, "pin": one.pin}
@@ -237,11 +245,3 @@ def _show(rows: Sequence[Sequence[str]]) -> None:
     if len(rows) > 1:
         filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
         tables.show(list(zip(*filled, strict=True)), texts=range(len(filled)))
-
-
-def ohms(value: float) -> str:
-    """A resistance as it is printed on a resistor's bag."""
-    for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
-        if value >= limit:
-            return f"{value / limit:g} {unit}"
-    return f"{value:g} Ω"

@@ -51,9 +51,10 @@ def kit(parser: argparse.ArgumentParser) -> None:
 
 def sheet_file(args: argparse.Namespace) -> str | None:
     """The Skin's file that the options of :func:`sheet` name, or None."""
+    given: str | None = args.skin
     if not args.kit:
-        return args.skin
-    if args.skin:
+        return given
+    if given:
         raise ContactFPGAError("give --skin or --kit, not both; a kit has its own Skin")
     return str(kits.kit(args.kit).skin_path)
 

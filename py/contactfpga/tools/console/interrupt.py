@@ -44,6 +44,8 @@ def guarded(body: Callable[[], int | None]) -> int:
     try:
         with _listening():
             return _status(body)
+    except KeyboardInterrupt:  # it came while listening began or ended
+        return _cut_short()
     finally:
         # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by
         # SIGINT, whatever the status, unless another text is run to its end.

@@ -73,8 +73,8 @@ def worst_text(found: FlipResults) -> str:
         worst = max(fought, key=lambda row: row.found.fights)
         lines.append(
             f"- A column was driven against a row in {len(fought)} of {len(rows):,} flips, for {worst.found.fights} "
-            f"{'clock' if worst.found.fights == 1 else 'clocks'} at most: `{worst.found.name}` in `{worst.design}`. The "
-            "resistors at the pins bound its current ([which](maker.md#which-resistor-at-each-pin))."
+            f"{'clock' if worst.found.fights == 1 else 'clocks'} at most: `{worst.found.name}` in `{worst.design}`. "
+            "The resistors at the pins bound its current ([which](maker.md#which-resistor-at-each-pin))."
         )
     return "\n".join((*lines, "", "A flip that was not drawn may be worse than all of these."))
 

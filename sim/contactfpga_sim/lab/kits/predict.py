@@ -127,7 +127,11 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
     needs = [needed(one, skin.rows, skin.columns, skin.diodes) for one in drawn]
     values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
-        "settle_us": ("a row selected until the slowest column reads right", "us", lambda one: 1e6 * one.settle.seconds),
+        "settle_us": (
+            "a row selected until the slowest column reads right",
+            "us",
+            lambda one: 1e6 * one.settle.seconds,
+        ),
         "precharge_us": ("columns driven until they are charged", "us", lambda one: 1e6 * one.precharge.seconds),
         "pulled_release_us": (
             "pull-ups alone lift the columns after a pressed row",
@@ -196,7 +200,7 @@ def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
         finger = Ellipse(LENGTH_M / 2, WIDTH_M / 2, middle + x * pitch_m, middle + y * pitch_m, 0.0)
         taken = cells.forces_n([Load((finger,), 1.0)])
         with np.errstate(divide="ignore"):
-            found.append((cells.thresholds_n / np.where(taken > 0, taken, np.nan)))
+            found.append(cells.thresholds_n / np.where(taken > 0, taken, np.nan))
     return np.nanmin(np.array(found), axis=(1, 2))
 
 

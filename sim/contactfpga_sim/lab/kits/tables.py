@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.boards import BOARDS
+from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.kits import Kit
@@ -65,7 +66,8 @@ def headline(found: list[KitFigures]) -> str:
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
-            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB, worst / median",
+            "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB "
+            "with 0.1 ms assumed for the host, worst / median",
             *decision,
             "6,000 us for the paper's sheet and control together",
         ),
@@ -74,7 +76,11 @@ def headline(found: list[KitFigures]) -> str:
             *byte,
             "up to 1,000 us until the next scan of a 1 kHz array",
         ),
-        ("[Closed switch to the pin `contact`](docs/kits.md#from-the-finger-to-your-code), worst / median", *pin, "the same"),
+        (
+            "[Closed switch to the pin `contact`](docs/kits.md#from-the-finger-to-your-code), worst / median",
+            *pin,
+            "the same",
+        ),
         (
             "[Scenes of two to five fingers miscounted](docs/chart.md#every-method), 95 % interval",
             *(f"**{fingers}**",) * 2,
@@ -182,7 +188,9 @@ def pins_table() -> str:
                 )
             )
         )
-    return writer.table(("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines)
+    return writer.table(
+        ("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines
+    )
 
 
 def _reversal(skin: Skin) -> Skin:
@@ -199,16 +207,12 @@ def parts_table() -> str:
         layout = lay_out(kit.skin, load_circuit(kit.skin_path))
         counted = collections.Counter((one.part.order, one.value) for one in layout.drawing.placed)
         for (order, value), count in counted.items():
-            lines.append(writer.line((name, "sheet", str(count), order, ohms(value))))
+            shown = ohms(float(value)) if value.isdigit() else ""
+            lines.append(writer.line((name, "sheet", str(count), order, shown)))
         for other in kit.parts:
             maker = " ".join(filter(None, (other.maker, other.number)))
             lines.append(writer.line((name, "beside it", str(other.count), other.what, maker)))
     return writer.table(("kit", "where", "count", "what", "value or maker's number"), lines)
-
-
-def ohms(value: str) -> str:
-    """The value of a part in words; a number is a resistance in ohms."""
-    return f"{value} Ω" if value.isdigit() else ""
 
 
 def predictions_table() -> str:
