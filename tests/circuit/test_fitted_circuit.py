@@ -1,4 +1,4 @@
-"""Values of a circuit that are fitted to settle images: intervals against sheets that are drawn, and what is refused."""
+"""Values of a circuit that are fitted to settle images: intervals against sheets that are drawn; what is refused."""
 
 import math
 

@@ -9,7 +9,7 @@ import pytest
 from planted import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, drawn, faults_of
 
 from contactfpga import Skin
-from contactfpga.design import kits
+from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import Circuit, load_circuit
 from contactfpga.design.predictions import Prediction
 from contactfpga.tools import cli
@@ -149,9 +149,8 @@ def test_a_rehearsal_of_a_kit_writes_its_report(tmp_path, capsys):
     text = path.read_text()
     assert text.startswith("# Bring-up of the starter kit, ")
     assert "fingerprint `" + bringup.bring_up_skin(kits.kit("starter")).fingerprint.hex() in text
-    stated = load_circuit(kits.kit("starter").skin_path)
-    fitted = answer["circuit"]
-    assert all(one["low"] <= getattr(stated, name) <= one["high"] for name, one in fitted.items())
+    (grade,) = answer["predictions"]
+    assert (grade["name"], grade["as_predicted"]) == ("settle_us", True)
 
 
 def test_without_a_board_the_report_says_so(tmp_path, capsys):
@@ -184,6 +183,21 @@ def test_the_skin_of_a_bring_up_is_the_kits_with_cells(name, tmp_path, capsys):
 def test_what_cannot_be_is_refused_in_a_line(words, sentence, capsys):
     assert cli.main(["bringup", *words]) == 1
     assert sentence in capsys.readouterr().err
+
+
+def test_closing_forces_are_fitted_and_graded(tmp_path, capsys):
+    """Three that are a tenth above the prediction, each in another place."""
+    path, kit = tmp_path / "report.md", kits.kit("fast")
+    predicted = [predictions.load(kit)[f"closing_{place}_n"].value for place in (0, 3, 6)]
+    forces = [f"--measured=closing_{place}_n={1.1 * value}" for place, value in zip((0, 3, 6), predicted, strict=True)]
+    arguments = ["bringup", "--kit", "fast", str(tmp_path / "ttyNone"), "--output", str(path), "--yes", "--json"]
+    assert cli.main([*arguments, *forces]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["switch_force_n"]["value"] == pytest.approx(0.44, rel=1e-3)
+    assert [grade["model"] for grade in answer["predictions"]] == ["cover"] * 3
+    assert "[cover.switch]\nforce_n = 0.44 " in path.read_text()
+    assert cli.main([*arguments, *forces[:2]]) == 1
+    assert "2 closing forces were measured; 3 are needed" in capsys.readouterr().err
 
 
 def prediction(**values):

@@ -1,10 +1,10 @@
 """Values of a sheet's circuit from how long its cells took to read pressed (`contactfpga wire --settle`).
 
 A cell's time is that of the model for as many pressed switches in its row, times a factor of its row and one of its
-column, which scatter from line to line with a median of 1. What is fitted holds for the sheet as a whole. With one number
-of pressed switches the capacitance of the lines can be told; with two, the resistance of a closed switch as well.
-Resistors of pins and lines are taken from the circuit that is given: with the capacitance they make one product. So does
-VIL, at which a pin is taken to read low.
+column, which scatter from line to line with a median of 1. What is fitted holds for the sheet as a whole. With one
+number of pressed switches the capacitance of the lines can be told; with two, the resistance of a closed switch as
+well. Resistors of pins and lines are taken from the circuit that is given: with the capacitance they make one product.
+So does VIL, at which a pin is taken to read low.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ PROBABILITY = 0.95
 LEAST_LINES = 3
 """Rows, and columns, that must have been measured."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
-"""Of Gauss and Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares; times of
-the model jump by some 1e-4 with the steps of its method."""
+"""Of Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares. Times of the
+model jump by some 1e-4, as its steps in time do."""
 DRAWS = 20_000
 """By which the factor of the intervals is found."""
 HARMONICS = 6
@@ -58,6 +58,12 @@ class FittedValue:
     low: float
     high: float
     """All intervals of a fit together cover the true values with its probability."""
+
+    @property
+    def told(self) -> bool:
+        """Whether the interval ends before the limits of what a circuit may have: else the readings do not tell it."""
+        least, most, _ = LIMITS[self.name]
+        return least < self.low and self.high < most
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,11 +95,11 @@ def fit_circuit(
     diodes: str = "col2row",
     probability: float = PROBABILITY,
 ) -> FittedCircuit:
-    """The circuit of a sheet with so many lines, guard lines among them, from one or two readings. ``probability``: with
-    which the intervals hold, all at once.
+    """The circuit of a sheet with so many lines, guard lines among them, from one or two readings. ``probability``:
+    with which the intervals hold, all at once.
 
-    Raises :class:`CircuitError` where the readings do not tell: with fewer than three rows or columns that were measured
-    as a whole, with cells that are faster than the board's first sample, or where no values of the circuit would do."""
+    Raises :class:`CircuitError` where the readings do not tell: with fewer than three rows or columns that were
+    measured as a whole, with cells that are faster than the board's first sample, or where no values would do."""
     readings = sorted(readings, key=lambda one: one.pressed)[: len(NAMES)]
     names = NAMES[: len({one.pressed for one in readings})]
     if not readings or len(names) < len(readings):
@@ -103,8 +109,8 @@ def fit_circuit(
     for one, each in zip(readings, clocks, strict=True):
         if (each <= one.first).any():
             raise CircuitError(
-                f"with {one.pressed} switches pressed in a row, cells read pressed at the first sample, {one.first} clocks "
-                "after a row is selected: too fast for this clock"
+                f"with {one.pressed} switches pressed in a row, cells read pressed at the first sample, {one.first} "
+                "clocks after a row is selected: too fast for this clock"
             )
     middles = np.array([np.log(each - 0.5) + 1 / (24 * each**2) for each in clocks]) - math.log(clock_hz)
     means = middles.mean(axis=(1, 2))
@@ -184,8 +190,8 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
-    """Of the mean of (rows, columns) of cells that rows and columns move, and its degrees of freedom after Satterthwaite:
-    analysis of variance in two ways. Lines that scatter no more than their cells make them are taken not to scatter."""
+    """Of the mean of (rows, columns) of cells that rows and columns move, and its degrees of freedom after
+    Satterthwaite: analysis of variance in two ways. Lines that scatter no more than their cells make them are taken not to scatter."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean

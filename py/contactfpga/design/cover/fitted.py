@@ -28,9 +28,9 @@ def fit_force(force_n: float, pairs: Sequence[tuple[float, float]], probability:
     """The force that makes predicted closing forces those that were measured.
 
     ``force_n``: the force of a switch that the predictions were computed with; ``pairs``: a predicted and a measured
-    force in N each, of switches whose forces scatter by a factor. All forces of a cover go with that of its switches, so
-    the factor between the two is one. Raises :class:`CoverError` for fewer than three pairs, and for forces that are not
-    above 0."""
+    force in N each, of switches whose forces scatter by a factor. All forces of a cover go with that of its switches,
+    so the factor between the two is one. Raises :class:`CoverError` for fewer than three pairs, and for forces that are
+    not above 0."""
     if len(pairs) < LEAST:
         raise CoverError(f"{len(pairs)} closing forces were measured; {LEAST} are needed, each of another switch")
     if not all(value > 0 and math.isfinite(value) for pair in pairs for value in pair):

@@ -221,7 +221,8 @@ def _without_mask(skin: Skin | None) -> list[Finding]:
 
 
 def dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
-    """The names of switches that ``never`` read pressed, of all that were ``seen``. Whole lines first: these are broken wires rather than dead switches."""
+    """The names of switches that ``never`` read pressed, of all that were ``seen``. Whole lines first:
+    these are broken wires rather than dead switches."""
     rows = sorted({row for row, _ in never if not seen[row].any()})
     columns = sorted({column for _, column in never if not seen[:, column].any()})
     left = [(row, column) for row, column in never if row not in rows and column not in columns]

@@ -31,7 +31,7 @@ class Hand:
     def __call__(self, seconds: float) -> np.ndarray:
         if self._since_s is None:
             self._since_s = seconds
-        rows, columns = self._shape
+        columns = self._shape[1]
         cells, past_s = np.zeros(self._shape, bool), seconds - self._since_s
         if self._does == "finger":
             number, within_s = divmod(past_s, PRESS_S + MOVE_S)

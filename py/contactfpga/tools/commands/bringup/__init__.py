@@ -18,6 +18,8 @@ from contactfpga.design.circuit.fitted import PROBABILITY
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.fitted import FittedForce, fit_force
 from contactfpga.design.kits import Kit
+from contactfpga.design.sheet import lay_out
+from contactfpga.design.sheet.extract import extracted
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
@@ -60,8 +62,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     wait = "Seconds to wait for the board (default: 1)."
     parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
     parser.add_argument("--yes", action="store_true", help="Do not wait for Enter before each step.")
-    own = "What you measured yourself of the kit's predictions, by scale, scope or meter; may be given several times."
-    parser.add_argument("--measured", action="append", type=_measured, default=[], metavar="NAME=VALUE", help=own)
+    yours = "What you measured yourself of the kit's predictions, by scale, scope or meter; may be given several times."
+    parser.add_argument("--measured", action="append", type=_measured, default=[], metavar="NAME=VALUE", help=yours)
     parser.add_argument("--json", action="store_true", help="Print one JSON object at the end, and nothing before it.")
 
 
@@ -81,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     skin = bring_up_skin(kit)
     if args.skin_output:
         return _write_skin(kit, skin, args.skin_output)
-    predicted = predictions.load(kit) if (kit.folder / predictions.FILE).exists() else {}
+    predicted = predictions.load(kit)
     _check_names(args.measured, predicted)
     when = datetime.date.today()
     path = outputs.file(args.output or f"bringup-{kit.name}-{when.isoformat()}.md")
@@ -114,8 +116,8 @@ def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
     )
     board = kit.board.name
     terminal.say(
-        f"{path} is written. Next: contactfpga build {board} --skin {path}, contactfpga flash {board}, then contactfpga "
-        f"bringup --kit {kit.name}",
+        f"{path} is written. Next: contactfpga build {board} --skin {path}, contactfpga flash {board}, then "
+        f"contactfpga bringup --kit {kit.name}",
         hang=2,
     )
     return 0
@@ -159,8 +161,8 @@ def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
         if skin.report != "cells":
             report.skin = skin
             report.left_out.append(
-                f"switches, bounce, settle times and circuit: the board sends zones; `contactfpga bringup --kit {kit.name} "
-                "--skin-output FILE` writes the Skin that sends cells, then build and flash it"
+                "switches, bounce, settle times and circuit: the board sends zones; `contactfpga bringup --kit "
+                f"{kit.name} --skin-output FILE` writes the Skin that sends cells, then build and flash it"
             )
         bench = Bench(board, skin, person, load_circuit(kit.skin_path), args.seconds or 1.0, args.timeout)
         if _closing(args.measured):
@@ -197,7 +199,8 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
     from contactfpga_sim.model.scenes.hand import Hand
 
     hand = Hand(skin.rows, skin.columns)
-    return _Hand(hand), VirtualBoard(skin, hand, circuit=load_circuit(kit.skin_path))
+    circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
+    return _Hand(hand), VirtualBoard(skin, hand, circuit=circuit)
 
 
 class _Hand:

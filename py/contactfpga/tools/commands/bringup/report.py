@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from contactfpga import __version__
-from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit
+from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit, FittedValue
 from contactfpga.design.cover.fitted import FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
@@ -17,8 +17,8 @@ from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup.steps import Step
 
 NOT_FITTED = (
-    "[cover] is not fitted: a board does not feel forces. Press single switches through a kitchen scale until they close, "
-    "and give three forces or more of the kit's predictions: --measured closing_0_n=0.42 --measured closing_0_n=0.38 ..."
+    "[cover] is not fitted: a board does not feel forces. Lay the sheet on a kitchen scale, press a fingertip on one "
+    "switch after the other, and give three or more of the forces at which they close: --measured closing_0_n=0.42 ..."
 )
 
 
@@ -99,12 +99,12 @@ class Report:
                 }
                 for one in self.grades
             ],
-            "circuit": {
-                one.name: {"value": one.value, "low": one.low, "high": one.high}
-                for one in (self.fitted.values if self.fitted else ())
-            },
+            "circuit": {one.name: {"value": one.value, "low": one.low, "high": one.high} for one in self._circuit()},
             "switch_force_n": None if self.force is None else dataclasses.asdict(self.force),
         }
+
+    def _circuit(self) -> list[FittedValue]:
+        return [one for one in self.fitted.values if one.told] if self.fitted is not None else []
 
     def to_markdown(self) -> str:
         """The file."""
@@ -136,9 +136,7 @@ class Report:
             yield f"\nNot measured: {', '.join(one.name for one in self.not_measured)}."
 
     def _tables(self) -> Iterable[str]:
-        rows = [
-            ("circuit", one.name, one.value, one.low, one.high) for one in (self.fitted.values if self.fitted else ())
-        ]
+        rows = [("circuit", one.name, one.value, one.low, one.high) for one in self._circuit()]
         if self.force is not None:
             rows.append(("cover.switch", "force_n", self.force.value, self.force.low, self.force.high))
         if rows:

@@ -10,6 +10,7 @@ import numpy as np
 
 from contactfpga.design.circuit import Circuit, CircuitError
 from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit, SettleReading, fit_circuit
+from contactfpga.design.circuit.values import LIMITS
 from contactfpga.driver import health
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
@@ -200,8 +201,8 @@ class _Alike:
 
     def __init__(self) -> None:
         self._last: np.ndarray | None = None
-        self._differ: list[np.ndarray] = []
-        self._seen: list[np.ndarray] = []
+        self._differ: list[np.ndarray] | None = None
+        self._seen: list[np.ndarray] | None = None
 
     def take(self, zones: Zones) -> None:
         """One more frame."""
@@ -209,14 +210,15 @@ class _Alike:
         if self._last is not None and (zones.cells == self._last).all():
             return
         self._last = zones.cells
-        each: list[np.ndarray] = [(lines[:, None] != lines[None]).any(axis=2) for lines in (zones.cells, zones.cells.T)]
-        seen: list[np.ndarray] = [lines.any(axis=1) for lines in (zones.cells, zones.cells.T)]
-        self._differ = [before | now for before, now in zip(self._differ or each, each, strict=True)]
+        ways = (zones.cells, zones.cells.T)
+        differ = [np.asarray((lines[:, None] != lines[None]).any(axis=2)) for lines in ways]
+        seen = [np.asarray(lines.any(axis=1)) for lines in ways]
+        self._differ = [before | now for before, now in zip(self._differ or differ, differ, strict=True)]
         self._seen = [before | now for before, now in zip(self._seen or seen, seen, strict=True)]
 
     def sentences(self) -> Iterator[str]:
         """What to say of them."""
-        for name, differ, seen in zip(("rows", "columns"), self._differ, self._seen, strict=True):
+        for name, differ, seen in zip(("rows", "columns"), self._differ or (), self._seen or ()):
             same = np.triu(~differ & seen[:, None] & seen[None], 1)
             for one, other in np.argwhere(same).tolist():
                 yield f"{name} {one} and {other} always read alike: joined, by solder or a short circuit"
@@ -379,18 +381,25 @@ def circuit(bench: Bench) -> Step:
     except ContactFPGAError as error:
         found.append(Finding("note", f"[circuit] is not fitted: {error}"))
         return Step("circuit", tuple(found))
+    told = {}
     for one in bench.fitted.values:
+        if not one.told:
+            unit = LIMITS[one.name][2]
+            vague = f"{one.name} cannot be told better than {one.low:.4g} to {one.high:.4g} {unit} with this clock"
+            found.append(Finding("note", vague))
+            continue
+        told[one.name] = one.value
         given = getattr(bench.stated, one.name)
         inside = "as stated" if one.low <= given <= one.high else f"not the {given:g} that the kit states"
         found.append(Finding("ok", f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}), {inside}"))
     if len(bench.fitted.values) < 2:
         found.append(Finding("note", "switch_ohm cannot be told from one settle image; it was taken as stated"))
-    return Step("circuit", tuple(found), {one.name: one.value for one in bench.fitted.values})
+    return Step("circuit", tuple(found), told)
 
 
 def _reading(image: Settling, broken: Sequence[int], guard: bool) -> SettleReading:
-    """Rows with as many pressed switches as most; lines that are slow or broken say nothing of the others. ``guard``: each
-    row pulls a guard column too."""
+    """Rows with as many pressed switches as most; lines that are slow or broken say nothing of the others. ``guard``:
+    each row pulls a guard column too."""
     counts = (image.clocks > 0).sum(axis=1)
     usual = int(np.bincount(counts[counts > 0]).argmax())
     clocks, slow = image.clocks.copy(), image.slow()
