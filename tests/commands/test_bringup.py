@@ -157,8 +157,11 @@ def test_without_a_board_the_report_says_so(tmp_path, capsys):
     path = tmp_path / "report.md"
     arguments = ["bringup", "--kit", "starter", str(tmp_path / "ttyNone"), "--output", str(path), "--yes"]
     assert cli.main(arguments) == 1
-    assert "stop  there is no board to ask" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "stop  there is no board to ask" in said
+    assert "ttyNone" in said
     assert "The bring-up stops here: there is no board to ask." in path.read_text()
+    assert str(tmp_path) not in path.read_text()
 
 
 @pytest.mark.parametrize("name", kits.names())

@@ -37,8 +37,10 @@ EXTRA = None
 
 CLOSING = re.compile(r"closing_\w+_n")
 """Names of predictions that are forces at which a switch closes."""
-SECONDS = 60.0
+SECONDS = 300.0
 """That each step which asks for a touch lasts at most, where the user names no time."""
+COUNTED_S = 2.0
+"""Over which frames of an untouched sheet are counted."""
 STUCK_S, REST_S = 10.0, 1.0
 """Of a person, see :class:`Person`."""
 REHEARSAL = "sim://"
@@ -57,7 +59,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
     parser.add_argument("--skin-output", metavar="FILE", help=own)
     parser.add_argument("--output", metavar="FILE", help="The report (default: bringup-NAME-DATE.md).")
-    long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends the bring-up."
+    long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends such a step."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
     wait = "Seconds to wait for the board (default: 1)."
     parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
@@ -88,9 +90,9 @@ def run(args: argparse.Namespace) -> int:
     when = datetime.date.today()
     path = outputs.file(args.output or f"bringup-{kit.name}-{when.isoformat()}.md")
     report = Report(kit, skin, when)
+    report.force = _force(kit, predicted, args.measured)
     with interrupt.usual_end():
         _lead(args, kit, report)
-    report.force = _force(kit, predicted, args.measured)
     measured = {name: value for step in report.steps for name, value in step.measured.items()} | _medians(args.measured)
     report.grades = graded(predicted, measured)
     report.not_measured = [one for name, one in predicted.items() if name not in measured]
@@ -154,7 +156,12 @@ def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
     try:
         board, person = _opened(args, kit, report.skin)
     except (ContactFPGAError, OSError) as error:
-        _add(args, report, Step("supply and link", (Finding("fault", str(error)),), stop="there is no board to ask"))
+        _add(
+            args,
+            report,
+            Step("supply and link", (Finding("fault", str(error)),), stop="there is no board to ask"),
+            args.port or "",
+        )
         return
     with board:
         skin = board.skin
@@ -164,7 +171,7 @@ def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
                 "switches, bounce, settle times and circuit: the board sends zones; `contactfpga bringup --kit "
                 f"{kit.name} --skin-output FILE` writes the Skin that sends cells, then build and flash it"
             )
-        bench = Bench(board, skin, person, load_circuit(kit.skin_path), args.seconds or 1.0, args.timeout)
+        bench = Bench(board, skin, person, load_circuit(kit.skin_path), COUNTED_S, args.timeout)
         if _closing(args.measured):
             bench.probability = math.sqrt(PROBABILITY)  # the other half of the doubt is the cover's
         if isinstance(person, _Hand):
@@ -227,25 +234,25 @@ class _Reader:
     def asked(self, does: str, words: str) -> float:
         """See :class:`Person`."""
         waits = not self._args.yes and sys.stdin.isatty()
-        terminal.say(f"      {words}{' Enter when you are ready.' if waits else ''}", sys.stderr, hang=6)
+        enter = " Enter when you are ready;" if waits else ""
+        terminal.say(f"      {words}{enter} Ctrl-C ends the step.", sys.stderr, hang=6)
         if waits:
             input()
         return self._args.seconds or SECONDS
 
 
-def _add(args: argparse.Namespace, report: Report, step: Step, port: str = "") -> None:
-    """Take down a step, and show it."""
+def _add(args: argparse.Namespace, report: Report, step: Step, port: str) -> None:
+    """Take down a step, without the port's name, and show it."""
+    if not args.json:
+        terminal.say(f"{len(report.steps) + 1}. {step.name}")
+        for finding in step.findings:
+            terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
+        if step.stop:
+            terminal.say(f"stop  {step.stop}", hang=6)
+    plain = step.findings
     if port:
         plain = tuple(one._replace(sentence=one.sentence.replace(port, "the board")) for one in step.findings)
-        step = Step(step.name, plain, step.measured, step.stop)
-    report.steps.append(step)
-    if args.json:
-        return
-    terminal.say(f"{len(report.steps)}. {step.name}")
-    for finding in step.findings:
-        terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
-    if step.stop:
-        terminal.say(f"stop  {step.stop}", hang=6)
+    report.steps.append(Step(step.name, plain, step.measured, step.stop))
 
 
 def _show_end(report: Report, path: str) -> None:

@@ -16,12 +16,13 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, ReadTimeout
 from contactfpga.instruments.bounce import Bounce
-from contactfpga.instruments.self_test import LineFinding, SelfTest, untried
+from contactfpga.instruments.self_test import LineFinding, untried
 from contactfpga.instruments.settling import NEAR, Settling
 from contactfpga.instruments.watch import Watch, named, places
 from contactfpga.skin import Skin
 from contactfpga.tools.commands import doctor
 from contactfpga.tools.commands.wire import settle
+from contactfpga.tools.console import interrupt
 from contactfpga.zones.zone import Zones
 
 READS = 50
@@ -229,14 +230,15 @@ def diodes(bench: Bench) -> Step:
     seconds = bench.person.asked(
         "ruler", "Press a ruler's edge along each column, one after the other, half a second each."
     )
-    known: dict[LineFinding, None] = {}
-    pressed: frozenset[tuple[int, int]] = frozenset()
-    until_s, last = bench.board.clock() + seconds, None
-    while bench.board.clock() < until_s and (last is None or untried(last, pressed)):
-        last = bench.board.self_test(max(2.0, bench.timeout))
-        pressed |= last.pressed
-        known |= dict.fromkeys(last.findings)
-    assert isinstance(last, SelfTest)
+    last = bench.board.self_test(max(2.0, bench.timeout))
+    known: dict[LineFinding, None] = dict.fromkeys(last.findings)
+    pressed = last.pressed
+    until_s = bench.board.clock() + seconds
+    with interrupt.usual_end():
+        while bench.board.clock() < until_s and untried(last, pressed):
+            last = bench.board.self_test(max(2.0, bench.timeout))
+            pressed |= last.pressed
+            known |= dict.fromkeys(last.findings)
     found = [doctor.tested(finding) for finding in known]
     if left := untried(last, pressed):
         found.append(
@@ -280,16 +282,17 @@ def bounce(bench: Bench) -> Step:
 
 
 def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: Callable[[], bool]) -> None:
-    """Give frames for these seconds of device time, or until what is wanted was seen as a whole and rests."""
+    """Give frames for these seconds of device time, until Ctrl-C, or until all that is wanted was seen and rests."""
     zones = bench.board.latest(bench.timeout)
     first_us = rest_us = zones.time_us
-    while zones.time_us - first_us < 1e6 * seconds:
-        take(zones)
-        if zones.pressed or not whole():
-            rest_us = zones.time_us
-        if zones.time_us - rest_us > 1e6 * bench.person.rest_s:
-            return
-        zones = bench.board.next(bench.timeout)
+    with interrupt.usual_end():
+        while zones.time_us - first_us < 1e6 * seconds:
+            take(zones)
+            if zones.pressed or not whole():
+                rest_us = zones.time_us
+            if zones.time_us - rest_us > 1e6 * bench.person.rest_s:
+                return
+            zones = bench.board.next(bench.timeout)
 
 
 # ---- times
