@@ -6,7 +6,7 @@ import sys
 import tomllib
 
 import pytest
-from planted import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, drawn, faults_of
+from planted_sheets import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, drawn, faults_of
 
 from contactfpga import Skin
 from contactfpga.design import kits, predictions
@@ -201,6 +201,13 @@ def test_closing_forces_are_fitted_and_graded(tmp_path, capsys):
     assert "[cover.switch]\nforce_n = 0.44 " in path.read_text()
     assert cli.main([*arguments, *forces[:2]]) == 1
     assert "2 closing forces were measured; 3 are needed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "settle_us", "=1", "settle_us=", "settle_us=nan", "settle_us=1e400", "1=x"])
+def test_what_is_no_name_and_number_is_refused(text, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["bringup", "--kit", "fast", f"--measured={text}"])
+    assert f"argument --measured: '{text}' must be NAME=VALUE, with a finite number" in capsys.readouterr().err
 
 
 def prediction(**values):

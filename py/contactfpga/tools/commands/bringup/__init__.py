@@ -73,7 +73,7 @@ def _measured(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
     number = number_in(value) if equals and name else math.nan
     if not math.isfinite(number):
-        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} is no NAME=VALUE, such as closing_0_n=0.42")
+        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} must be NAME=VALUE, with a finite number")
     return name, number
 
 
