@@ -9,6 +9,7 @@ import pytest
 
 from contactfpga.boards import BOARDS, pll
 from contactfpga.boards.spec import bitstream_path
+from contactfpga.design import kits
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_hdl.board import build, placed, tools
@@ -35,6 +36,16 @@ def test_the_default_sheet_fits_and_meets_its_timing(name, tmp_path, capsys):
     assert bitstream.stat().st_size > 30_000
     assert f"bitstream    {bitstream}" in capsys.readouterr().out
     assert Skin.load(tmp_path / "skin.toml") == board.skin
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("name", kits.names())
+def test_a_kit_fits_and_meets_its_timing(name, tmp_path):
+    kit = kits.kit(name)
+    assert cli.main(["build", "--kit", name, "--output", str(tmp_path)]) == 0
+    found = placed.read(tmp_path, build.LOG)
+    assert found.fmax_mhz > MARGINS[kit.board.name] * found.needed_mhz
+    assert Skin.load(tmp_path / "skin.toml") == kit.skin
 
 
 @pytest.mark.timeout(600)

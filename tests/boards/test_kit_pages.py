@@ -35,6 +35,7 @@ def test_a_kit_has_predictions_of_each_model(name):
         assert re.fullmatch("[0-9a-f]{8}", one.commit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", kits.names())
 def test_predictions_are_what_is_computed_today(name):
     """The cheap ones, each by other means than the file's: circuit by its model, times by a part of the touches."""

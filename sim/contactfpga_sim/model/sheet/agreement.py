@@ -135,13 +135,14 @@ def installed() -> bool:
     return shutil.which("ngspice") is not None
 
 
-def run(phase: Phase, seconds: float, steps: int = 2000) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) seconds and (n, lines) volts under the phase's last drive."""
+def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) seconds and (n, lines) volts under the phase's last drive; ``celsius``: of the diodes, which our model has
+    at 27."""
     if not installed():
         raise MissingTool("the comparison", "ngspice", "apt install ngspice")
     with tempfile.TemporaryDirectory() as folder:
         deck, table = Path(folder, "sheet.cir"), Path(folder, "volts.txt")
-        deck.write_text(netlist(phase, seconds, steps, table), encoding="ascii")
+        deck.write_text(netlist(phase, seconds, steps, table, celsius), encoding="ascii")
         done = subprocess.run(
             ["ngspice", "-b", deck.name], cwd=folder, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
@@ -154,7 +155,11 @@ def run(phase: Phase, seconds: float, steps: int = 2000) -> tuple[np.ndarray, np
     return times[after], volts[after]
 
 
-def netlist(phase: Phase, seconds: float, steps: int, table: Path) -> str:
+SCHOTTKY_GAP = "EG=0.69 XTI=2"
+"""By which SPICE makes a Schottky diode's current follow its temperature; at 27 degrees Celsius it changes nothing."""
+
+
+def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: float = 27.0) -> str:
     """The deck: it comes to rest under the first drive, and writes time and volts of all lines."""
     lines = phase.network.rows + phase.network.columns
     end = sum(phase.seconds) + seconds
@@ -163,9 +168,10 @@ def netlist(phase: Phase, seconds: float, steps: int, table: Path) -> str:
     return "\n".join(
         [
             f"* {phase.name}",
-            ".options reltol=1e-4 method=gear",
+            f".options reltol=1e-4 method=gear temp={celsius}",
             f".model junction D(IS={diode.saturation_a} N={diode.emission} RS={diode.series_ohm} "
-            f"CJO={diode.junction_pf}p VJ={diode.junction_v} M={diode.grading} FC=0.5 TT=0 BV=1000)",
+            f"CJO={diode.junction_pf}p VJ={diode.junction_v} M={diode.grading} FC=0.5 TT=0 BV=1000 "
+            f"{SCHOTTKY_GAP if diode.emission < 1.3 else ''})",
             f".model pin SW(RON={phase.network.circuit.drive_ohm} ROFF={OPEN_OHM} VT=0.5 VH=0)",
             *_parts(phase.network),
             *_pins(phase),
