@@ -14,7 +14,7 @@ from contactfpga.design.circuit import Circuit, load_circuit
 from contactfpga.design.predictions import Prediction
 from contactfpga.tools import cli
 from contactfpga.tools.commands import bringup
-from contactfpga.tools.commands.bringup import report, steps
+from contactfpga.tools.commands.bringup import report, steps, times
 from contactfpga_sim.model.sheet.matrix import Shorts
 
 CASES = {
@@ -97,7 +97,7 @@ def test_a_sound_sheet_that_tests_itself_passes_all_steps():
 
 def test_slow_lines_are_named_and_left_out_of_the_fit():
     found, bench = brought_up(
-        Faults(slow_columns=(2,)), circuit=CIRCUIT, scatter=0.03, only=[steps.settling, steps.circuit]
+        Faults(slow_columns=(2,)), circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit]
     )
     assert faults_of(found) == ["slow column 2: a long or thin line, a cold joint, or a weak pin"]
     assert bench.fitted.rows == 8
@@ -106,7 +106,7 @@ def test_slow_lines_are_named_and_left_out_of_the_fit():
 
 def test_the_fit_covers_what_was_planted():
     planted = CIRCUIT.replace(line_pf=190, switch_ohm=1500)
-    found, bench = brought_up(circuit=planted, scatter=0.04, only=[steps.settling, steps.circuit], stated=CIRCUIT)
+    found, bench = brought_up(circuit=planted, scatter=0.04, only=[times.settling, times.circuit], stated=CIRCUIT)
     line, switch = bench.fitted.values
     assert (line.name, switch.name) == ("line_pf", "switch_ohm")
     assert line.low <= 190 <= line.high < 1.5 * line.low
@@ -233,7 +233,7 @@ def test_predictions_are_graded(measured, verdict):
 
 
 def test_the_report_holds_what_was_found_and_fitted():
-    found, bench = brought_up(circuit=CIRCUIT, scatter=0.03, only=[steps.settling, steps.circuit])
+    found, bench = brought_up(circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit])
     made = report.Report(kits.kit("starter"), SKIN, datetime.date(2026, 11, 24))
     made.steps, made.fitted = [*found.values()], bench.fitted
     made.grades = report.graded({"settle_us": prediction(high=99.0)}, found["settle times"].measured)

@@ -8,6 +8,7 @@ import contactfpga
 from contactfpga import Skin
 from contactfpga.design.circuit import Circuit
 from contactfpga.tools.commands.bringup import steps
+from contactfpga.tools.commands.bringup.bench import Bench
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.scenes.hand import Hand
 from contactfpga_sim.model.sheet.matrix import Shorts
@@ -116,7 +117,7 @@ def brought_up(faults=None, skin=SKIN, circuit=None, scatter=0.0, seed=0, only=N
     rng = np.random.default_rng(seed)
     port = PlantedBoard(skin, faults or Faults(), circuit, scatter, rng)
     with contactfpga.open(port, skin=skin) as board:
-        bench = steps.Bench(board, skin, Person(port.hand), stated or circuit, seconds=0.05)
+        bench = Bench(board, skin, Person(port.hand), stated or circuit, seconds=0.05)
         found = [step(bench) for step in only] if only else list(steps.run(bench))
     return {step.name: step for step in found}, bench
 

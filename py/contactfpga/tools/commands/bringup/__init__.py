@@ -29,8 +29,8 @@ from contactfpga.inputs.files import write_text
 from contactfpga.inputs.values import number_in
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup import steps
+from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
 from contactfpga.tools.commands.bringup.report import Report, graded
-from contactfpga.tools.commands.bringup.steps import Bench, Person, Step
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
 
 EXTRA = None

@@ -14,7 +14,7 @@ from contactfpga.design.cover.fitted import FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.skin import Skin
-from contactfpga.tools.commands.bringup.steps import Step
+from contactfpga.tools.commands.bringup.bench import Step
 
 NOT_FITTED = (
     "[cover] is not fitted: a board does not feel forces. Lay the sheet on a kitchen scale, press a fingertip on one "
