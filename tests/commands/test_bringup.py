@@ -7,6 +7,7 @@ import tomllib
 
 import pytest
 from planted_sheets import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, drawn, faults_of
+from sample import sample
 
 from contactfpga import Skin
 from contactfpga.design import kits, predictions
@@ -28,7 +29,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+QUICK = {"nothing", "open row", "dead cell", "bouncing switch"}
+
+
+@pytest.mark.parametrize("name", sample(CASES, quick=QUICK, slow={*CASES} - QUICK))
 def test_a_fault_is_found_and_named_and_no_other(name):
     faults, expected = CASES[name]
     found, _ = brought_up(faults, only=[steps.link, steps.lines, steps.switches, steps.bounce])
@@ -38,6 +42,7 @@ def test_a_fault_is_found_and_named_and_no_other(name):
     assert not any(step.stop for step in found.values())
 
 
+@pytest.mark.slow
 def test_columns_that_are_joined_read_alike():
     found, _ = brought_up(Faults(shorts=Shorts(columns=((2, 3),))), only=[steps.link, steps.lines, steps.switches])
     assert "columns 2 and 3 always read alike: joined, by solder or a short circuit" in faults_of(found)
@@ -55,6 +60,7 @@ def test_a_sheet_that_is_not_plugged_in_ends_it():
     assert found["lines"].stop.startswith("no line answers at all: look at the sheet's supply")
 
 
+@pytest.mark.slow
 def test_a_link_that_loses_is_a_fault_and_one_that_loses_much_ends_it():
     found, _ = brought_up(Faults(lost=0.001), only=[steps.link])
     assert any(" lost, " in one for one in faults_of(found))
@@ -95,6 +101,7 @@ def test_a_sound_sheet_that_tests_itself_passes_all_steps():
     assert found["diodes"].findings[-1].sentence == "no diode is bridged"
 
 
+@pytest.mark.slow
 def test_slow_lines_are_named_and_left_out_of_the_fit():
     found, bench = brought_up(
         Faults(slow_columns=(2,)), circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit]
@@ -232,6 +239,7 @@ def test_predictions_are_graded(measured, verdict):
     assert [one.verdict for one in found] == ([] if verdict is None else [verdict])
 
 
+@pytest.mark.slow
 def test_the_report_holds_what_was_found_and_fitted():
     found, bench = brought_up(circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit])
     made = report.Report(kits.kit("starter"), SKIN, datetime.date(2026, 11, 24))
