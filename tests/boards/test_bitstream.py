@@ -69,7 +69,7 @@ def test_64x64_on_shift_registers_fits_the_icebreaker(tmp_path):
     assert cli.main(["build", "icebreaker", "--skin", str(example), "--output", str(tmp_path)]) == 0
     found = placed.read(tmp_path, build.LOG)
     assert found.fmax_mhz > 1.5 * found.needed_mhz
-    page = (example.parents[2] / "docs" / "boards.md").read_text()
+    page = (example.parents[1] / "docs" / "boards.md").read_text()
     assert f"| {found.block_rams[0]} of {found.block_rams[1]} | " in page
 
 

@@ -8,6 +8,8 @@ import pytest
 from sample import sample
 from study_pages import outdated
 
+from contactfpga.boards import find
+from contactfpga.design import buildable
 from contactfpga.design.circuit import load_checked, needed
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.maker import schematic, tables
@@ -45,3 +47,5 @@ def test_the_pages_skin_works_with_its_circuit(tmp_path):
     needs = needed(circuit, skin.rows, skin.columns)
     assert needs.pulled_release.us(1.3) <= skin.release_us
     assert needs.settle.us(1.3) <= skin.settle_us
+    (board,) = re.findall(r"contactfpga build (\w+) --skin my.toml", PAGE.read_text(encoding="utf-8"))
+    assert not any(buildable.findings(find(board), find(board).load(file), circuit).values())
