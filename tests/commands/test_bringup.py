@@ -135,11 +135,12 @@ def test_200_planted_sheets_are_found_out():
         found, bench = brought_up(faults, LARGE, circuit, SCATTER, seed, stated=CIRCUIT)
         said = faults_of(found)
         assert all(any(begin in one for one in said) for begin in expected), (seed, name, said)
-        assert all(any(begin in one for begin in expected) for one in said), (seed, name, said)
+        known = [*expected, *["leaves too little room"] * name.startswith("slow")]
+        assert all(any(begin in one for begin in known) for one in said), (seed, name, said)
         values = bench.fitted.values
         assert len(values) == 2, (seed, name)
         covered.append(all(one.low <= getattr(circuit, one.name) <= one.high for one in values))
-    assert 0.93 <= sum(covered) / SHEETS <= 0.97
+    assert 0.92 <= sum(covered) / SHEETS <= 0.98, "two standard deviations of the share about 95 %"
 
 
 # ---- the command

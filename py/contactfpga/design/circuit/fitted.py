@@ -29,6 +29,8 @@ LEAST_LINES = 3
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
 """Of Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares. Times of the
 model jump by some 1e-4, as its steps in time do."""
+NEARLY = 0.02
+"""The change at which it ends where it does not come to rest; intervals are several times wider."""
 DRAWS = 20_000
 """By which the factor of the intervals is found."""
 HARMONICS = 6
@@ -158,7 +160,7 @@ def _solved(times: object, start: np.ndarray, goal: np.ndarray, names: Sequence[
     """The values whose logarithms of times are those of ``goal``, and how these change with the values."""
     values = start.astype(float)
     low, high = (np.array([LIMITS[name][end] for name in names], float) for end in (0, 1))
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         now = times(values)  # type: ignore[operator]
         slopes = np.empty((len(values), len(values)))
         for index in range(len(values)):
@@ -167,7 +169,8 @@ def _solved(times: object, start: np.ndarray, goal: np.ndarray, names: Sequence[
             slopes[:, index] = (times(moved) - now) / (moved[index] - values[index])  # type: ignore[operator]
         step = np.linalg.solve(slopes, goal - now)
         wanted = np.clip(values + step, np.maximum(low, values / 4), np.minimum(high, 4 * values))
-        done = bool((np.abs(wanted - values) <= CLOSE * values).all())
+        close = CLOSE if number < ROUNDS // 2 else NEARLY
+        done = bool((np.abs(wanted - values) <= close * values).all())
         values = wanted
         if done:
             break
@@ -191,7 +194,8 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
     """Of the mean of (rows, columns) of cells that rows and columns move, and its degrees of freedom after
-    Satterthwaite: analysis of variance in two ways. Lines that scatter no more than their cells make them are taken not to scatter."""
+    Satterthwaite: analysis of variance in two ways. Lines that scatter no more than their cells make them are taken not
+    to scatter."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean
