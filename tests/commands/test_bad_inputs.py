@@ -255,7 +255,7 @@ def numeric_options():
         for action in parser._actions:
             if action.type is not None and not action.choices:
                 assert action.type not in (int, float), f"{words} {action.option_strings}: say a range"
-                if action.dest != "joint":  # a name and a number, which has tests of its own
+                if action.dest not in ("joint", "measured"):  # a name and a number, which have tests of their own
                     found.append((words, action.option_strings[0], action.nargs or 1))
 
     walk(cli._parser(), [])

@@ -23,6 +23,7 @@ COMMANDS = {
     "wire": "Show the pressed cells live, to check wiring, bounce and settle times.",
     "board": "Run the virtual board on a pseudo-terminal.",
     "doctor": "Find out what is wrong between this computer and the board.",
+    "bringup": "Lead through the first power-up of a kit, and write a report of it.",
     "build": "Build a bitstream for a board; print its wiring.",
     "flash": "Write a bitstream to a board.",
     "latency": "Measure the time from a touch to the last byte, through USB and to your code, on simulated gateware.",

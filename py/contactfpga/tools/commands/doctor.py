@@ -176,15 +176,15 @@ def _watch(args: argparse.Namespace) -> int:
             for suspicion in watch.update(zones):
                 found.append(suspicion)
                 if not silent:
-                    _say(_suspected(suspicion))
+                    _say(suspected(suspicion))
 
         def render(zones: Zones, room: Any) -> Any:
             from contactfpga.tools.console import views  # rich, which scripts do without
 
-            return views.watch_view(board, watch, [_line(_suspected(one)) for one in found], zones, room)
+            return views.watch_view(board, watch, [_line(suspected(one)) for one in found], zones, room)
 
         seconds, end = live.follow(board, args, take, None if args.json else render)
-        findings = [*map(_suspected, found), *_coverage(watch), *_without_mask(skin), *end]
+        findings = [*map(suspected, found), *_coverage(watch), *_without_mask(skin), *end]
     mask_line = watch.mask_line
     faults = sum(finding.verdict == "fault" for finding in findings)
     if args.json:
@@ -198,7 +198,8 @@ def _watch(args: argparse.Namespace) -> int:
     return min(faults, 1)
 
 
-def _suspected(suspicion: Suspicion) -> Finding:
+def suspected(suspicion: Suspicion) -> Finding:
+    """What a watch noticed."""
     return Finding("fault" if suspicion.kind in FAULTS else "note", suspicion.sentence)
 
 
@@ -209,7 +210,7 @@ def _coverage(watch: Watch) -> list[Finding]:
     if not seen.any():
         return [Finding("fault", "no switch read pressed; was the sheet touched?")]
     if never:
-        return [Finding("fault", f"{_dark(seen, never)} never read pressed: not touched, or dead")]
+        return [Finding("fault", f"{dark(seen, never)} never read pressed: not touched, or dead")]
     return [Finding("ok", "every switch read pressed at least once")]
 
 
@@ -219,8 +220,9 @@ def _without_mask(skin: Skin | None) -> list[Finding]:
     return [Finding("note", "the mask of this board is not known, so absent switches look dead; give --skin FILE")]
 
 
-def _dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
-    """Whole lines first: these are broken wires rather than dead switches."""
+def dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
+    """The names of switches that ``never`` read pressed, of all that were ``seen``. Whole lines first:
+    these are broken wires rather than dead switches."""
     rows = sorted({row for row, _ in never if not seen[row].any()})
     columns = sorted({column for _, column in never if not seen[:, column].any()})
     left = [(row, column) for row, column in never if row not in rows and column not in columns]
@@ -258,11 +260,11 @@ def _self_test(args: argparse.Namespace) -> int:
                 if finding not in known:
                     known.append(finding)
                     if not args.json:
-                        _say(_tested(finding))
+                        _say(tested(finding))
         end = _tests_end(known, tests, pressed, last)
     faults = sum(finding.kind == "fault" for finding in known)
     if args.json:
-        found = [finding._asdict() for finding in [*map(_tested, known), *end]]
+        found = [finding._asdict() for finding in [*map(tested, known), *end]]
         answer = {"faults": faults, "findings": found, "tests": tests, "pressed": sorted(pressed)}
         print(json.dumps(answer), flush=True)
         return min(faults, 1)
@@ -294,5 +296,6 @@ def _tests_end(
         yield Finding("ok", "every switch was pressed in a self-test")
 
 
-def _tested(finding: LineFinding) -> Finding:
+def tested(finding: LineFinding) -> Finding:
+    """What a self-test found."""
     return Finding("fault" if finding.kind == "fault" else "note", finding.sentence)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,14 +31,15 @@ STEPS = 10
 def measure(board: Board, args: argparse.Namespace) -> int:
     """Measure for ``args.seconds`` of device time or until Ctrl-C; status 1 when nothing was measured."""
     skin = bare_skin(board, "what one frame shows")
-    found = _settling(board, skin)
+    found = settling(board, skin)
     board.sample_at(0, args.timeout)  # refuses what cannot be measured before anything is asked of the user
     if not args.json:
         terminal.say(
             f"Press every place of {board.port} for a moment, or lay a plate on the sheet. Ctrl-C ends the measurement."
         )
 
-    seconds, end = _follow(board, args, found, None if args.json else lambda _, room: _view(found, skin, room))
+    render = None if args.json else lambda _, room: _view(found, skin, room)
+    seconds, end = follow(board, found, args.timeout, args.seconds, render)
     if args.json:
         print(json.dumps(_answer(found, skin, seconds, end)), flush=True)
     else:
@@ -45,7 +47,9 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     return 0 if (found.clocks > 0).any() else 1
 
 
-def _settling(board: Board, skin: Skin) -> Settling:
+def settling(board: Board, skin: Skin) -> Settling:
+    """What frames of this board are given to; raises :class:`ContactFPGAError` for a Skin that leaves nothing to
+    measure."""
     derived = skin.derived
     first, settle = derived.first_sample_clocks, derived.settle_clocks
     if settle <= first:
@@ -56,32 +60,37 @@ def _settling(board: Board, skin: Skin) -> Settling:
     return Settling((skin.rows, skin.columns), first, settle, skips=skin.reads_rows, guard=skin.guard)
 
 
-def _follow(
-    board: Board, args: argparse.Namespace, found: Settling, render: live.Render | None
+def follow(
+    board: Board,
+    found: Settling,
+    timeout: float,
+    seconds: float | None = None,
+    render: live.Render | None = None,
+    enough: Callable[[], bool] = lambda: False,
 ) -> tuple[float, list[Finding]]:
-    """Measure until the end, and leave the board as it was; returns the seconds that it took and what is to be said of
-    the end."""
+    """Measure for these seconds of device time, until it is ``enough`` or until Ctrl-C, and leave the board as it was;
+    returns the seconds that it took and what is to be said of the end. ``timeout`` in s, of each frame."""
     findings: list[Finding] = []
-    zones, past_us = board.sample_at(0, args.timeout), 0
+    zones, past_us = board.sample_at(0, timeout), 0
     found.start(_cells(zones))
     with live.shown(render) as show:
         try:
             with interrupt.usual_end():
-                while args.seconds is None or past_us < args.seconds * 1e6:
+                while (seconds is None or past_us < seconds * 1e6) and not enough():
                     clocks, before = found.next_clocks(), zones
                     if clocks is None:
-                        zones = board.sample_at(0, args.timeout)
+                        zones = board.sample_at(0, timeout)
                         found.start(_cells(zones))
                     else:
-                        early = board.sample_at(clocks, args.timeout)
-                        zones = board.sample_at(0, args.timeout)
+                        early = board.sample_at(clocks, timeout)
+                        zones = board.sample_at(0, timeout)
                         found.take(clocks, _cells(early), _cells(zones))
                     past_us += max(0, zones.time_us - before.time_us)  # a board that starts again begins at 0
                     show(zones)
         except (PortLost, ReadTimeout, NoSuchCommand) as error:  # what was found is worth having all the same
             findings.append(Finding("fault", str(error)))
         finally:
-            findings += _restored(board, args.timeout)
+            findings += _restored(board, timeout)
     return past_us / 1e6, findings
 
 

@@ -1,0 +1,266 @@
+"""`contactfpga bringup`: leads through the first power-up of a kit, and writes what was found into one file."""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import math
+import re
+import statistics
+import sys
+from collections.abc import Iterator
+
+from contactfpga import terminal
+from contactfpga.design import kits, predictions
+from contactfpga.design.circuit import load_circuit
+from contactfpga.design.circuit.fitted import PROBABILITY
+from contactfpga.design.cover import load_cover
+from contactfpga.design.cover.fitted import FittedForce, fit_force
+from contactfpga.design.kits import Kit
+from contactfpga.design.sheet import lay_out
+from contactfpga.design.sheet.extract import extracted
+from contactfpga.driver import driver
+from contactfpga.driver.board import Board
+from contactfpga.driver.health import Finding
+from contactfpga.driver.transport import SimulatedPort
+from contactfpga.errors import ContactFPGAError, SkinMismatch
+from contactfpga.inputs.files import write_text
+from contactfpga.inputs.values import number_in
+from contactfpga.skin import Skin
+from contactfpga.tools.commands.bringup import steps
+from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
+from contactfpga.tools.commands.bringup.report import Report, graded
+from contactfpga.tools.console import flags, interrupt, numbers, outputs
+
+EXTRA = None
+
+CLOSING = re.compile(r"closing_\w+_n")
+"""Names of predictions that are forces at which a switch closes."""
+SECONDS = 300.0
+"""That each step which asks for a touch lasts at most, where the user names no time."""
+COUNTED_S = 2.0
+"""Over which frames of an untouched sheet are counted."""
+STUCK_S, REST_S = 10.0, 1.0
+"""Of a person, see :class:`Person`."""
+REHEARSAL = "sim://"
+"""This port is a virtual board of the kit that a hand touches as the steps ask."""
+REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
+"""Simulated: at most, for what the hand keeps doing, and over which frames are counted."""
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    port = (
+        "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
+    )
+    parser.add_argument("port", nargs="?", metavar="PORT", help=port)
+    flags.kit(parser)
+    own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
+    parser.add_argument("--skin-output", metavar="FILE", help=own)
+    parser.add_argument("--output", metavar="FILE", help="The report (default: bringup-NAME-DATE.md).")
+    long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends such a step."
+    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
+    wait = "Seconds to wait for the board (default: 1)."
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
+    parser.add_argument("--yes", action="store_true", help="Do not wait for Enter before each step.")
+    yours = "What you measured yourself of the kit's predictions, by scale, scope or meter; may be given several times."
+    parser.add_argument("--measured", action="append", type=_measured, default=[], metavar="NAME=VALUE", help=yours)
+    parser.add_argument("--json", action="store_true", help="Print one JSON object at the end, and nothing before it.")
+
+
+def _measured(text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    number = number_in(value) if equals and name else math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} must be NAME=VALUE, with a finite number")
+    return name, number
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; status 1 when a fault was found."""
+    if not args.kit:
+        raise ContactFPGAError(f"name a kit: --kit {' or '.join(kits.names())}")
+    kit = kits.kit(args.kit)
+    skin = bring_up_skin(kit)
+    if args.skin_output:
+        return _write_skin(kit, skin, args.skin_output)
+    predicted = predictions.load(kit)
+    _check_names(args.measured, predicted)
+    when = datetime.date.today()
+    path = outputs.file(args.output or f"bringup-{kit.name}-{when.isoformat()}.md")
+    report = Report(kit, skin, when)
+    report.force = _force(kit, predicted, args.measured)
+    with interrupt.usual_end():
+        _lead(args, kit, report)
+    measured = {name: value for step in report.steps for name, value in step.measured.items()} | _medians(args.measured)
+    report.grades = graded(predicted, measured)
+    report.not_measured = [one for name, one in predicted.items() if name not in measured]
+    write_text(path, report.to_markdown())
+    if args.json:
+        print(json.dumps(report.to_dict()), flush=True)
+    else:
+        _show_end(report, str(path))
+    return min(report.faults, 1)
+
+
+def bring_up_skin(kit: Kit) -> Skin:
+    """The kit's Skin, but each frame has all cells, and nothing hides how they bounce."""
+    return kit.skin.replace(report="cells", debounce="none", send="always")
+
+
+def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
+    path = outputs.file(name, "--skin-output")
+    text = kit.skin_path.read_text(encoding="utf-8")
+    tables = text[text.index("\n[") :] if "\n[" in text else ""
+    write_text(
+        path, f"# The {kit.name} kit's Skin for `contactfpga bringup`: it sends every cell.\n{skin.to_toml()}{tables}"
+    )
+    board = kit.board.name
+    terminal.say(
+        f"{path} is written. Next: contactfpga build {board} --skin {path}, contactfpga flash {board}, then "
+        f"contactfpga bringup --kit {kit.name}",
+        hang=2,
+    )
+    return 0
+
+
+def _check_names(measured: list[tuple[str, float]], predicted: dict[str, predictions.Prediction]) -> None:
+    for name, _ in measured:
+        if name not in predicted:
+            known = ", ".join(predicted) or "none"
+            raise ContactFPGAError(f"--measured {name}: the kit predicts nothing of this name; it predicts {known}")
+
+
+def _medians(measured: list[tuple[str, float]]) -> dict[str, float]:
+    return {name: statistics.median(value for other, value in measured if other == name) for name, _ in measured}
+
+
+def _closing(measured: list[tuple[str, float]]) -> list[tuple[str, float]]:
+    return [(name, value) for name, value in measured if CLOSING.fullmatch(name)]
+
+
+def _force(
+    kit: Kit, predicted: dict[str, predictions.Prediction], measured: list[tuple[str, float]]
+) -> FittedForce | None:
+    """What closing forces that somebody measured say of the switches; None where there are none, or no cover."""
+    cover, closing = load_cover(kit.skin_path), _closing(measured)
+    if cover is None or not closing:
+        return None
+    pairs = [(predicted[name].value, value) for name, value in closing]
+    return fit_force(cover.switch.force_n, pairs, math.sqrt(PROBABILITY))
+
+
+def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
+    """Through all steps that can be made."""
+    try:
+        board, person = _opened(args, kit, report.skin)
+    except (ContactFPGAError, OSError) as error:
+        _add(
+            args,
+            report,
+            Step("supply and link", (Finding("fault", str(error)),), stop="there is no board to ask"),
+            args.port or "",
+        )
+        return
+    with board:
+        skin = board.skin
+        if skin.report != "cells":
+            report.skin = skin
+            report.left_out.append(
+                "switches, bounce, settle times and circuit: the board sends zones; `contactfpga bringup --kit "
+                f"{kit.name} --skin-output FILE` writes the Skin that sends cells, then build and flash it"
+            )
+        bench = Bench(board, skin, person, load_circuit(kit.skin_path), COUNTED_S, args.timeout)
+        if _closing(args.measured):
+            bench.probability = math.sqrt(PROBABILITY)  # the other half of the doubt is the cover's
+        if isinstance(person, _Hand):
+            bench.seconds = REHEARSED_LINK_S
+        for step in _until_lost(steps.run(bench)):
+            _add(args, report, step, board.port)
+        report.fitted = bench.fitted
+
+
+def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
+    """The steps up to one that the board or its sheet breaks off."""
+    try:
+        yield from found
+    except ContactFPGAError as error:
+        yield Step("end", (Finding("fault", str(error)),), stop="the board no longer answers as it should")
+
+
+def _opened(args: argparse.Namespace, kit: Kit, skin: Skin) -> tuple[Board, Person]:
+    """The board, built from the Skin of the bring-up or else from the kit's own, and who touches it."""
+    person: Person = _Reader(args)
+    port: str | SimulatedPort | None = args.port
+    if port == REHEARSAL:
+        person, port = _rehearsed(kit, skin)
+    try:
+        return driver.open(port, skin, timeout=args.timeout), person
+    except SkinMismatch:
+        return driver.open(port, kit.skin, timeout=args.timeout), person
+
+
+def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
+    from contactfpga_sim.model.board.virtual import VirtualBoard
+    from contactfpga_sim.model.scenes.hand import Hand
+
+    hand = Hand(skin.rows, skin.columns)
+    circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
+    return _Hand(hand), VirtualBoard(skin, hand, circuit=circuit)
+
+
+class _Hand:
+    """Does on a virtual board what the steps ask."""
+
+    stuck_s, rest_s = 0.1, 0.02
+
+    def __init__(self, hand: object):
+        self._hand = hand
+
+    def asked(self, does: str, words: str) -> float:
+        """See :class:`Person`."""
+        return self._hand.does(does) or REHEARSED_S  # type: ignore[attr-defined]
+
+
+class _Reader:
+    """Somebody who reads what to do."""
+
+    stuck_s, rest_s = STUCK_S, REST_S
+
+    def __init__(self, args: argparse.Namespace):
+        self._args = args
+
+    def asked(self, does: str, words: str) -> float:
+        """See :class:`Person`."""
+        waits = not self._args.yes and sys.stdin.isatty()
+        enter = " Enter when you are ready;" if waits else ""
+        terminal.say(f"      {words}{enter} Ctrl-C ends the step.", sys.stderr, hang=6)
+        if waits:
+            input()
+        return self._args.seconds or SECONDS
+
+
+def _add(args: argparse.Namespace, report: Report, step: Step, port: str) -> None:
+    """Take down a step, without the port's name, and show it."""
+    if not args.json:
+        terminal.say(f"{len(report.steps) + 1}. {step.name}")
+        for finding in step.findings:
+            terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
+        if step.stop:
+            terminal.say(f"stop  {step.stop}", hang=6)
+    plain = step.findings
+    if port:
+        plain = tuple(one._replace(sentence=one.sentence.replace(port, "the board")) for one in step.findings)
+    report.steps.append(Step(step.name, plain, step.measured, step.stop))
+
+
+def _show_end(report: Report, path: str) -> None:
+    for one in report.grades:
+        said = one.prediction
+        measured = f"{said.name} = {one.measured:.4g} {said.unit}, predicted {said.low:g} to {said.high:g}"
+        terminal.say(f"{'ok' if one.holds else 'note':5} {measured}: {one.verdict}", hang=6)
+    for what in report.left_out:
+        terminal.say(f"note  left out: {what}", hang=6)
+    faults = f"{report.faults} fault{'' if report.faults == 1 else 's'}"
+    terminal.say(f"{faults}; the report is {path}: open an issue with it, whatever it says", hang=2)

@@ -1,0 +1,254 @@
+"""`contactfpga bringup` on virtual sheets: each planted fault is found and named, and nothing else is."""
+
+import datetime
+import json
+import sys
+import tomllib
+
+import pytest
+from planted_sheets import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, drawn, faults_of
+from sample import sample
+
+from contactfpga import Skin
+from contactfpga.design import kits, predictions
+from contactfpga.design.circuit import Circuit, load_circuit
+from contactfpga.design.predictions import Prediction
+from contactfpga.tools import cli
+from contactfpga.tools.commands import bringup
+from contactfpga.tools.commands.bringup import report, steps, times
+from contactfpga_sim.model.sheet.matrix import Shorts
+
+CASES = {
+    "nothing": (Faults(), []),
+    "open row": (Faults(rows_open=(2,)), ["row 2 open: ", "row 2 never read pressed: "]),
+    "open column": (Faults(columns_open=(5,)), ["column 5 open: ", "column 5 never read pressed: "]),
+    "open guard row": (Faults(rows_open=(8,)), ["guard row open: "]),
+    "stuck switch": (Faults(stuck=((3, 4),)), ["cell (3, 4) pressed though nothing", "cell (3, 4) pressed for "]),
+    "dead cell": (Faults(dead=((6, 1),)), ["cell (6, 1) never read pressed: "]),
+    "bouncing switch": (Faults(bouncing=((1, 7),)), ["cell (1, 7) bounces for "]),
+}
+
+
+QUICK = {"nothing", "open row", "dead cell", "bouncing switch"}
+
+
+@pytest.mark.parametrize("name", sample(CASES, quick=QUICK, slow={*CASES} - QUICK))
+def test_a_fault_is_found_and_named_and_no_other(name):
+    faults, expected = CASES[name]
+    found, _ = brought_up(faults, only=[steps.link, steps.lines, steps.switches, steps.bounce])
+    said = faults_of(found)
+    assert [any(one.startswith(begin) for one in said) for begin in expected] == [True] * len(expected)
+    assert all(any(one.startswith(begin) for begin in expected) for one in said), said
+    assert not any(step.stop for step in found.values())
+
+
+@pytest.mark.slow
+def test_columns_that_are_joined_read_alike():
+    found, _ = brought_up(Faults(shorts=Shorts(columns=((2, 3),))), only=[steps.link, steps.lines, steps.switches])
+    assert "columns 2 and 3 always read alike: joined, by solder or a short circuit" in faults_of(found)
+
+
+def test_a_stuck_column_is_named():
+    found, _ = brought_up(Faults(columns_stuck=(6,)), only=[steps.link, steps.lines])
+    assert any(one.startswith("column 6 stuck: ") for one in faults_of(found))
+
+
+def test_a_sheet_that_is_not_plugged_in_ends_it():
+    faults = Faults(rows_open=tuple(range(9)), columns_open=tuple(range(8)))
+    found, _ = brought_up(faults)
+    assert [*found] == ["supply and link", "lines"]
+    assert found["lines"].stop.startswith("no line answers at all: look at the sheet's supply")
+
+
+@pytest.mark.slow
+def test_a_link_that_loses_is_a_fault_and_one_that_loses_much_ends_it():
+    found, _ = brought_up(Faults(lost=0.001), only=[steps.link])
+    assert any(" lost, " in one for one in faults_of(found))
+    assert 0 < found["supply and link"].measured["lost_share"] < 0.1
+    found, _ = brought_up(Faults(lost=0.01))
+    assert [*found] == ["supply and link"]
+    assert "of the frames are lost; mend the link first" in found["supply and link"].stop
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("shorts", "sentence"),
+    [
+        (Shorts(rows=((1, 2),)), "rows 1 and 2 joined"),
+        (Shorts(columns=((0, 3),)), "columns 0 and 3 joined"),
+        (Shorts(crossed=((2, 1),)), "row 2 and column 1 joined, or the diode at (2, 1) is bridged"),
+    ],
+)
+def test_joined_lines_end_it_before_a_switch_is_pressed(shorts, sentence):
+    found, _ = brought_up(Faults(shorts=shorts), TESTED)
+    assert sentence in faults_of(found)
+    assert [*found] == ["supply and link", "lines"]
+    assert "mend that first" in found["lines"].stop
+
+
+@pytest.mark.slow
+def test_a_bridged_diode_shows_while_its_switch_is_pressed():
+    found, _ = brought_up(Faults(shorts=Shorts(bridged=((1, 2),))), TESTED)
+    assert "row 1 and column 2 joined, or the diode at (1, 2) is bridged" in faults_of(found)
+    assert "a diode is bridged" in found["diodes"].stop
+
+
+@pytest.mark.slow
+def test_a_sound_sheet_that_tests_itself_passes_all_steps():
+    found, _ = brought_up(skin=TESTED, circuit=Circuit(line_pf=50, column_pull_ohm=47_000, row_pull_ohm=5600))
+    assert faults_of(found) == []
+    assert [*found] == ["supply and link", "lines", "switches", "diodes", "bounce", "settle times", "circuit"]
+    assert found["diodes"].findings[-1].sentence == "no diode is bridged"
+
+
+@pytest.mark.slow
+def test_slow_lines_are_named_and_left_out_of_the_fit():
+    found, bench = brought_up(
+        Faults(slow_columns=(2,)), circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit]
+    )
+    assert faults_of(found) == ["slow column 2: a long or thin line, a cold joint, or a weak pin"]
+    assert bench.fitted.rows == 8
+    assert bench.fitted.columns == 3
+
+
+def test_the_fit_covers_what_was_planted():
+    planted = CIRCUIT.replace(line_pf=190, switch_ohm=1500)
+    found, bench = brought_up(circuit=planted, scatter=0.04, only=[times.settling, times.circuit], stated=CIRCUIT)
+    line, switch = bench.fitted.values
+    assert (line.name, switch.name) == ("line_pf", "switch_ohm")
+    assert line.low <= 190 <= line.high < 1.5 * line.low
+    assert switch.low <= 1500 <= switch.high < 2 * switch.low
+    sentences = [one.sentence for one in found["circuit"].findings]
+    assert sentences[0].endswith("not the 150 that the kit states")
+
+
+SHEETS, SCATTER = 200, 0.05
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(4 * 3600)
+def test_200_planted_sheets_are_found_out():
+    """Each fault is named, with no other, and the intervals of all fitted values cover what was planted."""
+    covered = []
+    for seed in range(SHEETS):
+        name, faults, expected, circuit = drawn(seed)
+        found, bench = brought_up(faults, LARGE, circuit, SCATTER, seed, stated=CIRCUIT)
+        said = faults_of(found)
+        assert all(any(begin in one for one in said) for begin in expected), (seed, name, said)
+        known = [*expected, *["leaves too little room"] * name.startswith("slow")]
+        assert all(any(begin in one for begin in known) for one in said), (seed, name, said)
+        values = bench.fitted.values
+        assert len(values) == 2, (seed, name)
+        covered.append(all(one.low <= getattr(circuit, one.name) <= one.high for one in values))
+    assert 0.92 <= sum(covered) / SHEETS <= 0.98, "two standard deviations of the share about 95 %"
+
+
+# ---- the command
+
+
+@pytest.mark.slow
+def test_a_rehearsal_of_a_kit_writes_its_report(tmp_path, capsys):
+    path = tmp_path / "report.md"
+    assert cli.main(["bringup", "--kit", "starter", "sim://", "--output", str(path), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    names = ["supply and link", "lines", "switches", "bounce", "settle times", "circuit"]
+    assert [step["name"] for step in answer["steps"]] == names
+    assert (answer["faults"], answer["steps"][2]["measured"]) == (0, {"switches_seen": 256.0})
+    text = path.read_text()
+    assert text.startswith("# Bring-up of the starter kit, ")
+    assert "fingerprint `" + bringup.bring_up_skin(kits.kit("starter")).fingerprint.hex() in text
+    (grade,) = answer["predictions"]
+    assert (grade["name"], grade["as_predicted"]) == ("settle_us", True)
+
+
+def test_without_a_board_the_report_says_so(tmp_path, capsys):
+    path = tmp_path / "report.md"
+    arguments = ["bringup", "--kit", "starter", str(tmp_path / "ttyNone"), "--output", str(path), "--yes"]
+    assert cli.main(arguments) == 1
+    said = capsys.readouterr().out
+    assert "stop  there is no board to ask" in said
+    assert "ttyNone" in said
+    assert "The bring-up stops here: there is no board to ask." in path.read_text()
+    assert str(tmp_path) not in path.read_text()
+
+
+@pytest.mark.parametrize("name", kits.names())
+def test_the_skin_of_a_bring_up_is_the_kits_with_cells(name, tmp_path, capsys):
+    path, kit = tmp_path / "skin.toml", kits.kit(name)
+    assert cli.main(["bringup", "--kit", name, "--skin-output", str(path)]) == 0
+    assert f"contactfpga build {kit.board.name} --skin {path}" in " ".join(capsys.readouterr().out.split())
+    skin = Skin.load(path)
+    assert (skin.report, skin.replace(report="moments", send=kit.skin.send)) == ("cells", kit.skin)
+    assert load_circuit(path) == load_circuit(kit.skin_path)
+    assert cli.main(["build", kit.board.name, "--skin", str(path), "--wiring"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "name a kit: --kit fast or starter"),
+        (["--kit", "huge"], "'huge' is no kit; take one of fast, starter"),
+        (["--kit", "starter", "--measured", "moon=1"], "--measured moon: the kit predicts nothing of this name"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(words, sentence, capsys):
+    assert cli.main(["bringup", *words]) == 1
+    assert sentence in capsys.readouterr().err
+
+
+def test_closing_forces_are_fitted_and_graded(tmp_path, capsys):
+    """Three that are a tenth above the prediction, each in another place."""
+    path, kit = tmp_path / "report.md", kits.kit("fast")
+    predicted = [predictions.load(kit)[f"closing_{place}_n"].value for place in (0, 3, 6)]
+    forces = [f"--measured=closing_{place}_n={1.1 * value}" for place, value in zip((0, 3, 6), predicted, strict=True)]
+    arguments = ["bringup", "--kit", "fast", str(tmp_path / "ttyNone"), "--output", str(path), "--yes", "--json"]
+    assert cli.main([*arguments, *forces]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["switch_force_n"]["value"] == pytest.approx(0.44, rel=1e-3)
+    assert [grade["model"] for grade in answer["predictions"]] == ["cover"] * 3
+    assert "[cover.switch]\nforce_n = 0.44 " in path.read_text()
+    assert cli.main([*arguments, *forces[:2]]) == 1
+    assert "2 closing forces were measured; 3 are needed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "settle_us", "=1", "settle_us=", "settle_us=nan", "settle_us=1e400", "1=x"])
+def test_what_is_no_name_and_number_is_refused(text, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["bringup", "--kit", "fast", f"--measured={text}"])
+    assert f"argument --measured: '{text}' must be NAME=VALUE, with a finite number" in capsys.readouterr().err
+
+
+def prediction(**values):
+    usual = {"name": "settle_us", "what": "slowest cell", "unit": "us", "value": 0.6, "low": 0.4, "high": 0.8}
+    usual |= {"model": "circuit", "command": "contactfpga settle", "date": datetime.date(2026, 11, 24), "commit": "0"}
+    return Prediction(**usual | values)
+
+
+@pytest.mark.parametrize(
+    ("measured", "verdict"),
+    [
+        ({"settle_us": 0.8}, "as predicted"),
+        ({"settle_us": 0.81}, "not as predicted: the model of the circuit is wrong"),
+        ({"settle_us": 0.81, "settle_us_step": 0.08}, "as predicted"),
+        ({"settle_us": 0.39}, "not as predicted: the model of the circuit is wrong"),
+        ({"lost_share": 0.0}, None),
+    ],
+)
+def test_predictions_are_graded(measured, verdict):
+    """A value that a clock rounds may be off by half a step."""
+    found = report.graded({"settle_us": prediction()}, measured)
+    assert [one.verdict for one in found] == ([] if verdict is None else [verdict])
+
+
+@pytest.mark.slow
+def test_the_report_holds_what_was_found_and_fitted():
+    found, bench = brought_up(circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit])
+    made = report.Report(kits.kit("starter"), SKIN, datetime.date(2026, 11, 24))
+    made.steps, made.fitted = [*found.values()], bench.fitted
+    made.grades = report.graded({"settle_us": prediction(high=99.0)}, found["settle times"].measured)
+    text = made.to_markdown()
+    table = tomllib.loads(text.split("```toml\n")[1].split("```")[0])
+    assert table["circuit"]["line_pf"] == pytest.approx(bench.fitted.circuit.line_pf, rel=1e-3)
+    assert "| as predicted |" in text
+    assert "[cover] is not fitted: a board does not feel forces." in text
+    assert sys.platform not in made.to_dict()
