@@ -42,7 +42,7 @@ def test_predictions_are_what_is_computed_today(name):
     kit = kits.kit(name)
     found = predictions.load(kit)
     circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
-    needs = needed(circuit, kit.skin.rows, kit.skin.columns)
+    needs = needed(circuit, kit.skin.row_lines, kit.skin.column_lines)
     assert found["settle_us"].value == pytest.approx(1e6 * needs.settle.seconds, rel=1e-4)
     assert found["row_ma"].value == pytest.approx(needs.pressed.pin_ma, rel=1e-4)
     some = latency.measure(kit.skin, touches=12)

@@ -125,7 +125,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
     nominal = extracted(lay_out(skin, stated)).circuit
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
-    needs = [needed(one, skin.rows, skin.columns, skin.diodes) for one in drawn]
+    needs = [needed(one, skin.row_lines, skin.column_lines, skin.diodes) for one in drawn]
     values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
         "settle_us": (
             "a row selected until the slowest column reads right",
