@@ -31,10 +31,10 @@ def test_times_are_enough_at_the_corners(name, celsius, supply_v):
     skin = kits.kit(name).skin
     stated = load_circuit(kits.kit(name).skin_path)
     circuit = extracted(lay_out(skin, stated)).circuit.replace(supply_v=supply_v)
-    needs = needed(circuit, skin.rows, skin.columns, skin.diodes)
+    needs = needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
     for what in PHASES if skin.reads_rows else ("settle", "precharge"):
         pattern = getattr(needs, what).pattern
-        network = Network(circuit, patterns.named(skin.rows, skin.columns)[pattern])
+        network = Network(circuit, patterns.named(skin.row_lines, skin.column_lines)[pattern])
         phase = PHASES[what](network, Levels.of(circuit, skin.diodes))
         given_s = 1e-6 * getattr(skin, f"{what}_us")
         seconds, volts = agreement.run(phase, given_s, celsius=celsius)
