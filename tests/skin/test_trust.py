@@ -117,10 +117,15 @@ def test_a_trusted_robot_opens_its_boards_with_trust(mark, tmp_path):
     assert Body.load(robot(tmp_path, port="sim://?skin=other.toml"), trust=True).links["arm"].trust
 
 
+NEEDED = {"build": ["icebreaker"], "bringup": ["--kit", "starter"]}
+"""What a command wants besides, though its parser does not say so."""
+
+
 def reading():
     """Each command that reads a Skin file, by name, with the arguments that make it read this one."""
     for leaf in leaves():
         command = called(leaf)
+        command += NEEDED.get(command[0], [])
         assert "--trust" in options(leaf)
         if "--skin" in options(leaf):
             yield [*command, "--skin", "skin.toml"]

@@ -37,7 +37,7 @@ def test_each_section_of_a_page_has_one_owner():
         for page in (*DOCS.glob("*.md"), ROOT / "README.md")
         for name in re.findall(r"^<!-- figures: (\w+)[^\n]*-->$", page.read_text(encoding="utf-8"), re.MULTILINE)
     )
-    owned = Counter((study.page_of(name), name) for study in DECLARED for name in study.sections)
+    owned = Counter((Path(study.page_of(name)).name, name) for study in DECLARED for name in study.sections)
     assert owned == shown
     assert set(owned.values()) == {1}
 

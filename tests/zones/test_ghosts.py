@@ -172,7 +172,7 @@ def test_the_gateware_is_the_golden_models_in_every_clock(record_property):
 
 def test_rows_of_a_board_are_low_or_float():
     """A tristate output a row whose data are 0; with diodes each drives all the time."""
-    skin = BOARDS["icebreaker"].skin.replace(row_drive="direct", rows=8, columns=8, connectivity=4)
+    skin = BOARDS["icebreaker"].skin.replace(row_drive="direct", rows=8, columns=8, connectivity=4, precharge_us=0)
     counts = []
     for diodes in ("none", "col2row"):
         netlist = plan_for(BOARDS["icebreaker"], skin.replace(diodes=diodes)).files["contactfpga.il"]
