@@ -57,8 +57,6 @@ def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str,
                 continue
             if not any(findings(board, changed, circuit).values()):
                 return tried
-    if not refused and not changes:
-        return {}
     raise SkinError(refused)
 
 

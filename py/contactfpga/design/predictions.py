@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import tomllib
 from collections.abc import Mapping
 
 from contactfpga.design.kits import Kit, KitError
@@ -49,8 +50,6 @@ def load(kit: Kit) -> dict[str, Prediction]:
 
 def added(text: str, now: Mapping[str, Prediction]) -> str:
     """The text of the file with an entry for each prediction that is not in it with this value and this interval."""
-    import tomllib
-
     newest = {entry["name"]: entry for entry in tomllib.loads(text).get("prediction", [])}
     for one in now.values():
         before = newest.get(one.name, {})

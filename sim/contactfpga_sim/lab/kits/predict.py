@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import datetime
+import functools
 import math
 import subprocess
 import sys
@@ -95,10 +96,15 @@ def _times(kit: Kit) -> Iterator[Prediction]:
     yield _made("alive_ms", "time between two edges of `alive`", "ms", edges, "gateware", f"build --kit {kit.name}")
 
 
+def _near(rng: np.random.Generator, share: float) -> float:
+    """A factor within this share of 1."""
+    return float(rng.uniform(1 - share, 1 + share))
+
+
 def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
     """One of the sheets that the same files may become: lines within 30 %, pins within 25, pulls and series resistors
     within 1, switches from 1 ohm to the stated, and the diode's capacitance within 30 and its current by 3."""
-    near = lambda share: float(rng.uniform(1 - share, 1 + share))  # noqa: E731
+    near = functools.partial(_near, rng)
     diode = dataclasses.replace(
         circuit.diode,
         junction_pf=circuit.diode.junction_pf * near(0.3),
@@ -158,7 +164,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
 def drawn_cover(cover: Cover, rng: np.random.Generator) -> Cover:
     """One of the covers that the same parts may become: the domes of a batch within 10 % of their force and 25 of their
     travel, foam within 30 % of its modulus and 10 of its thickness."""
-    near = lambda share: float(rng.uniform(1 - share, 1 + share))  # noqa: E731
+    near = functools.partial(_near, rng)
     switch = dataclasses.replace(
         cover.switch, force_n=cover.switch.force_n * near(0.1), travel_m=cover.switch.travel_m * near(0.25)
     )
