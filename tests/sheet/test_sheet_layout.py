@@ -44,7 +44,8 @@ def test_what_cannot_be_laid_out_is_refused_with_the_limit(changes, part, messag
 
 @pytest.mark.parametrize(("pitch_x", "pitch_y", "part"), [(5.52, 5.2, "dome"), (7.0, 5.8, "tact")])
 def test_the_limit_itself_is_taken(pitch_x, pitch_y, part):
-    lay_out(Skin(rows=3, columns=3, pitch_x_mm=pitch_x, pitch_y_mm=pitch_y), part=part)
+    layout = lay_out(Skin(rows=3, columns=3, pitch_x_mm=pitch_x, pitch_y_mm=pitch_y), part=part)
+    assert sum(one.reference.startswith("SW") for one in layout.drawing.placed) == 9
 
 
 def placed(layout):

@@ -48,7 +48,7 @@ def miscounted(given, lines, cover, numbers, structure):
 
 
 def agrees(path):
-    """The sheet that is chosen is the coarsest that is good enough on many newly drawn scenes, within chance."""
+    """Whether the chosen sheet is the coarsest that is good enough on many newly drawn scenes, within chance."""
     made = faces.faces(("caps", "tiles"), (0.4,))
     given, count = source(path), 200
     methods = [{"labeller": "serial", "report": "moments", "connectivity": c} for c in (4, 8)]
@@ -65,24 +65,23 @@ def agrees(path):
     surely = {one for one, share in shares.items() if share <= SURELY}
     perhaps = {one for one, share in shares.items() if share < LIMIT + 2 * math.sqrt(LIMIT * (1 - LIMIT) / NEW)}
     if found.answer is None:
-        assert not surely
-        return
+        return not surely
     settings = dict(found.answer.candidate.settings)
-    assert (settings["rows"], settings["cover"], settings["connectivity"]) in perhaps
-    assert settings["rows"] <= min((lines for lines, _, _ in surely), default=10)
+    good = (settings["rows"], settings["cover"], settings["connectivity"]) in perhaps
+    return good and settings["rows"] <= min((lines for lines, _, _ in surely), default=10)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_sheet_is_the_coarsest_of_all_that_are_good_enough(seed, file, shortcuts):
-    agrees(file(random_file(seed)))
+    assert agrees(file(random_file(seed)))
 
 
 @pytest.mark.campaign
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("seed", range(4, 54))
 def test_the_sheet_is_the_coarsest_of_all_in_many_files(seed, file, shortcuts):
-    agrees(file(random_file(seed)))
+    assert agrees(file(random_file(seed)))
 
 
 def test_a_share_lies_beyond_its_bound_no_more_often_than_said():

@@ -33,7 +33,7 @@ class Prediction:
     """Computes it."""
     date: datetime.date
     commit: str
-    """Of the code that computed it."""
+    """Abbreviated hash of the commit whose code computed the value."""
 
 
 def load(kit: Kit) -> dict[str, Prediction]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -27,8 +27,8 @@ PROBABILITY = 0.95
 LEAST_LINES = 3
 """Rows, and columns, that must have been measured."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
-"""Of Newton's method: rounds, the change at which it ends and the step of its derivatives, both as shares. Times of the
-model jump by some 1e-4, as its steps in time do."""
+"""Newton's method takes at most this many rounds, ends at this relative change, and differentiates over this relative
+step. The model's times jump by some 1e-4, because it advances in discrete steps."""
 NEARLY = 0.02
 """The change at which it ends where it does not come to rest; intervals are several times wider."""
 DRAWS = 20_000
@@ -41,7 +41,7 @@ MOST_FREEDOM = 1e6
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SettleReading:
-    """How long the cells of a sheet took while so many switches were pressed in each row."""
+    """How long each cell of a sheet took to read pressed, while all rows had the same number of pressed switches."""
 
     pressed: int
     """Switches in each row that pull their column, with that of a guard column."""
@@ -76,13 +76,14 @@ class FittedCircuit:
     """The one that was given, with the fitted values."""
     values: tuple[FittedValue, ...]
     rows: int
-    """That were measured."""
+    """Number of rows whose cells were measured."""
     columns: int
+    """Number of columns whose cells were measured."""
 
 
 def settle_s(circuit: Circuit, rows: int, columns: int, diodes: str, pressed: int) -> float:
-    """Seconds from a selected row until the slowest column reads pressed, with so many switches pressed in each row;
-    infinite if it never does."""
+    """Seconds from the moment a row is selected until its slowest column reads pressed; infinite if it never does.
+    ``pressed``: the number of pressed switches in each row."""
     network = Network(circuit, np.tile(np.arange(columns) < pressed, (rows, 1)))
     done = phases.passed(phases.settle(network, Levels.of(circuit, diodes)))
     return float(done.phase.arrived(done.trace.seconds, done.trace.volts)[:pressed].max())
@@ -97,8 +98,8 @@ def fit_circuit(
     diodes: str = "col2row",
     probability: float = PROBABILITY,
 ) -> FittedCircuit:
-    """The circuit of a sheet with so many lines, guard lines among them, from one or two readings. ``probability``:
-    with which the intervals hold, all at once.
+    """The circuit of a sheet from one or two readings. ``rows`` and ``columns`` count guard lines, too.
+    ``probability``: the share of sheets in which all intervals are to cover the truth together.
 
     Raises :class:`CircuitError` where the readings do not tell: with fewer than three rows or columns that were
     measured as a whole, with cells that are faster than the board's first sample, or where no values would do."""
@@ -156,17 +157,19 @@ def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
     return rows, columns
 
 
-def _solved(times: object, start: np.ndarray, goal: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+def _solved(
+    times: Callable[[np.ndarray], np.ndarray], start: np.ndarray, goal: np.ndarray, names: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
     """The values whose logarithms of times are those of ``goal``, and how these change with the values."""
     values = start.astype(float)
     low, high = (np.array([LIMITS[name][end] for name in names], float) for end in (0, 1))
     for number in range(ROUNDS):
-        now = times(values)  # type: ignore[operator]
+        now = times(values)
         slopes = np.empty((len(values), len(values)))
         for index in range(len(values)):
             moved = values.copy()
             moved[index] *= 1 + STEP
-            slopes[:, index] = (times(moved) - now) / (moved[index] - values[index])  # type: ignore[operator]
+            slopes[:, index] = (times(moved) - now) / (moved[index] - values[index])
         step = np.linalg.solve(slopes, goal - now)
         wanted = np.clip(values + step, np.maximum(low, values / 4), np.minimum(high, 4 * values))
         close = CLOSE if number < ROUNDS // 2 else NEARLY
@@ -184,8 +187,8 @@ def _solved(times: object, start: np.ndarray, goal: np.ndarray, names: Sequence[
 
 
 def _rounding_variance(clocks: np.ndarray) -> float:
-    """Of the logarithm of the mean: where times scatter by less than a clock, all are rounded alike, and their mean is
-    off by as much as the place of the true one between two clocks makes it; all places are as likely."""
+    """The variance that rounding to whole clocks adds to the logarithm of the mean. Where times scatter by less than a
+    clock, all are rounded alike, so the mean is off by up to half a clock. Each offset is taken to be as likely."""
     variance = max(0.0, float(clocks.var()) - 1 / 12)
     harmonics = np.arange(1, HARMONICS + 1)
     off = float(np.sum(np.exp(-4 * np.pi**2 * harmonics**2 * variance) / (2 * np.pi**2 * harmonics**2)))
@@ -193,9 +196,9 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
-    """Of the mean of (rows, columns) of cells that rows and columns move, and its degrees of freedom after
-    Satterthwaite: analysis of variance in two ways. Lines that scatter no more than their cells make them are taken not
-    to scatter."""
+    """The variance of the mean of (rows, columns) cells, and its degrees of freedom after Satterthwaite, by a two-way
+    analysis of variance: each row and each column shifts its cells. Lines that scatter no more than their cells explain
+    are taken not to scatter."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean

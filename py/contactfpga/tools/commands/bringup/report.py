@@ -140,7 +140,8 @@ class Report:
         if self.force is not None:
             rows.append(("cover.switch", "force_n", self.force.value, self.force.low, self.force.high))
         if rows:
-            yield f"\n## Fitted\n\nAll intervals together hold with {100 * PROBABILITY:.0f} %.\n\n```toml"
+            yield f"\n## Fitted\n\nThe intervals are computed to hold together with {100 * PROBABILITY:.0f} %."
+            yield "docs/bringup.md says how often they did.\n\n```toml"
             for table in dict.fromkeys(row[0] for row in rows):
                 yield f"[{table}]"
                 for _, name, value, low, high in (row for row in rows if row[0] == table):

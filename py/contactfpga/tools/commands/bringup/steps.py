@@ -24,6 +24,8 @@ READS = 50
 """Frames that are asked for to see how long an answer takes."""
 MOST_LOST = 0.1
 """Share of the frames from which on the link is too bad to measure anything else."""
+RULER = "Press a ruler's edge along each column, one after the other, half a second each."
+"""What a person is asked to do for the diodes and for bounce."""
 WATCHED_S = 0.1
 """At least, of the untouched sheet."""
 
@@ -163,9 +165,7 @@ class _Alike:
 
 def diodes(bench: Bench) -> Step:
     """The self-test while switches are pressed, which shows bridged diodes."""
-    seconds = bench.person.asked(
-        "ruler", "Press a ruler's edge along each column, one after the other, half a second each."
-    )
+    seconds = bench.person.asked("ruler", RULER)
     last = bench.board.self_test(max(2.0, bench.timeout))
     known: dict[LineFinding, None] = dict.fromkeys(last.findings)
     pressed = last.pressed
@@ -191,9 +191,7 @@ def diodes(bench: Bench) -> Step:
 
 def bounce(bench: Bench) -> Step:
     """How long switches bounce, pressed column by column."""
-    seconds = bench.person.asked(
-        "ruler", "Press a ruler's edge along each column, one after the other, half a second each."
-    )
+    seconds = bench.person.asked("ruler", RULER)
     seen = Bounce(bench.board.hello.send == "on_change")
     _follow(bench, seen.update, seconds, lambda: len(seen.longest()) == bench.skin.rows * bench.skin.columns)
     seen.finish()
