@@ -1,4 +1,7 @@
-"""The page that runs the starter kit's board in a browser, as one file: python docs/try/assemble.py build/try.html"""
+"""The page that runs the starter kit's board in a browser, as one file: python docs/try/assemble.py build/try.html
+
+It is made of the files beside this one and of two WebAssembly files that the package carries, so it takes no compiler.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,13 @@ from pathlib import Path
 from contactfpga.design import kits
 from contactfpga.design.cover import cells_of, load_cover
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).resolve().parent
+WASM = FOLDER.parents[1] / "sim/contactfpga_sim/model/board/wasm"
 MODULES = ("wasm", "board", "decoder", "zones", "machine", "cover", "svg", "sheet", "timeline", "main")
 """Each after those that it imports."""
 
 KIT = "starter"
+BOARD, DECODER = WASM / f"{KIT}.wasm", WASM / "reader.wasm"
 MOST_N = 10.0
 """The force of a pen pressed as hard as it can tell."""
 
@@ -45,12 +50,12 @@ def facts(name: str = KIT) -> dict:
         "frame_clocks": skin.derived.frame_clocks,
         "bit_clocks": skin.derived.bit_clocks,
         "area_bits": skin.derived.area_bits,
-        "empty_frame_bytes": 13,
+        "record_bytes": skin.derived.item_bytes,
     }
 
 
-def page(board: bytes, decoder: bytes) -> str:
-    """The page with a kit's board and the reader of its bytes, both compiled to WebAssembly."""
+def page() -> str:
+    """The page's text."""
     kit = facts()
     style, script = read("page.css"), "".join(map(plain, MODULES))
     values = {
@@ -58,8 +63,8 @@ def page(board: bytes, decoder: bytes) -> str:
         "style": style,
         "script": script,
         "kit": json.dumps(kit, separators=(",", ":")),
-        "board": packed(board),
-        "decoder": packed(decoder),
+        "board": packed(BOARD),
+        "decoder": packed(DECODER),
         "cells": kit["rows"] * kit["columns"],
         "scans": f"{kit['clock_hz'] / kit['frame_clocks']:,.0f}",
         "last_row": kit["rows"] - 1,
@@ -86,9 +91,9 @@ def digest(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def packed(wasm: bytes) -> str:
-    return base64.b64encode(gzip.compress(wasm, 9, mtime=0)).decode()
+def packed(file: Path) -> str:
+    return base64.b64encode(gzip.compress(file.read_bytes(), 9, mtime=0)).decode()
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(page(*(Path(name).read_bytes() for name in sys.argv[2:4])), encoding="utf-8")
+    Path(sys.argv[1]).write_text(page(), encoding="utf-8")

@@ -32,7 +32,7 @@ export class Board {
     const { rows, columns } = this.#kit;
     const words = new BigUint64Array(this.#wasm.memory.buffer, this.#room, rows);
     for (let row = 0; row < rows; row++) {
-      words[row] = BigInt("0b" + cells.slice(row * columns, (row + 1) * columns).reverse().join(""));
+      words[row] = BigInt(cells.slice(row * columns, (row + 1) * columns).reduceRight((word, on) => 2 * word + on, 0));
     }
     this.#wasm.board_hold(this.#board, this.#room, 1, 0n);
   }

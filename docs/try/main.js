@@ -8,6 +8,7 @@ import { load } from "./wasm.js";
 
 const BUDGET_MS = 7; // of each picture's time, for the board
 const START = 24_000; // clocks in which the board says hello and sends its first frames
+const STEP = 2503; // clocks; no multiple of a scan's, so that touches fall anywhere in one
 const SAME_MM = 15; // a zone that was no farther away in the picture before is the same one
 const PLAY_S = 14; // for a touch in slow motion
 
@@ -104,7 +105,7 @@ function numbered(zones) {
   const found = zones.map((zone) => {
     const away = (one) => Math.hypot(one.x_mm - zone.x_mm, one.y_mm - zone.y_mm);
     const nearest = before.sort((one, other) => away(one) - away(other))[0];
-    return nearest && away(nearest) < SAME_MM ? { ...zone, number: before.shift().number } : zone;
+    return nearest && away(nearest) < SAME_MM ? { ...zone, number: before.shift().number } : { ...zone };
   });
   for (const zone of found) zone.number ??= Math.min(...free(found));
   return found.map((zone) => ({ ...zone, color: (zone.number - 1) % COLORS })).sort((one, other) => one.number - other.number);
@@ -122,7 +123,7 @@ function showZones() {
   at("zones").tBodies[0].replaceChildren(...shown.map((zone) => {
     const row = document.createElement("tr"), name = cell(`#${zone.number}`);
     name.className = `zone-${zone.color}`;
-    row.append(name, cell(`${(zone.area * area).toFixed(0)} mm²`), cell(`${zone.x_mm.toFixed(1)} mm`), cell(`${zone.y_mm.toFixed(1)} mm`), cell(zone.area));
+    row.append(name, cell((zone.area * area).toFixed(0)), cell(zone.x_mm.toFixed(1)), cell(zone.y_mm.toFixed(1)), cell(zone.area));
     return row;
   }));
 }
@@ -140,12 +141,11 @@ function pin(id, on, says) {
   at(id).lastElementChild.textContent = says;
 }
 
-// A frame: a byte of framing, zones, time and counts, three check bytes and the zero byte at its end.
+// A frame: a byte of framing, a record for each zone, time and counts, three check bytes and the zero byte at its end.
 function showFrame({ bytes, zones }) {
-  const record = zones.length ? (bytes.length - kit.empty_frame_bytes) / zones.length : 0;
   const parts = bytes.map((byte, index) => {
-    const zone = Math.floor((index - 1) / record);
-    const kind = index === 0 || byte === 0 ? "stuffing" : zones[zone] && record ? "zone" : index >= bytes.length - 4 ? "check" : "trailer";
+    const kind = index === 0 || byte === 0 ? "stuffing" : index <= zones.length * kit.record_bytes ? "zone"
+      : index >= bytes.length - 4 ? "check" : "trailer";
     return Object.assign(document.createElement("span"), { className: kind, textContent: hex(byte) });
   });
   at("frame").replaceChildren(...parts);
@@ -167,10 +167,18 @@ function showReport() {
   if (broken.stuck) named.push("The jammed switch reads as a touch: the board cannot tell it from a finger. Over time, `doctor --watch` can.");
   at("report").textContent = named.join(" ") || "The board reports: all lines are whole.";
   at("report").classList.toggle("bad", named.length > 0);
+  at("cuts").textContent = [broken.row, broken.column].filter(Boolean).map(cutOff).join(" ");
+}
+
+function cutOff({ kind, row, column }) {
+  return kind === "row"
+    ? `Row ${row} is cut before column ${column}: what is pressed beyond no longer reaches the board.`
+    : `Column ${column} is cut before row ${row}: what is pressed below no longer reaches the board.`;
 }
 
 // ---- slow motion ----
 
+const still = matchMedia("(prefers-reduced-motion: reduce)");
 let playing = null; // when it began, in ms
 
 function look(cycle) {
@@ -192,7 +200,7 @@ function live() {
   at("live").hidden = true;
   stop();
   sheet.lines();
-  at("moment").textContent = "";
+  tellTouch();
 }
 
 function stop() {
@@ -203,7 +211,7 @@ function stop() {
 function play(now) {
   const { start, last } = timeline.touch;
   const cycle = start + ((now - playing) / 1e3 / PLAY_S) * (last - start);
-  look(cycle);
+  look(still.matches ? timeline.stops.findLast((stop) => stop <= cycle) : cycle); // from event to event for who wants no motion
   if (cycle >= last) stop();
 }
 
@@ -229,9 +237,15 @@ function step(find) {
   if (cycle !== undefined && cycle !== null) look(cycle);
 }
 
+function tellTouch() {
+  const { start, last } = timeline.touch, slower = (PLAY_S * kit.clock_hz) / (last - start);
+  at("moment").textContent = `From the switches to the last byte in ${us(last - start)}. Play shows it ${slower.toLocaleString("en", { maximumSignificantDigits: 2 })} times slower.`;
+}
+
 function showTouch() {
   if (!machine.touch || machine.touch === timeline.touch) return;
   timeline.show(machine.touch);
+  tellTouch();
   at("cursor").max = machine.touch.last - machine.touch.start;
   at("cursor").value = at("cursor").max;
 }
@@ -251,7 +265,7 @@ function tick(now) {
   }
   const from = machine.cycle, ahead = ((now - before) / 1e3) * kit.clock_hz;
   const until = performance.now() + BUDGET_MS;
-  while (performance.now() < until && machine.cycle - from < ahead) machine.run(4 * kit.frame_clocks);
+  while (performance.now() < until && machine.cycle - from < ahead) machine.run(STEP);
   pace += 0.05 * ((machine.cycle - from) / Math.max(now - before, 1) * 1e3 - pace);
   before = now;
   draw();
@@ -271,6 +285,7 @@ function draw() {
   showTouch();
 }
 
+at("log").open = matchMedia("(min-width: 75rem)").matches;
 machine.run(START);
 sheet.put(32, 42);
 machine.run(8 * kit.frame_clocks);

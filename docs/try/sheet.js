@@ -37,7 +37,7 @@ export class Sheet {
     const { rows, columns, pitch_mm: pitch } = this.#kit;
     const width = columns * pitch, height = rows * pitch, edge = pitch / 2;
     this.#svg.setAttribute("viewBox", `${-edge - 8} ${-edge - 8} ${width + 16} ${height + 16}`);
-    const names = ["foam", "wires", "caps", "outlines", "marks", "labels", "fingers"];
+    const names = ["foam", "caps", "wires", "labels", "fingers", "outlines", "marks"];
     this.#layers = Object.fromEntries(names.map((name) => [name, svg("g", { class: name })]));
     this.#svg.append(...Object.values(this.#layers));
     this.#layers.foam.append(svg("rect", { x: -edge - 1, y: -edge - 1, width: width + 2, height: height + 2, rx: 2 }));

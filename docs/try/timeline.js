@@ -101,7 +101,7 @@ export class Timeline {
       group.append(svg("path", { d: `M${x} ${TOP - 6}V${HEIGHT - 26}` }), svg("text", { x, y: 11 }, us ? String(us) : "0 µs"));
       group.append(svg("text", { x, y: HEIGHT - 8 }, us ? String(Math.round((us * this.#kit.clock_hz) / 1e6)) : "0"));
     }
-    group.append(svg("text", { x: 0, y: 11, class: "name" }, "since the touch"), svg("text", { x: 0, y: HEIGHT - 8, class: "name" }, "clocks"));
+    group.append(svg("text", { x: 0, y: 11, class: "name" }, "time"), svg("text", { x: 0, y: HEIGHT - 8, class: "name" }, "clock"));
     return group;
   }
 

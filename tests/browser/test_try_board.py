@@ -1,0 +1,99 @@
+"""The board of the page is the native one: the same bytes through the page's own scripts, and what these read in them is what
+the Python driver reads."""
+
+import json
+
+import numpy as np
+import pytest
+from try_page import assemble, kit, needs_node, node
+
+from contactfpga.design import kits
+from contactfpga.design.cover import load_cover
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.receiver import frames_in
+from contactfpga_sim.model.scenes.scene import NAMES, scene
+
+pytest.importorskip("amaranth")
+pytestmark = needs_node
+
+KIT = kits.kit(assemble.KIT)
+CHUNK = 10_000  # frames in a line for Node
+ODD = 643  # clocks, no multiple of a scan's: touches fall anywhere in one
+
+
+def by_page(steps: list[dict]) -> tuple[bytes, list[int], dict]:
+    """What the page's board sends, its cycle after each step, and what the page's decoder reads in it all."""
+    given = "\n".join(map(json.dumps, steps))
+    lines = node("board.mjs", str(assemble.BOARD), str(assemble.DECODER), kit(), given=given, timeout=3000).splitlines()
+    *done, read = map(json.loads, lines)
+    runs = [each for each in done if each]
+    return bytes.fromhex("".join(each["bytes"] for each in runs)), [each["cycle"] for each in runs], read
+
+
+def held(frames: np.ndarray, cycles: int) -> dict:
+    return {"frames": frames.astype(int).reshape(len(frames), -1).tolist(), "cycles": cycles}
+
+
+def random_frames(count: int, seed: int) -> np.ndarray:
+    """From nearly empty ones to nearly full ones."""
+    rng = np.random.default_rng(seed)
+    return rng.random((count, KIT.skin.rows, KIT.skin.columns)) < rng.choice([0.01, 0.05, 0.2, 0.5, 0.9], (count, 1, 1))
+
+
+def test_all_scenes_give_the_native_boards_bytes():
+    cover = load_cover(KIT.skin_path)
+    scenes = [scene(KIT.skin, name, cover) for name in NAMES]
+    frames = np.array([cells(seconds) for cells in scenes for seconds in (0.0, 0.31, 0.77)])
+    with CompiledBoard(KIT.skin) as board:
+        board.hold(frames, 6 * ODD)
+        native, cycle = board.receive(), board.cycle
+    found, cycles, read = by_page([held(frames, 6 * ODD)])
+    assert (found, cycles[-1]) == (native, cycle)
+    assert len({frame["cells"] for frame in read["frames"]}) > 8
+
+
+@pytest.mark.parametrize("count", [3000, pytest.param(1_000_000, marks=[pytest.mark.campaign, pytest.mark.timeout(3000)])])
+def test_random_frames_give_the_native_boards_bytes(count, record_property):
+    total = 0
+    for seed, start in enumerate(range(0, count, 10 * CHUNK)):
+        frames = random_frames(min(count - start, 10 * CHUNK), seed)
+        with CompiledBoard(KIT.skin) as board:
+            board.hold(frames, ODD)
+            native = board.receive()
+        found, _, read = by_page([held(frames[at : at + CHUNK], ODD) for at in range(0, len(frames), CHUNK)])
+        assert found == native
+        # Dense frames take longer on the line than a scan, so the board replaces some before they are sent.
+        assert len(read["frames"]) > len(frames) / 20
+        total += len(found)
+    record_property("cases", count)
+    assert total > 15 * count  # as many as fit on the line
+
+
+def test_the_pages_decoder_reads_what_python_reads():
+    data, _, read = by_page([held(random_frames(2000, 5), ODD)])
+    frames = [each.frame for each in frames_in(KIT.skin, enumerate(data))]
+    assert [facts_of(frame) for frame in frames] == [
+        (one["time_us"], one["sequence"], one["cells"], one["count"], *map(moments, one["zones"])) for one in read["frames"]
+    ]
+    assert sum(frame.zones for frame in frames) > 5000
+    for zone in (zone for one in read["frames"] for zone in one["zones"]):
+        place = [zone["sum_x"] / zone["area"] * 6.4, zone["sum_y"] / zone["area"] * 6.4]
+        assert [zone["x_mm"], zone["y_mm"]] == pytest.approx(place, abs=1e-9)
+
+
+def facts_of(frame) -> tuple:
+    return (frame.time_us, frame.sequence, frame.cells, frame.zones, *map(tuple, frame.moments.tolist()))
+
+
+def moments(zone: dict) -> tuple:
+    return zone["area"], zone["sum_x"], zone["sum_y"]
+
+
+def test_broken_lines_are_named_as_the_page_breaks_them():
+    quiet = np.zeros((1, 16, 16), bool)
+    steps = [held(quiet, 20_000), {"cut": [[[5, 9]], [[3, 2]]]}, held(quiet, 10_000), {"stick": [7]}, held(quiet, 10_000)]
+    _, _, read = by_page(steps)
+    row, column, stuck = "row 5 is open before its far end", "column 3 is open before its far end", "column 7 reads pressed"
+    assert [row, column] in read["faults"]
+    assert read["faults"][-1][:2] == [row, column]
+    assert read["faults"][-1][2].startswith(stuck)
