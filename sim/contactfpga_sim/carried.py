@@ -1,0 +1,69 @@
+"""What the package carries as WebAssembly: boards, and the C header for a page in a browser.
+
+    python -m contactfpga_sim.carried
+
+builds those that are not of these sources, in a clone and with the extra ``release``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from contactfpga import terminal
+from contactfpga.shipped import examples
+from contactfpga.skin import Skin
+from contactfpga.tools.view import opening
+from contactfpga_sim import demo
+from contactfpga_sim.model.board import compiled, webassembly
+
+DECODER = "decoder"
+_DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
+
+
+def skins() -> dict[str, Skin]:
+    """By name: what ``sim://`` and ``view`` show by themselves, what ``make sim`` runs, and the kits."""
+    kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
+    shown = {"reference": Skin(), "view": Skin().replace(**opening.SLOW)}
+    return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
+
+
+def keys() -> dict[str, str]:
+    """By name the key that each file has to have."""
+    boards = {name: webassembly.board_key(skin, compiled.model_of(skin)) for name, skin in skins().items()}
+    return boards | {DECODER: webassembly.c_key(_DECODER_C)}
+
+
+def stale() -> list[str]:
+    """Names of files that are missing, damaged, or not built from these sources."""
+    return [name for name, key in keys().items() if webassembly.file(key) is None]
+
+
+def build(name: str) -> bytes:
+    """What a file holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        if name == DECODER:
+            return webassembly.build_c(_DECODER_C, Path(folder))
+        return webassembly.build_board(compiled.model_of(skins()[name]), Path(folder))
+
+
+def main() -> int:
+    """Build what is stale and write the list."""
+    names = stale()
+    for name in names:
+        data = build(name)
+        (webassembly.FOLDER / f"{name}.wasm").write_bytes(data)
+        terminal.say(f"{name}: built, {len(data) / 1e3:.1f} kB")
+    files = {
+        name: {"key": key, "sha256": webassembly.sum_of((webassembly.FOLDER / f"{name}.wasm").read_bytes())}
+        for name, key in keys().items()
+    }
+    text = json.dumps({"tools": webassembly.tools(), "files": files}, indent=1) + "\n"
+    webassembly.LIST.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
