@@ -15,14 +15,14 @@ from pathlib import Path
 
 from contactfpga.design import kits
 from contactfpga.design.cover import cells_of, load_cover
+from contactfpga_sim.model.board import webassembly
 
 FOLDER = Path(__file__).resolve().parent
-WASM = FOLDER.parents[1] / "sim/contactfpga_sim/model/board/wasm"
 MODULES = ("wasm", "board", "decoder", "zones", "machine", "cover", "svg", "sheet", "timeline", "main")
 """Each after those that it imports."""
 
 KIT = "starter"
-BOARD, DECODER = WASM / f"{KIT}.wasm", WASM / "reader.wasm"
+BOARD, DECODER = webassembly.FOLDER / f"{KIT}.wasm", webassembly.FOLDER / "decoder.wasm"
 MOST_N = 10.0
 """The force of a pen pressed as hard as it can tell."""
 

@@ -2,7 +2,7 @@
 
 import { Board } from "./board.js";
 import { Decoder, FAULT, FAULTS, FRAME, HELLO } from "./decoder.js";
-import { sums } from "./zones.js";
+import { groups, same } from "./zones.js";
 
 const ALWAYS = ["rows", "contact", "alive"];
 const TRACED = ["records", "driven", "charged"]; // while a touch is under way, too
@@ -44,9 +44,8 @@ export class Machine {
 
   // Close these switches. A touch begins: the cycle, what has to be told, and all that is seen until a frame tells it.
   press(cells) {
-    const pressed = cells.flatMap((on, cell) => (on ? [cell] : []));
     this.#open = {
-      cells, start: this.cycle, wanted: { area: pressed.length, ...sums(pressed, this.#kit.columns) },
+      cells, start: this.cycle, wanted: groups(cells, this.#kit),
       raised: this.contact, contact: null, last: null, // cycles
       rows: [], records: [], driven: [], charged: [], received: [],
     };
@@ -125,7 +124,6 @@ function said({ zones, cells, flags }) {
   return JSON.stringify([zones, cells, flags & FAULT]);
 }
 
-function tells({ zones, cells }, wanted) {
-  const total = (name) => zones.reduce((sum, zone) => sum + zone[name], 0);
-  return cells === wanted.area && ["area", "sum_x", "sum_y"].every((name) => total(name) === wanted[name]);
+function tells({ zones }, wanted) {
+  return zones.length === wanted.length && wanted.every((group) => zones.some((zone) => same(zone, group)));
 }

@@ -154,7 +154,7 @@ function showFrame({ bytes, zones }) {
 function showPackets() {
   at("packets").replaceChildren(...machine.packets.map(({ cycle, kind, bytes, content }) => {
     const item = document.createElement("li");
-    const text = kind === "hello" ? `the board is "${content.name}", ${content.rows}×${content.columns}`
+    const text = kind === "hello" ? `${content.rows}×${content.columns} switches, ${content.pitch_mm} mm apart`
       : kind === "faults" ? content.join("; ") || "all lines are whole" : `${content.count} zones, ${content.cells} switches`;
     const raw = Object.assign(document.createElement("code"), { textContent: bytes.map(hex).join(" ") });
     item.append(`${((cycle / kit.clock_hz) * 1e3).toFixed(3)} ms, ${kind}: ${text} `, raw);

@@ -2,7 +2,7 @@
 // at (0, 0), as in everything that the board says.
 
 import { svg } from "./svg.js";
-import { groups, outline } from "./zones.js";
+import { groups, outline, same } from "./zones.js";
 
 export const COLORS = 6; // of zones, in the style sheet
 const STEP_MM = 1; // of an arrow key; with Shift a pitch
@@ -78,11 +78,11 @@ export class Sheet {
     this.#layers.marks.replaceChildren(...zones.map(mark));
   }
 
-  // A board sends no shapes. Those drawn are the cells that it read whose area and sums are those of the record.
+  // A board sends no shapes. Those drawn are the cells that it read whose area and place are those of a zone.
   #outline(read, zones) {
     const { columns, pitch_mm: pitch } = this.#kit;
-    const paths = groups(read, columns).flatMap((group) => {
-      const zone = zones.find((one) => ["area", "sum_x", "sum_y"].every((name) => one[name] === group[name]));
+    const paths = groups(read, this.#kit).flatMap((group) => {
+      const zone = zones.find((one) => same(one, group));
       return zone ? [svg("path", { d: outline(group, columns), class: `zone-${zone.color}`, transform: `scale(${pitch})` })] : [];
     });
     this.#layers.outlines.replaceChildren(...paths);

@@ -1,8 +1,8 @@
 // Groups of cells that are neighbors along rows and columns, found the plain way: to draw their outlines, and to know what
 // the board ought to say.
 
-// Each group: its cells by number (row * columns + column), area, and the sums of columns and rows, as in a record.
-export function groups(cells, columns) {
+// Each group: its cells by number (row * columns + column), its area in cells and its place in mm, as a board says them.
+export function groups(cells, { columns, pitch_mm }) {
   const left = new Set(cells.flatMap((pressed, cell) => (pressed ? [cell] : [])));
   const found = [];
   while (left.size) {
@@ -11,15 +11,15 @@ export function groups(cells, columns) {
     for (const cell of group) {
       for (const next of neighbors(cell, columns)) if (left.delete(next)) group.push(next);
     }
-    found.push({ cells: group, area: group.length, ...sums(group, columns) });
+    const middle = (of) => (group.reduce((sum, cell) => sum + of(cell), 0) / group.length) * pitch_mm;
+    found.push({ cells: group, area: group.length, x_mm: middle((cell) => cell % columns), y_mm: middle((cell) => Math.floor(cell / columns)) });
   }
   return found;
 }
 
-export function sums(cells, columns) {
-  const sum_x = cells.reduce((sum, cell) => sum + (cell % columns), 0);
-  const sum_y = cells.reduce((sum, cell) => sum + Math.floor(cell / columns), 0);
-  return { sum_x, sum_y };
+// Whether a board's zone and a group are the same. Both places are computed in the same steps from the same whole numbers.
+export function same(zone, group) {
+  return zone.area === group.area && zone.x_mm === group.x_mm && zone.y_mm === group.y_mm;
 }
 
 function neighbors(cell, columns) {

@@ -58,7 +58,7 @@ def visit(file, chromium):
         page = context.new_page()
         page.set_default_timeout(PATIENCE_MS)
         page.on("request", lambda request: requests.append(request.url))
-        page.on("pageerror", wrong.append)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("console", lambda message: wrong.append(message.text))
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-ready]")
@@ -137,11 +137,11 @@ def test_its_policy_forbids_the_network(file):
     assert not re.search(r"""(src|href)=["'](?!#)""", file.read_text())
 
 
-def test_the_policy_stops_a_request(visit):
-    page = visit()
-    stopped = "fetch('data:,x').then(() => 'loaded', () => 'stopped')"
-    page.remove_listener  # noqa: B018
-    assert page.evaluate(stopped) == "stopped"
+def test_the_policy_stops_a_request(file, chromium):
+    page = chromium.new_page()
+    page.goto(file.as_uri())
+    assert page.evaluate("fetch('data:,x').then(() => 'loaded', () => 'stopped')") == "stopped"
+    page.close()
 
 
 def test_fingers_of_the_mouse_make_the_zones_of_python(visit):
@@ -238,8 +238,8 @@ def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
         moments.append(page.inner_text("#moment"))
         page.locator("#back").click()
     said = "\n".join(moments)
-    for what in ("is driven", "Row 6 is read: columns", "A zone is complete:", "that tell the touch", "The pin contact rises"):
-        assert what in said, what
+    for what in ("is driven", r"Row 6 is read: columns? \d", "A zone is complete:", "that tell the touch", "The pin contact rises"):
+        assert re.search(what, said), what
     page.locator("#live").click()
     expect(page.locator("#headline")).to_have_text("One contact")
 
