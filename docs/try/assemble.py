@@ -31,8 +31,8 @@ def facts(name: str = KIT) -> dict:
     """What the scripts need to know of a kit whose cover is tiles: sheet, clock, and when each switch closes."""
     kit = kits.kit(name)
     skin, cover = kit.skin, load_cover(kit.skin_path)
-    assert cover and cover.cap and cover.cut and cover.cap.proud, "cover.js knows tiles only"
-    assert skin.pitch_x_mm == skin.pitch_y_mm, "cover.js knows one pitch"
+    if cover is None or cover.cap is None or not (cover.cut and cover.cap.proud) or skin.pitch_x_mm != skin.pitch_y_mm:
+        raise ValueError(f"the kit {name!r} has no square tiles; cover.js knows nothing else")
     pitch_m = skin.pitch_x_mm * 1e-3
     cells = cells_of(cover, skin.rows, skin.columns, pitch_m, pitch_m)
     return {
@@ -96,4 +96,7 @@ def packed(file: Path) -> str:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(page(), encoding="utf-8")
+    file = Path(sys.argv[1])
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(page(), encoding="utf-8")
+    print(f"{file}: {file.stat().st_size / 1e3:.0f} kB")

@@ -49,7 +49,7 @@ def chromium():
 
 @pytest.fixture
 def visit(file, chromium):
-    """Opens the page anew: ``visit(width=..., color_scheme=...)``. Nothing may go wrong in it, and it asks for nothing."""
+    """Opens the page: ``visit(width, color_scheme=...)``. Nothing may go wrong in it, and it asks for nothing."""
     contexts, wrong, requests = [], [], []
 
     def visit(width=1400, height=900, **options):
@@ -88,16 +88,19 @@ def press(page, x_mm, y_mm):
 
 def fingers_of(page):
     """x, y, force and radius in mm and N of the fingers that are on the page."""
-    found = page.evaluate("[...document.querySelectorAll('.fingers > g')].map((g) => [g.ariaLabel, g.firstChild.getAttribute('r')])")
-    return [(*map(float, re.findall(r"-?[\d.]+", label)), float(radius)) for label, radius in found]
+    fingers = page.locator(".fingers > g").all()
+    said = [(one.get_attribute("aria-label"), one.locator(".skin").get_attribute("r")) for one in fingers]
+    return [(*map(float, re.findall(r"-?[\d.]+", label)), float(radius)) for label, radius in said]
 
 
-def by_python(fingers):
-    """(area in mm2, x, y in mm) of each zone that these fingers ought to make, sorted, as the page rounds them."""
+def by_python(fingers, dead=np.s_[:0]):
+    """(area in mm2, x, y in mm) of each zone that these fingers ought to make, sorted, without ``dead`` cells."""
     cover, pitch_m = load_cover(KIT.skin_path), PITCH_MM * 1e-3
     cells = cells_of(cover, KIT.skin.rows, KIT.skin.columns, pitch_m, pitch_m)
     loads = [Load((Ellipse(r * 1e-3, r * 1e-3, x * 1e-3, y * 1e-3),), force) for x, y, force, r in fingers]
-    labels, count = ndimage.label(cells.closed(loads))
+    closed = cells.closed(loads)
+    closed[dead] = False
+    labels, count = ndimage.label(closed)
     zones = [np.argwhere(labels == 1 + number) for number in range(count)]
     return sorted((len(zone) * PITCH_MM**2, *(zone.mean(axis=0)[::-1] * PITCH_MM)) for zone in zones)
 
@@ -112,10 +115,11 @@ def lifted(page):
     expect(page.locator("#headline")).to_have_text("Nothing touches it")
 
 
-def same(page, count):
+def same(page, count, dead=np.s_[:0]):
+    """The page shows the zones of its fingers, and these are so many."""
     expect(page.locator("#zones tbody tr")).to_have_count(count)
     page.wait_for_timeout(300)
-    wanted = by_python(fingers_of(page))
+    wanted = by_python(fingers_of(page), dead)
     assert len(wanted) == count
     for found, zone in zip(zones_of(page), wanted, strict=True):
         assert found == pytest.approx(zone, abs=0.51)
@@ -209,14 +213,15 @@ def test_broken_lines_and_a_stuck_column_are_reported_and_a_jammed_switch_is_not
     lifted(page)
     report, fault = page.locator("#report"), page.locator("#faults button")
     expect(report).to_have_text("The board reports: all lines are whole.")
-    press(page, 12 * PITCH_MM, 5 * PITCH_MM)
+    press(page, 9 * PITCH_MM, 5 * PITCH_MM)
+    page.locator("#size").fill("28")
+    page.locator("#force").fill("10")
     same(page, 1)
-    fault.nth(0).click()  # row 5, before column 9
+    fault.nth(0).click()
     expect(report).to_contain_text("The board reports: row 5 is open before its far end.")
     expect(page.locator("#contact")).to_contain_text("high")
     expect(page.locator("#alive")).to_contain_text("stopped")
-    same_without_row_5 = [zone for zone in by_python(fingers_of(page)) if zone[2] != pytest.approx(5 * PITCH_MM)]
-    assert zones_of(page) != same_without_row_5 or not zones_of(page)
+    same(page, 1, dead=np.s_[5, 9:])
     fault.nth(0).click()
     expect(report).to_have_text("The board reports: all lines are whole.")
     fault.nth(2).click()
@@ -238,7 +243,13 @@ def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
         moments.append(page.inner_text("#moment"))
         page.locator("#back").click()
     said = "\n".join(moments)
-    for what in ("is driven", r"Row 6 is read: columns? \d", "A zone is complete:", "that tell the touch", "The pin contact rises"):
+    for what in (
+        r"Row \d+ is driven",
+        r"Row 6 is read: columns? \d",
+        "A zone is complete",
+        "tell the touch",
+        "contact rises",
+    ):
         assert re.search(what, said), what
     page.locator("#live").click()
     expect(page.locator("#headline")).to_have_text("One contact")
@@ -249,6 +260,10 @@ def test_it_fits_from_a_phone_to_a_desk(visit, color_scheme):
     for width in (390, 800, 1400):
         page = visit(width, color_scheme=color_scheme)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-        ground, ink = page.evaluate("[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]")
-        brightness = [sum(map(int, re.findall(r"\d+", color))) for color in (ground, ink)]
-        assert (brightness[0] < brightness[1] - 400) if color_scheme == "dark" else (brightness[0] > brightness[1] + 400)
+        ground, ink = (brightness(page, name) for name in ("backgroundColor", "color"))
+        assert (ink - ground > 150) if color_scheme == "dark" else (ground - ink > 150)
+
+
+def brightness(page, name):
+    color = page.evaluate("(name) => getComputedStyle(document.body)[name]", name)
+    return np.mean([int(part) for part in re.findall(r"\d+", color)])
