@@ -6,7 +6,8 @@ import { Tiles } from "./cover.js";
 import { Timeline, hex } from "./timeline.js";
 import { load } from "./wasm.js";
 
-const BUDGET_MS = 7; // of each picture's time, for the board
+const BUSY_MS = 7, IDLE_MS = 2; // of each picture's time, for the board
+const IDLE_AFTER_MS = 3000; // without anything new
 const START = 24_000; // clocks in which the board says hello and sends its first frames
 const STEP = 2503; // clocks; no multiple of a scan's, so that touches fall anywhere in one
 const SAME_MM = 15; // a zone that was no farther away in the picture before is the same one
@@ -255,6 +256,7 @@ function showTouch() {
 let pace = 0; // cycles per second of the clock on the wall, smoothed
 let before = performance.now();
 let drawn = "";
+let news = before; // when something new was drawn
 
 function tick(now) {
   requestAnimationFrame(tick);
@@ -263,10 +265,10 @@ function tick(now) {
     before = now;
     return;
   }
-  const from = machine.cycle, ahead = ((now - before) / 1e3) * kit.clock_hz;
-  const until = performance.now() + BUDGET_MS;
-  while (performance.now() < until && machine.cycle - from < ahead) machine.run(STEP);
-  pace += 0.05 * ((machine.cycle - from) / Math.max(now - before, 1) * 1e3 - pace);
+  const busy = now - news < IDLE_AFTER_MS, until = performance.now() + (busy ? BUSY_MS : IDLE_MS);
+  const from = machine.cycle, passed_s = Math.max(now - before, 1) / 1e3;
+  while (performance.now() < until && machine.cycle - from < passed_s * kit.clock_hz) machine.run(STEP);
+  if (busy) pace += 0.05 * ((machine.cycle - from) / passed_s - pace);
   before = now;
   draw();
 }
@@ -278,6 +280,7 @@ function draw() {
   const now = JSON.stringify([machine.frame.zones, machine.faults, machine.read, closed, machine.packets[0].cycle, broken]);
   if (now === drawn) return;
   drawn = now;
+  news = performance.now();
   showZones();
   showFrame(machine.frame);
   showPackets();

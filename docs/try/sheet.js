@@ -140,9 +140,11 @@ export class Sheet {
   }
 
   lift(finger) {
+    const focused = finger.element === document.activeElement;
     finger.element.remove();
     this.fingers = this.fingers.filter((one) => one !== finger);
     if (this.selected === finger) this.select(this.fingers.at(-1) ?? null);
+    if (focused) (this.selected?.element ?? this.#svg).focus();
     this.#changed();
   }
 
@@ -210,8 +212,7 @@ export class Sheet {
     const { rows, columns, pitch_mm: pitch } = this.#kit;
     const finger = this.selected, step = event.shiftKey ? pitch : STEP_MM;
     const steps = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }[event.key];
-    if (event.key === "Escape") this.liftAll();
-    else if (event.key === "Enter" || event.key === " ") this.put(((columns - 1) * pitch) / 2, ((rows - 1) * pitch) / 2).element.focus();
+    if (event.key === "Enter" || event.key === " ") this.put(((columns - 1) * pitch) / 2, ((rows - 1) * pitch) / 2).element.focus();
     else if (finger && (event.key === "Delete" || event.key === "Backspace")) this.lift(finger);
     else if (finger && steps) this.move(finger, finger.x_mm + steps[0], finger.y_mm + steps[1]);
     else return;

@@ -1,4 +1,4 @@
-"""The page's board is the native one: the same bytes through the page's scripts, which read in them what Python does."""
+"""The page's board is the native one: the same bytes by the page's scripts, which read in them what Python does."""
 
 import json
 

@@ -17,7 +17,7 @@ from contactfpga.design.cover import Ellipse, Load, cells_of, load_cover
 from contactfpga_sim.lab.view import browser
 
 pytestmark = [
-    pytest.mark.slow,  # 30 s
+    pytest.mark.slow,  # 30 to 60 s
     pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed"),
 ]
 
@@ -93,16 +93,18 @@ def fingers_of(page):
     return [(*map(float, re.findall(r"-?[\d.]+", label)), float(radius)) for label, radius in said]
 
 
-def by_python(fingers, dead=np.s_[:0]):
-    """(area in mm2, x, y in mm) of each zone that these fingers ought to make, sorted, without ``dead`` cells."""
+def closed_on(page):
+    """(rows, columns) bool: the switches that the page draws as closed. They are all that its fingers close, and none but
+    those that they can hold: a dome that is closed opens at less force."""
+    names = page.locator(".caps rect").evaluate_all("(caps) => caps.map((cap) => cap.classList.contains('closed'))")
+    closed = np.reshape(names, (KIT.skin.rows, KIT.skin.columns))
     cover, pitch_m = load_cover(KIT.skin_path), PITCH_MM * 1e-3
-    cells = cells_of(cover, KIT.skin.rows, KIT.skin.columns, pitch_m, pitch_m)
+    cells = cells_of(cover, *closed.shape, pitch_m, pitch_m)
+    fingers = fingers_of(page)
     loads = [Load((Ellipse(r * 1e-3, r * 1e-3, x * 1e-3, y * 1e-3),), force) for x, y, force, r in fingers]
-    closed = cells.closed(loads)
-    closed[dead] = False
-    labels, count = ndimage.label(closed)
-    zones = [np.argwhere(labels == 1 + number) for number in range(count)]
-    return sorted((len(zone) * PITCH_MM**2, *(zone.mean(axis=0)[::-1] * PITCH_MM)) for zone in zones)
+    assert not (cells.closed(loads) & ~closed).any()
+    assert not (closed & ~cells.closed(loads, np.ones_like(closed))).any()
+    return closed
 
 
 def zones_of(page):
@@ -116,14 +118,18 @@ def lifted(page):
 
 
 def same(page, count, dead=np.s_[:0]):
-    """The page shows the zones of its fingers, and these are so many."""
+    """The page shows the zones of its closed switches without those that are ``dead``, and these are so many."""
     expect(page.locator("#zones tbody tr")).to_have_count(count)
     page.wait_for_timeout(300)
-    wanted = by_python(fingers_of(page), dead)
-    assert len(wanted) == count
-    for found, zone in zip(zones_of(page), wanted, strict=True):
-        assert found == pytest.approx(zone, abs=0.51)
-        assert found[1:] == pytest.approx(zone[1:], abs=0.051)
+    closed = closed_on(page)
+    closed[dead] = False
+    labels, found = ndimage.label(closed)
+    assert found == count
+    zones = [np.argwhere(labels == 1 + number) for number in range(count)]
+    wanted = sorted((len(zone) * PITCH_MM**2, *(zone.mean(axis=0)[::-1] * PITCH_MM)) for zone in zones)
+    for shown, zone in zip(zones_of(page), wanted, strict=True):
+        assert shown == pytest.approx(zone, abs=0.51)  # rounded to whole mm2
+        assert shown[1:] == pytest.approx(zone[1:], abs=0.051)
 
 
 def test_it_is_small_and_soon_ready(file, visit, record_property):
@@ -171,6 +177,11 @@ def test_a_drag_moves_a_finger_and_a_light_one_is_not_felt(visit):
     page.mouse.move(*pixel(page, 50, 60), steps=5)
     page.mouse.up()
     assert fingers_of(page)[0][:2] == pytest.approx((50, 60), abs=0.3)
+    same(page, 1)
+    page.mouse.down()  # the same one again
+    page.mouse.move(*pixel(page, 30, 25), steps=5)
+    page.mouse.up()
+    assert [finger[:2] for finger in fingers_of(page)] == [pytest.approx((30, 25), abs=0.3)]
     same(page, 1)
     page.locator("#force").fill("0.3")
     expect(page.locator("#headline")).to_have_text("Nothing touches it")
@@ -251,6 +262,10 @@ def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
         "contact rises",
     ):
         assert re.search(what, said), what
+    telling = re.search(r"(\d+) of \1 that tell the touch", said)
+    assert page.locator(".received .hit").count() == int(telling[1]) == 17
+    assert page.locator(".records .hit").count() >= 1 <= page.locator(".records .end").count()
+    assert page.locator(".rows .hit").count() >= len(set(re.findall(r"Row (\d+) is read: column", said))) >= 2
     page.locator("#live").click()
     expect(page.locator("#headline")).to_have_text("One contact")
 
