@@ -94,10 +94,9 @@ def fingers_of(page):
 
 
 def closed_on(page):
-    """(rows, columns) bool: the switches that the page draws as closed. They are all that its fingers close, and none but
-    those that they can hold: a dome that is closed opens at less force."""
-    names = page.locator(".caps rect").evaluate_all("(caps) => caps.map((cap) => cap.classList.contains('closed'))")
-    closed = np.reshape(names, (KIT.skin.rows, KIT.skin.columns))
+    """(rows, columns) bool: the switches that the page draws as closed. They are all that its fingers close, and none
+    but those that they can hold: a dome that is closed opens at less force."""
+    closed = cells_named(page, "closed")
     cover, pitch_m = load_cover(KIT.skin_path), PITCH_MM * 1e-3
     cells = cells_of(cover, *closed.shape, pitch_m, pitch_m)
     fingers = fingers_of(page)
@@ -105,6 +104,13 @@ def closed_on(page):
     assert not (cells.closed(loads) & ~closed).any()
     assert not (closed & ~cells.closed(loads, np.ones_like(closed))).any()
     return closed
+
+
+def cells_named(page, name):
+    names = page.locator(".caps rect").evaluate_all(
+        "(all, name) => all.map((one) => one.classList.contains(name))", name
+    )
+    return np.reshape(names, (KIT.skin.rows, KIT.skin.columns))
 
 
 def zones_of(page):
@@ -123,6 +129,8 @@ def same(page, count, dead=np.s_[:0]):
     page.wait_for_timeout(300)
     closed = closed_on(page)
     closed[dead] = False
+    assert (cells_named(page, "read") == closed).all()
+    assert page.locator(".outlines path").count() == page.locator(".marks circle").count() == count
     labels, found = ndimage.label(closed)
     assert found == count
     zones = [np.argwhere(labels == 1 + number) for number in range(count)]
