@@ -32,7 +32,7 @@ def skins() -> dict[str, Skin]:
 
 def keys() -> dict[str, str]:
     """By name the key that each file has to have."""
-    boards = {name: webassembly.board_key(skin, compiled.model_of(skin)) for name, skin in skins().items()}
+    boards = {name: compiled.carried_key(skin) for name, skin in skins().items()}
     return boards | {DECODER: webassembly.c_key(_DECODER_C)}
 
 

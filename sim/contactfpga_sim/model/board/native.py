@@ -106,7 +106,13 @@ def skin_key(skin: Skin) -> str:
     return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
-def load(model: Model) -> ctypes.CDLL:
+class Library(ctypes.CDLL):
+    """A library, and the memory that its functions' addresses are of."""
+
+    string_at = staticmethod(ctypes.string_at)
+
+
+def load(model: Model) -> Library:
     """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
@@ -119,7 +125,7 @@ def load(model: Model) -> ctypes.CDLL:
             if not cache.whole(library, tell=True):
                 _build(model, compiler, library)
     try:
-        return ctypes.CDLL(str(library))
+        return Library(str(library))
     except OSError as error:
         raise cache.CacheError(f"{library} in the cache cannot be loaded: {error}") from None
 

