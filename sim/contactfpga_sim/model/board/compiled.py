@@ -106,8 +106,8 @@ are driven, and bytes decoded from the line. The order is that of the driver."""
 class CompiledBoard(CompiledModel):
     """A compiled board of one sheet.
 
-    ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is the gateware, as native code; by
-    default that of :func:`library_of`. The first board of a Skin takes some seconds to build
+    ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is what native code is built from;
+    by default the board is that of :func:`library_of`. The first native board of a Skin takes some seconds to build
     (:mod:`contactfpga_sim.model.board.native`, also for what can go wrong).
     """
 

@@ -14,7 +14,7 @@ import itertools
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,10 +56,10 @@ class Library:
         linker.define_wasi()
         self._store = wasmtime.Store(engine)
         self._store.set_wasi(wasmtime.WasiConfig())  # nothing of this machine
-        self._exports = linker.instantiate(self._store, module).exports(self._store)
-        self._memory = self._exports["memory"]
+        exports: Any = linker.instantiate(self._store, module).exports(self._store)
+        self._exports, self._memory = exports, exports["memory"]
         self._room, self._room_bytes = 0, 0
-        self._exports["_initialize"](self._store)
+        exports["_initialize"](self._store)
 
     def __getattr__(self, name: str) -> _Function:
         function = _Function(self, self._store, self._exports[name])
@@ -109,14 +109,13 @@ class _Function:
         return self.restype(self._values[0].i64 & self._mask).value
 
     def _run(self) -> None:
-        trap = ctypes.POINTER(self._c.wasm_trap_t)()
-        values = self._values
-        import wasmtime
+        from wasmtime import Trap, WasmtimeError
 
+        trap, values = ctypes.POINTER(self._c.wasm_trap_t)(), self._values
         if error := self._c.wasmtime_func_call_unchecked(*self._called, values, len(values), ctypes.byref(trap)):
-            raise wasmtime.WasmtimeError._from_ptr(error)
+            raise WasmtimeError._from_ptr(error)
         if trap:
-            raise wasmtime.Trap._from_ptr(trap)
+            raise Trap._from_ptr(trap)
 
 
 def load(key: str) -> Library | None:
