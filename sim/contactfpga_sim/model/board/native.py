@@ -118,6 +118,10 @@ def load(model: Model) -> Library:
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
     :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
+    if sys.platform == "win32":
+        raise CompileFailed(
+            "on Windows sim:// runs the reference Skin and those of kits; for others take Linux, as in WSL"
+        )
     compiler = find_compiler()
     library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
     if not cache.whole(library):

@@ -6,6 +6,7 @@ other Skins or while somebody works on the gateware, there is none.
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import functools
 import hashlib
@@ -56,22 +57,32 @@ class Library:
         linker.define_wasi()
         self._store = wasmtime.Store(engine)
         self._store.set_wasi(wasmtime.WasiConfig())  # nothing of this machine
-        exports: Any = linker.instantiate(self._store, module).exports(self._store)
-        self._exports, self._memory = exports, exports["memory"]
-        self._room, self._room_bytes = 0, 0
-        exports["_initialize"](self._store)
+        self._exports: Any = linker.instantiate(self._store, module).exports(self._store)
+        self._memory = _Memory(self._store, self._exports)
+        self._exports["_initialize"](self._store)
 
     def __getattr__(self, name: str) -> _Function:
-        function = _Function(self, self._store, self._exports[name])
+        function = _Function(self._memory, self._store, self._exports[name])
         setattr(self, name, function)
         return function
 
     def string_at(self, address: int, size: int) -> bytes:
         """As that of ctypes."""
-        return bytes(self._memory.read(self._store, address, address + size))
+        return self._memory.read(address, size)
+
+
+class _Memory:
+    """What a board reads and writes."""
+
+    def __init__(self, store: Any, exports: Any):
+        self._store, self._exports, self._bytes = store, exports, exports["memory"]
+        self._room = self._room_bytes = 0
+
+    def read(self, address: int, size: int) -> bytes:
+        return bytes(self._bytes.read(self._store, address, address + size))
 
     def placed(self, datas: Sequence[bytes]) -> list[int]:
-        """Where they lie in memory until the next call."""
+        """Where they lie until the next call."""
         if not datas:
             return []
         *starts, size = itertools.accumulate((-len(data) % _ALIGNED + len(data) for data in datas), initial=0)
@@ -79,7 +90,7 @@ class Library:
             self._exports["free"](self._store, self._room)
             self._room, self._room_bytes = self._exports["malloc"](self._store, size), size
         for start, data in zip(starts, datas):
-            self._memory.write(self._store, data, self._room + start)
+            self._bytes.write(self._store, data, self._room + start)
         return [self._room + start for start in starts]
 
 
@@ -88,17 +99,17 @@ class _Function:
 
     restype: Any = ctypes.c_int
 
-    def __init__(self, library: Library, store: Any, function: Any):
+    def __init__(self, memory: _Memory, store: Any, function: Any):
         from wasmtime import _bindings
 
         kind = function.type(store)
-        self._library, self._c = library, _bindings
+        self._memory, self._c = memory, _bindings
         self._called = store._context(), ctypes.byref(function._func)
         self._values = (_bindings.wasmtime_val_raw_t * max(1, len(kind.params)))()
-        self._mask = 0xFFFF_FFFF if [str(one) for one in kind.results] == ["i32"] else -1
+        self._returns = str(kind.results[0]) if kind.results else "i32"
 
     def __call__(self, *arguments: Any) -> Any:
-        places = iter(self._library.placed([each for each in arguments if isinstance(each, bytes)]))
+        places = iter(self._memory.placed([each for each in arguments if isinstance(each, bytes)]))
         for value, given in zip(self._values, arguments):
             number = next(places) if isinstance(given, bytes) else given.value or 0
             if isinstance(number, float):
@@ -106,7 +117,8 @@ class _Function:
             else:
                 value.i64 = number
         self._run()
-        return self.restype(self._values[0].i64 & self._mask).value
+        found = getattr(self._values[0], self._returns)
+        return self.restype(found & 0xFFFF_FFFF if self._returns == "i32" else found).value
 
     def _run(self) -> None:
         from wasmtime import Trap, WasmtimeError
@@ -136,6 +148,12 @@ def _tell() -> None:
         terminal.say(f"contactfpga: the virtual board is WebAssembly; {faster}", sys.stderr, hang=2)
 
 
+@atexit.register
+def _let_go() -> None:
+    """Free what is kept while wasmtime can still be called."""
+    _compiled.cache_clear()
+
+
 @functools.cache
 def _compiled(file: Path) -> tuple[Any, Any]:
     """An engine and a module, which take 0.2 s."""
@@ -153,10 +171,21 @@ def listed() -> dict[str, Any]:
     return found
 
 
+def write_list(keys: Mapping[str, str]) -> None:
+    """Write :data:`LIST`, of files by name and key that were built here."""
+    files = {name: {"key": key, "sha256": sum_of(path_of(name).read_bytes())} for name, key in keys.items()}
+    LIST.write_text(json.dumps({"tools": tools(), "files": files}, indent=1) + "\n", encoding="utf-8", newline="\n")
+
+
+def path_of(name: str) -> Path:
+    """Where a file is."""
+    return FOLDER / f"{name}.wasm"
+
+
 def file(key: str) -> Path | None:
     """The file that was built of what the key stands for, if it is carried."""
     for name, made in listed()["files"].items():
-        path = FOLDER / f"{name}.wasm"
+        path = path_of(name)
         if made["key"] == key and path.is_file():
             if sum_of(path.read_bytes()) == made["sha256"]:
                 return path
