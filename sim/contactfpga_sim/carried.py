@@ -7,7 +7,6 @@ builds those that are not of these sources, in a clone and with the extra ``rele
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from pathlib import Path
@@ -32,13 +31,19 @@ def skins() -> dict[str, Skin]:
 
 def keys() -> dict[str, str]:
     """By name the key that each file has to have."""
-    boards = {name: webassembly.board_key(skin, compiled.model_of(skin)) for name, skin in skins().items()}
+    boards = {name: compiled.carried_key(skin) for name, skin in skins().items()}
     return boards | {DECODER: webassembly.c_key(_DECODER_C)}
 
 
 def stale() -> list[str]:
     """Names of files that are missing, damaged, or not built from these sources."""
     return [name for name, key in keys().items() if webassembly.file(key) is None]
+
+
+def check() -> None:
+    """End the program where the package would be released with one of them."""
+    if names := stale():
+        sys.exit(f"{', '.join(names)}: not built from these sources; run python -m contactfpga_sim.carried")
 
 
 def build(name: str) -> bytes:
@@ -51,17 +56,12 @@ def build(name: str) -> bytes:
 
 def main() -> int:
     """Build what is stale and write the list."""
-    names = stale()
-    for name in names:
+    for name in stale():
         data = build(name)
-        (webassembly.FOLDER / f"{name}.wasm").write_bytes(data)
+        webassembly.path_of(name).write_bytes(data)
         terminal.say(f"{name}: built, {len(data) / 1e3:.1f} kB")
-    files = {
-        name: {"key": key, "sha256": webassembly.sum_of((webassembly.FOLDER / f"{name}.wasm").read_bytes())}
-        for name, key in keys().items()
-    }
-    text = json.dumps({"tools": webassembly.tools(), "files": files}, indent=1) + "\n"
-    webassembly.LIST.write_text(text, encoding="utf-8")
+    webassembly.write_list(keys())
+    terminal.say(f"{webassembly.FOLDER} is built from these sources.")
     return 0
 
 

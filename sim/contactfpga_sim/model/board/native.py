@@ -106,12 +106,22 @@ def skin_key(skin: Skin) -> str:
     return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
-def load(model: Model) -> ctypes.CDLL:
+class Library(ctypes.CDLL):
+    """A library, and the memory that its functions' addresses are of."""
+
+    string_at = staticmethod(ctypes.string_at)
+
+
+def load(model: Model) -> Library:
     """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
     :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
+    if sys.platform == "win32":
+        raise CompileFailed(
+            "on Windows sim:// runs the reference Skin and those of kits; for others take Linux, as in WSL"
+        )
     compiler = find_compiler()
     library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
     if not cache.whole(library):
@@ -119,7 +129,7 @@ def load(model: Model) -> ctypes.CDLL:
             if not cache.whole(library, tell=True):
                 _build(model, compiler, library)
     try:
-        return ctypes.CDLL(str(library))
+        return Library(str(library))
     except OSError as error:
         raise cache.CacheError(f"{library} in the cache cannot be loaded: {error}") from None
 
