@@ -45,9 +45,9 @@ export class Board {
   // What was noted of this name since it was asked for last: cycle, data and mark as the driver says.
   take(name) {
     const index = EVENTS.indexOf(name);
-    const at = this.#wasm.board_events(this.#board, index, this.#room);
+    const count = this.#wasm.board_count(this.#board, index);
+    const at = this.#wasm.board_events(this.#board, index);
     const view = new DataView(this.#wasm.memory.buffer);
-    const count = view.getUint32(this.#room, true);
     const found = Array.from({ length: count }, (_, each) => {
       const [cycle, data, mark] = [0, 8, 16].map((offset) => view.getBigUint64(at + EVENT_BYTES * each + offset, true));
       return { cycle: Number(cycle), data: Number(data), mark: Number(mark) };

@@ -9,7 +9,7 @@ from try_page import assemble, kit, needs_node, node
 
 from contactfpga.design import kits
 from contactfpga.design.cover import load_cover
-from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.scenes.scene import NAMES, scene
 
@@ -30,6 +30,11 @@ def by_page(steps: list[dict]) -> tuple[bytes, list[int], dict]:
     return bytes.fromhex("".join(each["bytes"] for each in runs)), [each["cycle"] for each in runs], read
 
 
+def native() -> CompiledBoard:
+    """The kit's board as native code; by itself a kit's board is the WebAssembly that is judged here."""
+    return CompiledBoard(KIT.skin, model=model_of(KIT.skin))
+
+
 def held(frames: np.ndarray, cycles: int) -> dict:
     return {"frames": frames.astype(int).reshape(len(frames), -1).tolist(), "cycles": cycles}
 
@@ -44,11 +49,11 @@ def test_all_scenes_give_the_native_boards_bytes():
     cover = load_cover(KIT.skin_path)
     scenes = [scene(KIT.skin, name, cover) for name in NAMES]
     frames = np.array([cells(seconds) for cells in scenes for seconds in (0.0, 0.31, 0.77)])
-    with CompiledBoard(KIT.skin) as board:
+    with native() as board:
         board.hold(frames, 6 * ODD)
-        native, cycle = board.receive(), board.cycle
+        expected, cycle = board.receive(), board.cycle
     found, cycles, read = by_page([held(frames, 6 * ODD)])
-    assert (found, cycles[-1]) == (native, cycle)
+    assert (found, cycles[-1]) == (expected, cycle)
     assert len({frame["cells"] for frame in read["frames"]}) > 8
 
 
@@ -58,11 +63,11 @@ def test_random_frames_give_the_native_boards_bytes(count, record_property):
     total = 0
     for seed, start in enumerate(range(0, count, 10 * CHUNK)):
         frames = random_frames(min(count - start, 10 * CHUNK), seed)
-        with CompiledBoard(KIT.skin) as board:
+        with native() as board:
             board.hold(frames, ODD)
-            native = board.receive()
+            expected = board.receive()
         found, _, read = by_page([held(frames[at : at + CHUNK], ODD) for at in range(0, len(frames), CHUNK)])
-        assert found == native
+        assert found == expected
         # Dense frames take longer on the line than a scan, so the board replaces some before they are sent.
         assert len(read["frames"]) > len(frames) / 20
         total += len(found)
