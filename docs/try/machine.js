@@ -11,7 +11,6 @@ const PACKETS = 12; // that are kept
 
 export class Machine {
   frame = null; // the last frame, with its bytes and the cycle after its last one
-  hello = null;
   faults = []; // sentences
   packets = []; // those that said something new, the last one first
   read; // cells as the last whole scan read them
@@ -88,7 +87,7 @@ export class Machine {
     this.#bytes.push(event.data);
     const what = this.#decoder.push(event.data);
     if (what === FRAME) this.#frame(event.cycle);
-    if (what === HELLO) this.#say(event.cycle, "hello", this.hello = this.#decoder.hello());
+    if (what === HELLO) this.#say(event.cycle, "hello", this.#decoder.hello());
     if (what === FAULTS) this.#say(event.cycle, "faults", this.faults = this.#decoder.faults());
     if (event.data === 0) this.#bytes = [];
   }

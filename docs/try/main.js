@@ -156,7 +156,7 @@ function showPackets() {
   at("packets").replaceChildren(...machine.packets.map(({ cycle, kind, bytes, content }) => {
     const item = document.createElement("li");
     const text = kind === "hello" ? `${content.rows}×${content.columns} switches, ${content.pitch_mm} mm apart`
-      : kind === "faults" ? content.join("; ") || "all lines are whole" : `${content.count} zones, ${content.cells} switches`;
+      : kind === "faults" ? content.join("; ") || "all lines are whole" : `zones: ${content.count}, switches: ${content.cells}`;
     const raw = Object.assign(document.createElement("code"), { textContent: bytes.map(hex).join(" ") });
     item.append(`${((cycle / kit.clock_hz) * 1e3).toFixed(3)} ms, ${kind}: ${text} `, raw);
     return item;

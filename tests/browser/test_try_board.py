@@ -1,6 +1,7 @@
 """The page's board is the native one: the same bytes by the page's scripts, which read in them what Python does."""
 
 import json
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -30,9 +31,9 @@ def by_page(steps: list[dict]) -> tuple[bytes, list[int], dict]:
     return bytes.fromhex("".join(each["bytes"] for each in runs)), [each["cycle"] for each in runs], read
 
 
-def native() -> CompiledBoard:
+def native(capture: Iterable[str] = ()) -> CompiledBoard:
     """The kit's board as native code; by itself a kit's board is the WebAssembly that is judged here."""
-    return CompiledBoard(KIT.skin, model=model_of(KIT.skin))
+    return CompiledBoard(KIT.skin, capture, model_of(KIT.skin))
 
 
 def held(frames: np.ndarray, cycles: int) -> dict:
@@ -92,6 +93,33 @@ def facts_of(frame) -> tuple:
 
 def place(zone: dict) -> tuple:
     return zone["area"], zone["x_mm"], zone["y_mm"]
+
+
+def test_times_of_a_touch_are_those_of_the_native_board():
+    rng = np.random.default_rng(8)
+    hold, touches = 3000, []
+    for _ in range(30):
+        cells = np.zeros((16, 16), bool)
+        row, column = rng.integers(0, 14, 2)
+        cells[row : row + 3, column : column + 2] = True
+        touches.append((20_000 + int(rng.integers(0, 2000)), cells))
+    given = json.dumps([(gap, cells.astype(int).ravel().tolist(), hold) for gap, cells in touches])
+    found = json.loads(node("touches.mjs", str(assemble.BOARD), str(assemble.DECODER), kit(), given=given))
+    with native(["contact"]) as board:
+        starts = [touched(board, gap, cells, hold) for gap, cells in touches]
+        pin = [int(event["cycle"]) for event in board.take("contact") if event["data"]]
+        stream = [(int(event["cycle"]), int(event["data"])) for event in board.take("received")]
+    told = [each for each in frames_in(KIT.skin, stream) if each.frame.cells == 6 and each.frame.zones == 1]
+    last = [next(each.last for each in told if each.last > start) for start in starts]
+    assert found == [list(times) for times in zip(starts, pin, last, strict=True)]
+
+
+def touched(board: CompiledBoard, gap: int, cells: np.ndarray, hold: int) -> int:
+    """Touch and let go; returns the cycle of the touch."""
+    board.run(gap)
+    start = board.cycle
+    board.hold(np.array([cells, np.zeros_like(cells)]), hold)
+    return start
 
 
 def test_broken_lines_are_named_as_the_page_breaks_them():
