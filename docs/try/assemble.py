@@ -18,11 +18,14 @@ from contactfpga.design.cover import cells_of, load_cover
 from contactfpga_sim.model.board import webassembly
 
 FOLDER = Path(__file__).resolve().parent
-MODULES = ("wasm", "board", "decoder", "zones", "machine", "cover", "svg", "sheet", "timeline", "main")
+MODULES = (
+    *("wasm", "board", "decoder", "zones", "machine", "cover"),
+    *("dom", "text", "sheet", "fingers", "timeline", "replay", "panels", "main"),
+)
 """Each after those that it imports."""
 
 KIT = "starter"
-BOARD, DECODER = webassembly.FOLDER / f"{KIT}.wasm", webassembly.FOLDER / "decoder.wasm"
+BOARD, DECODER = webassembly.path_of(KIT), webassembly.path_of("decoder")
 MOST_N = 10.0
 """The force of a pen pressed as hard as it can tell."""
 
@@ -79,7 +82,7 @@ def page() -> str:
 
 def plain(name: str) -> str:
     """A module as a part of one script."""
-    return re.sub(r"^import .*\n|^export ", "", read(f"{name}.js"), flags=re.MULTILINE)
+    return re.sub(r"^import [^;]*;\n|^export ", "", read(f"{name}.js"), flags=re.MULTILINE)
 
 
 def read(name: str) -> str:

@@ -1,5 +1,5 @@
-// The gateware of a kit with its sheet of switches and a UART at its line, stepped by the clock. It is the virtual board of
-// sim/contactfpga_sim/model/board/drivers/board.cpp, which says what its functions do.
+// The gateware of a kit with its sheet of switches and a UART at its line, stepped by the clock. It is the virtual
+// board of sim/contactfpga_sim/model/board/drivers/board.cpp, which says what its functions do.
 
 const EVENTS = ["rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received"];
 const EVENT_BYTES = 24; // cycle, data, mark: 64 bits each
@@ -39,7 +39,10 @@ export class Board {
 
   // What is noted besides received bytes: names of EVENTS.
   capture(names) {
-    this.#wasm.board_capture(this.#board, names.reduce((bits, name) => bits | 1 << EVENTS.indexOf(name), 0));
+    this.#wasm.board_capture(
+      this.#board,
+      names.reduce((bits, name) => bits | (1 << EVENTS.indexOf(name)), 0),
+    );
   }
 
   // What was noted of this name since it was asked for last: cycle, data and mark as the driver says.
@@ -63,8 +66,8 @@ export class Board {
     this.#wasm.board_stick(this.#board, lines.byteOffset);
   }
 
-  // From the next cycle on these lines are cut: of `rows`, a Map, the switches from a column on no longer reach the pin, of
-  // `columns` those from a row on.
+  // From the next cycle on these lines are cut, and all others whole. `rows`: pairs of a row and the column from which
+  // on its switches no longer reach the pin; `columns`: pairs of a column and such a row.
   cut(rows, columns) {
     const rowEnds = this.#lines(this.#kit.rows + 1, this.#kit.columns + 1);
     const columnEnds = this.#lines(this.#kit.columns + 1, this.#kit.rows + 1, 128);

@@ -1,13 +1,14 @@
-// Which switches close under fingers: tiles, that is foam cut between rigid caps that stand proud of the sheet. Each cap
-// takes what presses on its tile, one pitch wide. contactfpga.design.cover.cells is the same for any cover, with the reasons.
+// Which switches close under fingers: tiles, that is foam cut between rigid caps that stand proud of the sheet. Each
+// cap takes what presses on its tile, one pitch wide. contactfpga.design.cover.cells is the same for any cover, with
+// the reasons.
 
 export class Tiles {
   #kit;
   #step; // of the grid on which pressure is resolved, in mm
   #edge = 1; // pitches of the grid beyond the sheet, on each side
 
-  // `kit`: rows, columns, pitch_mm, parts (grid steps per pitch), thresholds_n (closing force of each switch, row by row)
-  // and hysteresis (the share of it by which the force must fall again).
+  // `kit`: rows, columns, pitch_mm, parts (grid steps per pitch), thresholds_n (closing force of each switch, row by
+  // row) and hysteresis (the share of it by which the force must fall again).
   constructor(kit) {
     this.#kit = kit;
     this.#step = kit.pitch_mm / kit.parts;
@@ -32,13 +33,16 @@ export class Tiles {
   // The pressure under a round finger is Hertz's: in proportion to sqrt(1 - (r / radius)^2).
   #add({ x_mm, y_mm, radius_mm, force_n }, forces) {
     const { rows, columns, parts } = this.#kit;
-    const across = this.#span(x_mm, radius_mm, columns), down = this.#span(y_mm, radius_mm, rows);
+    const across = this.#span(x_mm, radius_mm, columns);
+    const down = this.#span(y_mm, radius_mm, rows);
     const shares = new Array(forces.length).fill(0);
     let total = 0;
     for (let j = down.first; j < down.end; j++) {
-      const v = (this.#place(j) - y_mm) / radius_mm, row = Math.floor(j / parts) - this.#edge;
+      const v = (this.#place(j) - y_mm) / radius_mm;
+      const row = Math.floor(j / parts) - this.#edge;
       for (let i = across.first; i < across.end; i++) {
-        const u = (this.#place(i) - x_mm) / radius_mm, column = Math.floor(i / parts) - this.#edge;
+        const u = (this.#place(i) - x_mm) / radius_mm;
+        const column = Math.floor(i / parts) - this.#edge;
         const share = Math.sqrt(Math.max(0, 1 - u * u - v * v));
         total += share;
         if (row >= 0 && row < rows && column >= 0 && column < columns) shares[row * columns + column] += share;

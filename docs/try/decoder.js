@@ -1,6 +1,8 @@
 // What a board sent, read by c/contactfpga.h, compiled to WebAssembly with the functions of c/page.c.
 
-export const FRAME = 1, HELLO = 2, FAULTS = 3; // what a byte can complete: contactfpga_event
+export const FRAME = 1,
+  HELLO = 2,
+  FAULTS = 3; // what a byte can complete: contactfpga_event
 export const FAULT = 4; // a bit of a frame's flags
 
 export class Decoder {
@@ -20,9 +22,17 @@ export class Decoder {
   frame() {
     const wasm = this.#wasm;
     const zones = Array.from({ length: wasm.frame_items() }, (_, index) => ({
-      area: wasm.zone_area(index), x_mm: wasm.zone_x_mm(index), y_mm: wasm.zone_y_mm(index),
+      area: wasm.zone_area(index),
+      x_mm: wasm.zone_x_mm(index),
+      y_mm: wasm.zone_y_mm(index),
     }));
-    return { time_us: wasm.frame_time_us(), flags: wasm.frame_flags(), cells: wasm.frame_cells(), count: wasm.frame_zones(), zones };
+    return {
+      time_us: wasm.frame_time_us(),
+      flags: wasm.frame_flags(),
+      cells: wasm.frame_cells(),
+      count: wasm.frame_zones(),
+      zones,
+    };
   }
 
   // What the board says of itself.
@@ -33,8 +43,10 @@ export class Decoder {
 
   // What the board reports of its lines, in words.
   faults() {
-    const { rows, columns } = this.hello(), wasm = this.#wasm;
-    const all = (count, found, say) => Array.from({ length: count }, (_, line) => (found(line) ? [say(line)] : [])).flat();
+    const { rows, columns } = this.hello();
+    const wasm = this.#wasm;
+    const all = (count, found, say) =>
+      Array.from({ length: count }, (_, line) => (found(line) ? [say(line)] : [])).flat();
     const name = (column) => (column < columns ? `column ${column}` : "the guard column");
     return [
       ...all(rows, wasm.row_open, (row) => `row ${row} is open before its far end`),

@@ -44,9 +44,17 @@ export class Machine {
   // Close these switches. A touch begins: the cycle, what has to be told, and all that is seen until a frame tells it.
   press(cells) {
     this.#open = {
-      cells, start: this.cycle, wanted: groups(cells, this.#kit),
-      raised: this.contact, contact: null, last: null, // cycles
-      rows: [], records: [], driven: [], charged: [], received: [],
+      cells,
+      start: this.cycle,
+      wanted: groups(cells, this.#kit),
+      raised: this.contact,
+      contact: null,
+      last: null, // cycles
+      rows: [],
+      records: [],
+      driven: [],
+      charged: [],
+      received: [],
     };
     this.#board.capture([...ALWAYS, ...TRACED]);
     this.#board.press(cells);
@@ -88,7 +96,7 @@ export class Machine {
     const what = this.#decoder.push(event.data);
     if (what === FRAME) this.#frame(event.cycle);
     if (what === HELLO) this.#say(event.cycle, "hello", this.#decoder.hello());
-    if (what === FAULTS) this.#say(event.cycle, "faults", this.faults = this.#decoder.faults());
+    if (what === FAULTS) this.#say(event.cycle, "faults", (this.faults = this.#decoder.faults()));
     if (event.data === 0) this.#bytes = [];
   }
 

@@ -1,5 +1,5 @@
-// Loads WebAssembly that was compiled from C or C++ of this project. The functions of a system that it asks for do nothing:
-// it has neither files nor clocks.
+// Loads WebAssembly that was compiled from C or C++ of this project. The functions of a system that it asks for do
+// nothing: it has neither files nor clocks.
 
 export async function load(bytes) {
   const module = await WebAssembly.compile(bytes);

@@ -12,7 +12,8 @@ import { load } from "../../docs/try/wasm.js";
 const [board, decoder, kit] = process.argv.slice(2);
 const runs = new Board(await load(readFileSync(board)), JSON.parse(kit));
 const reads = new Decoder(await load(readFileSync(decoder)));
-const frames = [], faults = [];
+const frames = [];
+const faults = [];
 
 function run({ frames: pressed, cycles }) {
   for (const cells of pressed) {
@@ -30,7 +31,7 @@ function run({ frames: pressed, cycles }) {
 
 for await (const line of createInterface({ input: process.stdin })) {
   const asked = JSON.parse(line);
-  if (asked.cut) runs.cut(...asked.cut.map((ends) => new Map(ends)));
+  if (asked.cut) runs.cut(...asked.cut);
   if (asked.stick) runs.stick(asked.stick);
   console.log(JSON.stringify(asked.frames ? run(asked) : {}));
 }

@@ -214,6 +214,19 @@ def test_two_fingers_touch_at_once_and_leave(visit):
     expect(page.locator("#headline")).to_have_text("Nothing touches it")
 
 
+def test_a_pen_says_how_hard_it_presses(visit):
+    page = visit()
+    lifted(page)
+    x, y = pixel(page, 32, 32)
+    pen = {"x": x, "y": y, "button": "left", "buttons": 1, "pointerType": "pen", "clickCount": 1}
+    session = page.context.new_cdp_session(page)
+    for force in (0.25, 0.75):
+        kind = "mousePressed" if force == 0.25 else "mouseMoved"
+        session.send("Input.dispatchMouseEvent", {**pen, "type": kind, "force": force})
+        expect(page.locator("#force-value")).to_have_text(f"{10 * force:.1f} N")
+        same(page, 1)
+
+
 def test_keys_put_move_resize_and_lift_a_finger(visit):
     page = visit()
     lifted(page)
@@ -262,12 +275,8 @@ def test_broken_lines_and_a_stuck_column_are_reported_and_a_jammed_switch_is_not
 
 def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
     page = visit()
-    moments = []
-    page.locator("#back").click()
-    while len(moments) < 200 and (not moments or "The switches close." not in moments[-1]):
-        moments.append(page.inner_text("#moment"))
-        page.locator("#back").click()
-    said = "\n".join(moments)
+    moments = stopped_at(page)
+    said = "\n".join(moments.values())
     for what in (
         r"Row \d+ is driven",
         r"Row 6 is read: columns? \d",
@@ -280,8 +289,34 @@ def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
     assert page.locator(".received .hit").count() == int(telling[1]) == 17
     assert page.locator(".records .hit").count() >= 1 <= page.locator(".records .end").count()
     assert page.locator(".rows .hit").count() >= len(set(re.findall(r"Row (\d+) is read: column", said))) >= 2
+    assert not cells_named(page, "read").any()
     page.locator("#live").click()
-    expect(page.locator("#headline")).to_have_text("One contact")
+    page.wait_for_selector(".caps .read")
+    same(page, 1)
+
+
+def test_slow_motion_jumps_from_event_to_event_for_who_wants_no_motion(visit):
+    page = visit(reduced_motion="reduce")
+    stops = set(stopped_at(page))
+    page.locator("#play").click()
+    seen = set()
+    while len(seen) < 4:
+        seen.add(page.input_value("#cursor"))
+        page.wait_for_timeout(30)
+    assert seen <= stops
+    page.emulate_media(reduced_motion="no-preference")
+    page.wait_for_timeout(500)
+    assert page.locator("#play").inner_text() == "Pause"
+    assert {page.input_value("#cursor") for _ in range(20) if not page.wait_for_timeout(40)} - stops
+
+
+def stopped_at(page):
+    """What the page says at each stop of slow motion, by the slider's value, from the last byte back to the touch."""
+    found = {}
+    while "The switches close." not in found.get("0", ""):
+        page.locator("#back").click()
+        found[page.input_value("#cursor")] = page.inner_text("#moment")
+    return found
 
 
 @pytest.mark.parametrize("color_scheme", ["light", "dark"])

@@ -1,4 +1,5 @@
-// The page's cover under Node: node tiles.mjs KIT < JSON of [fingers, closed before] pairs; writes [forces, closed] pairs.
+// The page's cover under Node: node tiles.mjs KIT < JSON of [fingers, closed before] pairs; writes [forces, closed]
+// pairs.
 
 import { readFileSync } from "node:fs";
 import { Tiles } from "../../docs/try/cover.js";

@@ -1,5 +1,5 @@
-// Touches of the page's machine under Node: node touches.mjs BOARD DECODER KIT < JSON of [gap, cells, hold] triples; writes
-// for each the cycles of the touch, of the pin and of the last byte.
+// Touches of the page's machine under Node: node touches.mjs BOARD DECODER KIT < JSON of [gap, cells, hold] triples;
+// writes for each the cycles of the touch, of the pin and of the last byte.
 
 import { readFileSync } from "node:fs";
 import { Machine } from "../../docs/try/machine.js";
