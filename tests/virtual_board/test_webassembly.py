@@ -220,6 +220,11 @@ def test_zig_is_the_one_that_is_pinned():
 
 
 @pytest.mark.campaign
+def test_all_that_is_carried_is_of_these_sources():
+    carried.check()
+
+
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", carried.keys())
 def test_the_files_are_built_again_in_the_same_bytes(name):
     pytest.importorskip("ziglang")

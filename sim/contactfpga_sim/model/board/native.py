@@ -119,9 +119,7 @@ def load(model: Model) -> Library:
     :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
     if sys.platform == "win32":
-        raise CompileFailed(
-            "on Windows sim:// runs the reference Skin and those of kits; for others take Linux, as in WSL"
-        )
+        raise CompileFailed("on Windows sim:// runs the reference Skin and those of kits; others need Linux, as in WSL")
     compiler = find_compiler()
     library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
     if not cache.whole(library):
