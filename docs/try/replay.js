@@ -39,7 +39,8 @@ export class Replay {
     this.#zones = zones;
     if (touch === this.#timeline.touch) return;
     this.#timeline.show(touch);
-    at("cursor").max = at("cursor").value = touch.last - touch.start;
+    at("cursor").max = touch.last - touch.start;
+    at("cursor").value = at("cursor").max;
     this.#tell();
   }
 

@@ -174,6 +174,7 @@ def test_fingers_of_the_mouse_make_the_zones_of_python(visit):
     press(page, 20.3, 31.1)
     same(page, 1)
     assert 0 < float(page.inner_text("#to-pin").split()[0]) < 47
+    assert page.input_value("#cursor") == page.get_attribute("#cursor", "max")
     page.locator("#force").fill("8")
     page.locator("#size").fill("26")
     same(page, 1)
