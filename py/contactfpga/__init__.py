@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from contactfpga.driver.stats import Stats
     from contactfpga.driver.subscription import Events, Subscription
     from contactfpga.errors import (
+        AddressError,
         BoardClosed,
         BoardSilent,
         ContactFPGAError,
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 __all__ = [
+    "AddressError",
     "Batch",
     "Board",
     "BoardClosed",
@@ -99,8 +101,8 @@ _NAMES = {
     "driver.stats": "Stats",
     "driver.subscription": "Events Subscription",
     "errors": (
-        "BoardClosed BoardSilent ContactFPGAError MissingExtra MissingTool NoData NoSuchCommand OnlyNoise PortBusy "
-        "PortLost PortNotFound ReadTimeout ReplayEnded SkinMismatch VersionMismatch"
+        "AddressError BoardClosed BoardSilent ContactFPGAError MissingExtra MissingTool NoData NoSuchCommand OnlyNoise "
+        "PortBusy PortLost PortNotFound ReadTimeout ReplayEnded SkinMismatch VersionMismatch"
     ),
     "instruments.self_test": "SelfTest",
     "instruments.watch": "Suspicion Watch",

@@ -16,11 +16,15 @@ class SkinError(ContactFPGAError, ValueError):
     """A Skin that cannot work; the message names the field, its value and the limit."""
 
 
+class AddressError(ContactFPGAError):
+    """A port's name that names no port, such as one with an option or a scene that does not exist."""
+
+
 class PortNotFound(ContactFPGAError):
     """No port, or no single one, could be chosen or opened."""
 
 
-class PortBusy(PortNotFound):
+class PortBusy(ContactFPGAError):
     """The port is there, and open in this program or another one."""
 
 

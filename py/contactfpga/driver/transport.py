@@ -126,10 +126,7 @@ def _user(name: str) -> str:
     place = os.path.realpath(name)
     if all(os.path.realpath(one.name) != place for one in _SERIAL):
         return "another program reads this port; close it first"
-    return (
-        "this program opened it already; go on with that board, or close it first, as `with` does. "
-        "What read_zones() has opened stays open"
-    )
+    return "this program opened it already; go on with that board, or close it first, as `with` does"
 
 
 class SimulatedPort(Protocol):
