@@ -46,8 +46,8 @@ def open(
     (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`.
 
     Raises :class:`AddressError`, :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`,
-    :class:`OnlyNoise`, :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a Skin that cannot
-    work, and OSError, such as FileNotFoundError, for its file.
+    :class:`OnlyNoise`, :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a
+    Skin that cannot work, and OSError, such as FileNotFoundError, for its file.
     """
     timeout = checked(timeout)
     if skin is not None and not isinstance(skin, Skin):
