@@ -9,7 +9,14 @@ UNSOLVED = 3
 
 
 class ContactFPGAError(Exception):
-    """Base of every error of this package."""
+    """Base of every error of this package.
+
+    >>> try:
+    ...     contactfpga.open("sim://?scene=elbow")
+    ... except contactfpga.ContactFPGAError as error:
+    ...     type(error).__name__
+    'AddressError'
+    """
 
 
 class SkinError(ContactFPGAError, ValueError):
@@ -78,6 +85,7 @@ class MissingExtra(ContactFPGAError, ImportError):
 
     def __init__(self, what: str, extra: str):
         self.what = what
+        """What needs it."""
         super().__init__(
             f"{what} needs more than is installed; in the folder of contactfpga's sources, install it with: "
             f"pip install '.[{extra}]'"

@@ -33,6 +33,11 @@ QUEUE = 16_384
 class Board:
     """An open port with a board at its other end: a context manager that iterates over every frame.
 
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     for zones in board:
+    ...         if len(zones) == 2:
+    ...             break
+
     Made by :func:`open`. Safe for several threads. :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
     thread that wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another
     process; in a child of ``fork`` it is closed. After :meth:`close` every method raises :class:`BoardClosed`, even one

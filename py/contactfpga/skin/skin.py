@@ -29,6 +29,10 @@ from contactfpga.skin.sheet import Sheet, max_zones
 class Skin:
     """A sheet of switches, how it is scanned, and how its contact zones are reported.
 
+    >>> skin = contactfpga.Skin(rows=8, columns=8, pitch_x_mm=12.5, pitch_y_mm=12.5)
+    >>> skin.replace(report="cells").max_zones()
+    16
+
     Every field has a default; together the defaults are the reference Skin. x runs along the columns, y along
     the rows, and cell (row 0, column 0) lies at 0 mm. A Skin that cannot work raises :class:`SkinError`.
     """

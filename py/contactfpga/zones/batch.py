@@ -49,7 +49,13 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Batch:
     """Consecutive frames and all of their zones: ``batch.zones["x_mm"]`` is an array over all zones, in mm, and
-    ``batch.frames["time_us"]`` one over all frames, in us."""
+    ``batch.frames["time_us"]`` one over all frames, in us.
+
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     batch = board.batch()
+    >>> float(batch.zones["x_mm"].mean())
+    75.0
+    """
 
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""

@@ -46,7 +46,12 @@ DIVIDED_DTYPE = np.dtype([(name, DTYPE[name]) for name in DTYPE.names or () if n
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Zone:
-    """One contact zone."""
+    """One contact zone.
+
+    >>> zone = contactfpga.read_zones("sim://?scene=two_fingers")[0]
+    >>> zone.area_mm2, zone.x_mm, zone.y_mm
+    (400.0, 55.0, 75.0)
+    """
 
     area_cells: int
     """Pressed cells."""
@@ -109,7 +114,14 @@ def closed_records(frame: Frame, sheet: Sheet) -> np.ndarray:
 
 
 class Zones(Sequence[Zone]):
-    """The zones of one frame, sorted by y, x and area; not to be changed."""
+    """The zones of one frame, sorted by y, x and area; not to be changed.
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> len(zones), zones.pressed
+    (2, 8)
+    >>> [zone.area_mm2 for zone in zones]
+    [400.0, 400.0]
+    """
 
     def __init__(
         self,
