@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import shlex
 import time
@@ -69,6 +70,7 @@ class SerialTransport:
             SerialException,
         )  # 0.1 s that `contactfpga --help` need not wait for
 
+        _quieten("serialx")
         self.name = name
         self._errors: tuple[type[Exception], ...] = (OSError, SerialException)
         alone = PinState.UNDEFINED
@@ -115,6 +117,13 @@ class SerialTransport:
 
     def _lost(self, error: Exception) -> PortLost:
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
+
+
+def _quieten(library: str) -> None:
+    """Of a library that logs each read no line comes unless the program sets a level for it."""
+    logger = logging.getLogger(library)
+    if logger.level == logging.NOTSET:
+        logger.setLevel(logging.WARNING)
 
 
 _SERIAL: weakref.WeakSet[SerialTransport] = weakref.WeakSet()
