@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from contactfpga.driver.board import Board
+    from contactfpga.driver.board import AsyncBoard, Board
     from contactfpga.driver.driver import open, read_zones
     from contactfpga.driver.events import Silence
     from contactfpga.driver.stats import Stats
@@ -60,6 +60,7 @@ __version__ = "0.2.0"
 
 __all__ = [
     "AddressError",
+    "AsyncBoard",
     "Batch",
     "Board",
     "BoardClosed",
@@ -105,7 +106,7 @@ __all__ = [
 ]
 
 _NAMES = {
-    "driver.board": "Board",
+    "driver.board": "AsyncBoard Board",
     "driver.driver": "open read_zones",
     "driver.events": "Silence",
     "driver.stats": "Stats",

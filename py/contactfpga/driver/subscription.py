@@ -214,17 +214,21 @@ class Listening(Generic[Item]):
                 return
 
     async def __aiter__(self) -> AsyncIterator[Item]:
-        import asyncio  # a quarter of what contactfpga.open would load
-
         while True:
             try:
-                if self._frames:
-                    await asyncio.sleep(0)  # others go on
-                else:
-                    await asyncio.to_thread(self._wait, 1.0)
-                yield self.next()  # which waits for nothing now, and takes no frame if we were canceled above
+                yield await self.awaited()
             except ReplayEnded:
                 return
+
+    async def awaited(self, timeout: float = 1.0) -> Item:
+        """:meth:`next`, while other tasks go on."""
+        import asyncio  # a quarter of what contactfpga.open would load
+
+        if self._frames or timeout == 0:
+            await asyncio.sleep(0)  # others go on
+        else:
+            await asyncio.to_thread(self._wait, timeout)
+        return self.next(timeout)  # which waits for nothing now, and takes no frame if we were canceled above
 
     def _wait(self, timeout: float) -> None:
         """Until something waits, or silence is to be told."""
