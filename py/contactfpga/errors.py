@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shlex
+import sys
 from typing import Any
 
 UNSOLVED = 3
@@ -86,10 +89,27 @@ class MissingExtra(ContactFPGAError, ImportError):
     def __init__(self, what: str, extra: str):
         self.what = what
         """What needs it."""
-        super().__init__(
-            f"{what} needs more than is installed; in the folder of contactfpga's sources, install it with: "
-            f"pip install '.[{extra}]'"
-        )
+        super().__init__(f"{what} needs more than is installed; install it with: {pip_install(extra)}")
+
+
+def pip_install(extra: str) -> str:
+    """The command that adds an extra to what is installed for this Python, from a wheel or from a source tree."""
+    quote = '"' if sys.platform == "win32" else "'"
+    python = sys.executable or "python"
+    if os.sep in (inside := python.removeprefix(os.getcwd() + os.sep)):
+        python = inside
+    package, where = ("contactfpga", "") if _installed() else (".", ", in the folder of contactfpga's sources")
+    return f"{shlex.quote(python)} -m pip install {quote}{package}[{extra}]{quote}{where}"
+
+
+def _installed() -> bool:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        version("contactfpga")
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 class MissingTool(ContactFPGAError):

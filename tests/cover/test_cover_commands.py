@@ -42,7 +42,7 @@ def test_figures_without_matplotlib_name_what_to_install(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     status, _, errors = run("figures")
     assert status == 1
-    assert "pip install '.[sim]'" in errors
+    assert "pip install 'contactfpga[sim]'" in errors
 
 
 ARM = [*("--mass", 0.6, "--radius", 0.038, "--com", 0.15, "--lever", 0.2, "--speed", 0.4)]

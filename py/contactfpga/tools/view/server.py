@@ -18,7 +18,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga.errors import ContactFPGAError, MissingExtra, pip_install
 
 if TYPE_CHECKING:
     import viser
@@ -160,7 +160,7 @@ def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None
         server = viser.ViserServer(host=host, port=port, label="contactfpga", verbose=False)
     if not is_guarded():
         server.stop()
-        right = "install the right version with pip install '.[view]'"
+        right = f"install the right version with {pip_install('view')}"
         raise ContactFPGAError(f"viser {viser.__version__} lets no guard in; {right}")
     _forget_tunnel(server)
     return server, guard
