@@ -118,6 +118,10 @@ format: $(VENV)/.stamp-lint ## apply the style that `make lint` checks
 docs: $(VENV)/.stamp-docs ## build the pages into build/docs
 	$(PY) -m sphinx -W --keep-going -b html docs build/docs
 
+release-check: $(VENV)/.stamp-boards $(VENV)/.stamp-test $(VENV)/.stamp-docs ## build what a release publishes and use it with no compiler [ARGS="--tag v0.1.0"]
+	$(PY) scripts/release.py make $(ARGS)
+	$(PY) scripts/release.py try build/release/dist --offline
+
 clean: ## delete what was built; keep .venv
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find py hdl sim tests docs scripts -name __pycache__ -type d -prune -exec rm -rf {} +
