@@ -43,6 +43,15 @@ COMMANDS = {
 """Help of each command. The command itself is the module of this name in :mod:`contactfpga.tools.commands`, a
 :class:`Subcommand` or a :class:`TopicGroup`; it is imported when the command is called."""
 
+FIRST = {
+    "view": "press a virtual sheet in the browser",
+    "zones sim://": "see the zones of a virtual board",
+    "doctor": "check the board that is plugged in",
+    "zones": "see its contact zones, live",
+    "build icebreaker --wiring": "see how to wire a sheet to a board",
+}
+"""What people do first, and what it is for: shown where no command is given."""
+
 RENAMED = {
     "chart": "study chart",
     "failures": "study failures",
@@ -92,7 +101,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
     args = parser.parse_args(_renamed(sys.argv[1:] if arguments is None else arguments))
     if args.command is None:
-        parser.print_help(sys.stderr)
+        print(_first(), file=sys.stderr)
         return 2
     try:
         with trusted(args.trust):
@@ -104,6 +113,16 @@ def _run(arguments: Sequence[str] | None) -> int:
         return interrupt.failed(MissingExtra(error.what, args.extra) if args.extra else error)
     except ValueError as error:
         return interrupt.failed(error)
+
+
+def _first() -> str:
+    """The first steps, as lines that can be copied."""
+    commands = [f"contactfpga {words}" for words in FIRST]
+    width = max(map(len, commands))
+    steps = [f"  {command:{width}}   {what}" for command, what in zip(commands, FIRST.values())]
+    return "\n".join(
+        [*steps, "", "contactfpga --help lists all commands, contactfpga COMMAND --help the options of one."]
+    )
 
 
 def _renamed(arguments: Sequence[str]) -> list[str]:
