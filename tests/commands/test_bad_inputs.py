@@ -157,16 +157,16 @@ CASES = [
     ["record", "x.mcap", "sim://", "--split-mb", "0"],
     ["record", "x.mcap", "sim://", "--friction", "1"],
     *(["board", "--scene", name] for name in ("elbow", "", *CELLS)),
-    ["board", "--link", "/no/folder/x"],
+    ["board", "--symlink", "/no/folder/x"],
     ["build", "elbow"],
     ["build", ""],
     ["flash", "elbow"],
     ["flash", "icestick"],
     ["flash", "icestick", "FOLDER"],
-    *(["replay", name] for name in ("elbow", "", *CELLS)),
-    ["replay", "NAN", "--threshold", "1"],
-    ["replay", "COMPLEX", "--threshold", "1"],
-    ["replay", "FLOATS", "--connectivity", "6"],
+    *(["simulate", name] for name in ("elbow", "", *CELLS)),
+    ["simulate", "NAN", "--threshold", "1"],
+    ["simulate", "COMPLEX", "--threshold", "1"],
+    ["simulate", "FLOATS", "--connectivity", "6"],
     IMPACT,
     [*SENSE],
     [*SENSE, "--offset", "5", "--thickness", "5"],
@@ -174,7 +174,7 @@ CASES = [
     [*SENSE, "--pitch", "10"],
     [*SENSE, "--offset", "0", "--switch-area", "12.6"],
     *(["cover", "design", f"{name}.toml" if name in ("DEEP", "FIFO") else name] for name in TOML),
-    ["cover", "figures", "--design", "NONE"],
+    ["cover", "figures", "--case", "NONE"],
     ["cover", "figures", "--data", "NONE"],
     ["cover", "figures", "--data", "FIFO"],
     ["cover", "figures", "--data", "BINARY"],
@@ -192,7 +192,7 @@ CASES = [
     ["study", "failures", "--study", "elbow"],
     *(["study", "arm", "--case", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     ["study", "arm", "--case", "elbow"],
-    ["study", "arm", "--latency", "-1"],
+    ["study", "arm", "--latency-us", "-1"],
     ["study", "arm", "--charts", "--jobs", "0"],
     [],
     ["elbow"],
@@ -263,7 +263,7 @@ def numeric_options():
 
 
 OPTIONS = numeric_options()
-NEEDED = {"build": ["icestick"], "replay": ["x.npy"], "fit": ["bumper"]}
+NEEDED = {"build": ["icestick"], "simulate": ["x.npy"], "fit": ["bumper"]}
 
 
 def test_every_numeric_option_is_found():
@@ -273,7 +273,7 @@ def test_every_numeric_option_is_found():
             "wire",
             "doctor",
             "build",
-            "replay",
+            "simulate",
             "cover impact",
             "cover sense",
             "study chart",
@@ -461,7 +461,7 @@ def test_random_bytes_in_files_never_end_in_a_traceback(suffix, data, run, files
     path.write_bytes(raw[: data.draw(st.integers(0, len(raw)))] if data.draw(st.booleans()) else raw)
     commands = [["zones", "--json", f"replay://{path}"]]
     if suffix != "bin":
-        commands = [["replay", str(path)], ["fit", str(path)], ["zones", "--json", f"sim://?scene={path}"]]
+        commands = [["simulate", str(path)], ["fit", str(path)], ["zones", "--json", f"sim://?scene={path}"]]
     for command in commands:
         status, errors = run(*command)
         if status != 0:

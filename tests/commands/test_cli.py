@@ -62,6 +62,24 @@ def test_every_command_explains_itself(name, capsys):
     assert PARSERS[name].description in said
 
 
+EITHER = {
+    "--frame": {"NAME", None},  # of a coordinate frame: any name, or one of two
+    "--output": {"FILE", "DIR"},
+}
+"""What an option takes in one command or another where that is not the same."""
+
+
+def test_an_option_takes_the_same_in_every_command():
+    """A newcomer learns `--units FILE` once: elsewhere it is no switch."""
+    taken = {}
+    for parser in cli.leaves(cli._parser()):
+        for action in parser._actions:
+            takes = "nothing" if action.nargs == 0 else action.metavar
+            for option in action.option_strings:
+                taken.setdefault(option, {}).setdefault(takes, []).append(parser.prog)
+    assert {option: found for option, found in taken.items() if len(found) > 1 and {*found} != EITHER.get(option)} == {}
+
+
 @pytest.mark.parametrize(
     ("typed", "found"),
     [
@@ -200,7 +218,7 @@ def test_json_needs_no_display(board, loaded):
 def test_replay_of_a_built_model_loads_no_tools(tmp_path, run, loaded):
     frames = tmp_path / "frames.npy"
     np.save(frames, np.eye(16, dtype=bool)[None])
-    status, out, _ = run("replay", frames, "--json")  # builds the model where it is not built yet
+    status, out, _ = run("simulate", frames, "--json")  # builds the model where it is not built yet
     assert status == 0
     assert json.loads(out)["zones"][0]["area_cells"] == 16
     code = f"from contactfpga.tools import cli\ncli.main(['replay', {str(frames)!r}, '--json'])"

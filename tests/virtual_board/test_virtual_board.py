@@ -168,7 +168,7 @@ def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatc
 def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
     skin, link = tmp_path / "slow.toml", tmp_path / "port"
     skin.write_text(SLOW.to_toml())
-    command = [sys.executable, "-m", "contactfpga.tools.cli", "board", "--skin", str(skin), "--link", str(link)]
+    command = [sys.executable, "-m", "contactfpga.tools.cli", "board", "--skin", str(skin), "--symlink", str(link)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline().strip() == str(link)
     assert read_for(link, 0.5)
