@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contactfpga import shipped
 from contactfpga.tools import cli, commands
 from contactfpga.tools.commands import study
 from contactfpga_sim.lab.studies import STUDIES
@@ -60,6 +61,28 @@ def test_every_command_explains_itself(name, capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert f"usage: {name} " in said
     assert PARSERS[name].description in said
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("zone", "argument COMMAND: 'zone' is none; did you mean 'zones'?"),
+        ("study flip", "argument TOPIC: 'flip' is none; did you mean 'flips'?"),
+        ("xyz", "argument COMMAND: 'xyz' is none; known are zones, view, body, wire"),
+    ],
+)
+def test_a_word_that_is_no_command(typed, said, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(typed.split())
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_pages_are_files_in_a_source_tree_and_addresses_elsewhere(tmp_path, monkeypatch):
+    assert shipped.with_pages("see docs/net.md#keys") == "see docs/net.md#keys"
+    monkeypatch.setattr(shipped, "__file__", str(tmp_path / "lib/site-packages/contactfpga/shipped.py"))
+    address = "https://github.com/contactfpga/contactfpga/blob/main/docs/net.md"
+    assert shipped.with_pages("see docs/net.md#keys, (docs/net.md)") == f"see {address}#keys, ({address})"
+    assert shipped.with_pages("mydocs/net.mdx stays") == "mydocs/net.mdx stays"
 
 
 EITHER = {

@@ -216,6 +216,12 @@ def test_the_host_alone_names_the_extra_that_is_missing(host, command, extra):
 
 
 @pytest.mark.slow
+def test_the_host_alone_names_pages_by_their_address(host):
+    said = run(host / "contactfpga", "zones", "--help", cwd=host).stdout
+    assert "https://github.com/contactfpga/contactfpga/blob/main/docs/haptics.md" in said
+
+
+@pytest.mark.slow
 def test_an_extra_is_added_to_the_wheel_that_is_there(host):
     """Without an index pip lacks what the extra adds, and not contactfpga itself."""
     pip = [sys.executable, "-m", "pip", "--isolated", "--python", host / "python"]

@@ -12,7 +12,8 @@ from typing import Any, NoReturn, Protocol
 from contactfpga import __version__, terminal
 from contactfpga.choices.choice import trusted
 from contactfpga.errors import MissingExtra
-from contactfpga.inputs.values import shortened, visible_lines
+from contactfpga.inputs.values import shortened, suggestion, visible_lines
+from contactfpga.shipped import with_pages
 from contactfpga.tools import commands
 from contactfpga.tools.console import interrupt
 
@@ -184,6 +185,13 @@ def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Name
     parser.set_defaults(run=run, extra=command.EXTRA)
 
 
+class _Help(argparse.HelpFormatter):
+    """Leaves addresses whole."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return terminal.wrapped(" ".join(text.split()), width).split("\n")
+
+
 class Parser(argparse.ArgumentParser):
     """Takes options anywhere. By itself argparse refuses a word after an option where it could have been left out, as
     the port in `contactfpga record FILE --seconds 2 PORT`.
@@ -198,7 +206,7 @@ class Parser(argparse.ArgumentParser):
     """Topic of a command whose first word names none."""
 
     def __init__(self, *args: Any, add: Callable[[Parser], None] | None = None, **options: Any):
-        super().__init__(*args, **options)
+        super().__init__(*args, **{"formatter_class": _Help, **options})
         self._add = add
 
     def complete(self) -> None:
@@ -206,6 +214,8 @@ class Parser(argparse.ArgumentParser):
         add, self._add = self._add, None
         if add is not None:
             add(self)
+            for action in self._actions:
+                action.help = action.help and with_pages(action.help)
 
     @property
     def topics(self) -> dict[str, Parser]:
@@ -217,6 +227,12 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with argparse's message, in which control characters of the arguments are shown as escapes."""
         super().error(visible_lines(shortened(message)))
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Of a word that is no command, say which one was meant."""
+        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            raise argparse.ArgumentError(action, f"{value!r} is none; {suggestion(value, action.choices)}")
+        super()._check_value(action, value)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does, but with options anywhere."""
