@@ -13,7 +13,8 @@ _PAGE = re.compile(r"\bdocs/[\w-]+\.md\b")
 def examples() -> Path:
     """Folder of the example files.
 
-    Load one with ``Skin.load(contactfpga.examples() / "icebreaker-64x64.toml")``.
+    >>> contactfpga.Skin.load(contactfpga.examples() / "icebreaker-64x64.toml").rows
+    64
     """
     installed = _package() / "examples"
     return installed if installed.is_dir() else _package().parents[1] / "examples"  # the latter in a source tree

@@ -13,6 +13,7 @@ import pytest
 import contactfpga
 
 CLASSES = [name for name in contactfpga.__all__ if isinstance(getattr(contactfpga, name), type)]
+FUNCTIONS = [name for name in contactfpga.__all__ if inspect.isfunction(getattr(contactfpga, name))]
 ERRORS = [name for name in CLASSES if issubclass(getattr(contactfpga, name), Exception)]
 
 
@@ -39,12 +40,12 @@ def test_fields_and_properties_come_first(name):
     assert public(getattr(contactfpga, name)) - listed == set()
 
 
-@pytest.mark.parametrize("name", sorted({*CLASSES} - {*ERRORS} | {"ContactFPGAError"}))
+@pytest.mark.parametrize("name", sorted({*CLASSES, *FUNCTIONS} - {*ERRORS} | {"ContactFPGAError"}))
 def test_an_example_comes_before_the_fields(name):
     assert ">>> " in begin(name).split("Fields:")[0]
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", CLASSES + FUNCTIONS)
 def test_examples_print_what_they_say(name):
     kind = getattr(contactfpga, name)
     test = doctest.DocTestParser().get_doctest(kind.__doc__, {"contactfpga": contactfpga}, name, None, None)

@@ -10,14 +10,14 @@ from terminals import OnTerminal
 ROOT = Path(__file__).resolve().parents[2]
 
 PIP = """
-import sys, time
+import os, sys, time
 print("arguments:", sys.argv[1:])
 print('Processing ./package.whl')
 for number in range(39):
     print(f"Collecting package-{number}", flush=True)
-time.sleep(1.2)
+time.sleep(float(os.environ.get("PAUSE", 0)))
 print("Installing collected packages: a, b", flush=True)
-time.sleep(1.2)
+time.sleep(float(os.environ.get("PAUSE", 0)))
 print("ERROR: no room" if "--fail" in sys.argv else "Successfully installed a-1 b-2", file=sys.stderr)
 sys.exit(3 if "--fail" in sys.argv else 0)
 """
@@ -57,7 +57,7 @@ def test_a_failure_shows_the_end_of_them_and_where_they_are(install):
 
 def test_a_terminal_sees_how_far_it_is(install):
     command, log = install
-    terminal = OnTerminal(command, 80, PYTHONPATH=str(log.parent))
+    terminal = OnTerminal(command, 80, PYTHONPATH=str(log.parent), PAUSE="1.2")
     assert terminal.wait() == 0
     said = terminal.said
     assert "fetching, 40 packages, " in said

@@ -34,6 +34,11 @@ def open(
 ) -> Board:
     """Open a board and wait for its hello.
 
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     zones = board.next()
+    >>> len(zones)
+    2
+
     ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB
     serial number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, else as
     fast as it is read), a virtual board (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed
@@ -104,6 +109,10 @@ _lock = threading.RLock()
 
 def read_zones(port: str | None = None, timeout: float = 1.0) -> Zones:
     """Ask a board for its contact zones: the first complete frame scanned after this call.
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> zones[0].area_mm2
+    400.0
 
     ``port`` as for :func:`open`; it stays open until :func:`open` asks for it. ``timeout`` in seconds. Past it raises
     :class:`ReadTimeout`, which is a :class:`TimeoutError`; see :func:`open` for the others.
