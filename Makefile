@@ -39,7 +39,7 @@ help: ## list the targets
 check: ## look for Python and a C++ compiler; say what to install
 	@sh scripts/check
 
-sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model and draw the scenes
+sim: $(VENV)/.stamp-sim ## run the gateware against the golden model and draw the scenes
 	$(PY) -m contactfpga_sim.demo $(ARGS)
 
 test: $(VENV)/.stamp-test | compiler ## run the tests, in some minutes
@@ -154,7 +154,7 @@ PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
 @touch $@
 endef
 
-$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
+$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt

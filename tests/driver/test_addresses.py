@@ -13,7 +13,7 @@ from contactfpga.driver.finding import Candidate
 from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.tools import cli
-from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board import native, webassembly
 from contactfpga_sim.model.board.pty_board import PtyBoard
 
 
@@ -154,6 +154,7 @@ def test_errors_cannot_command_the_terminal(capsys, monkeypatch):
     def fail(*_, **__):
         raise native.CompileFailed("line 1 \x1b[2J\nline 2")
 
+    monkeypatch.setenv(webassembly.NATIVE, "1")
     monkeypatch.setattr(native, "load", fail)
     assert cli.main(["zones", "--json", "sim://"]) == 1
     assert capsys.readouterr().err == "contactfpga: line 1 \\x1b[2J\nline 2\n"

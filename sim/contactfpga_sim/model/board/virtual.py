@@ -133,10 +133,9 @@ class VirtualBoard:
         """Run clock cycles with the scene as it is now."""
         touch, pressed = self._touch, self._scene(self.clock())
         self.pressed = pressed if touch is None else pressed | touch(self.clock())
-        self._board.press(self.pressed)
         if self.skin.units:
             self._board.load(self._units(self.clock()))
-        self._board.run(cycles)
+        self._board.hold(self.pressed[None], cycles)
 
     def clock(self) -> float:
         """Simulated seconds since power-up."""
