@@ -163,10 +163,10 @@ CASES = [
     ["flash", "elbow"],
     ["flash", "icestick"],
     ["flash", "icestick", "FOLDER"],
-    *(["simulate", name] for name in ("elbow", "", *CELLS)),
-    ["simulate", "NAN", "--threshold", "1"],
-    ["simulate", "COMPLEX", "--threshold", "1"],
-    ["simulate", "FLOATS", "--connectivity", "6"],
+    *(["replay", name] for name in ("elbow", "", *CELLS)),
+    ["replay", "NAN", "--threshold", "1"],
+    ["replay", "COMPLEX", "--threshold", "1"],
+    ["replay", "FLOATS", "--connectivity", "6"],
     IMPACT,
     [*SENSE],
     [*SENSE, "--offset", "5", "--thickness", "5"],
@@ -263,7 +263,7 @@ def numeric_options():
 
 
 OPTIONS = numeric_options()
-NEEDED = {"build": ["icestick"], "simulate": ["x.npy"], "fit": ["bumper"]}
+NEEDED = {"build": ["icestick"], "replay": ["x.npy"], "fit": ["bumper"]}
 
 
 def test_every_numeric_option_is_found():
@@ -273,7 +273,7 @@ def test_every_numeric_option_is_found():
             "wire",
             "doctor",
             "build",
-            "simulate",
+            "replay",
             "cover impact",
             "cover sense",
             "study chart",
@@ -461,7 +461,7 @@ def test_random_bytes_in_files_never_end_in_a_traceback(suffix, data, run, files
     path.write_bytes(raw[: data.draw(st.integers(0, len(raw)))] if data.draw(st.booleans()) else raw)
     commands = [["zones", "--json", f"replay://{path}"]]
     if suffix != "bin":
-        commands = [["simulate", str(path)], ["fit", str(path)], ["zones", "--json", f"sim://?scene={path}"]]
+        commands = [["replay", str(path)], ["fit", str(path)], ["zones", "--json", f"sim://?scene={path}"]]
     for command in commands:
         status, errors = run(*command)
         if status != 0:

@@ -241,7 +241,7 @@ def test_json_needs_no_display(board, loaded):
 def test_replay_of_a_built_model_loads_no_tools(tmp_path, run, loaded):
     frames = tmp_path / "frames.npy"
     np.save(frames, np.eye(16, dtype=bool)[None])
-    status, out, _ = run("simulate", frames, "--json")  # builds the model where it is not built yet
+    status, out, _ = run("replay", frames, "--json")  # builds the model where it is not built yet
     assert status == 0
     assert json.loads(out)["zones"][0]["area_cells"] == 16
     code = f"from contactfpga.tools import cli\ncli.main(['replay', {str(frames)!r}, '--json'])"

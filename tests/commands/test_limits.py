@@ -158,7 +158,7 @@ def test_no_error_fills_the_screen(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["simulate", "x.npy", "--skin", "esc\x1b[2J"], ["zones", "\x1b[2J", "\u202eab"], ["\x1b]0;a\x07"]]
+    "arguments", [["replay", "x.npy", "--skin", "esc\x1b[2J"], ["zones", "\x1b[2J", "\u202eab"], ["\x1b]0;a\x07"]]
 )
 def test_what_the_parser_of_options_quotes_is_shown_as_escapes(capsys, arguments):
     with contextlib.suppress(SystemExit):

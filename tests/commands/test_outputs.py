@@ -110,7 +110,7 @@ def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypat
     monkeypatch.setattr(native, "load", build)
     monkeypatch.setattr(replay.time, "monotonic", lambda: now.__setitem__(0, now[0] + 1.0) or now[0])
     np.save(tmp_path / "frames.npy", np.tile(np.eye(16, dtype=bool), (500, 1, 1)))
-    assert cli.main(["simulate", str(tmp_path / "frames.npy")]) == 0
+    assert cli.main(["replay", str(tmp_path / "frames.npy")]) == 0
     speed = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("speed"))
     assert "500 frames per second" in speed
 

@@ -38,7 +38,7 @@ COMMANDS = {
     "zones of 64x64 cells": ["zones", "--once", "FILES/cells"],
     "wire": ["wire", "--once", "FILES/cells"],
     "doctor": ["doctor", "--seconds", "0.01", "sim://"],
-    "simulate": ["simulate", "FILES/frames.npy"],
+    "replay": ["replay", "FILES/frames.npy"],
     "arm": ["study", "arm", "--places", "4", "--output", "FILES/arm"],
     "push": ["study", "arm", "--case", "push"],
     "an error": ["zones", "sim://?scene=no_such_scene_of_this_name"],
@@ -76,7 +76,7 @@ def test_no_line_is_wider_than_the_terminal(name, columns, files):
         assert cell_len(line.rstrip()) <= columns or str(files) in line or "sim://" in line, line
 
 
-@pytest.mark.parametrize("name", sample(COMMANDS, quick=["zones of 64x64", "doctor", "an error"], slow=["simulate"]))
+@pytest.mark.parametrize("name", sample(COMMANDS, quick=["zones of 64x64", "doctor", "an error"], slow=["replay"]))
 def test_no_character_ends_a_command(name, files):
     command = [sys.executable, "-m", "contactfpga.tools.cli", *named(name, files)]
     result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=120)

@@ -197,7 +197,7 @@ def test_commands(scene, tmp_path, capsys):
     assert "3 zones" in capsys.readouterr().out
     assert cli.main(["doctor", port, "--seconds", "0.05"]) == 0
     assert "report 'barycenter' of 3 fraction bits" in capsys.readouterr().out
-    assert cli.main(["simulate", str(frames), "--barycenter-bits", "2", "--pitch-mm", "2", "--json"]) == 0
+    assert cli.main(["replay", str(frames), "--barycenter-bits", "2", "--pitch-mm", "2", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["zones"]
     wanted = [(area, x / 2, y / 2) for area, x, y in rounded_zones(cells, 2)]
     assert sorted((zone["area_cells"], zone["x_mm"], zone["y_mm"]) for zone in found) == wanted

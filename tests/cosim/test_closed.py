@@ -132,7 +132,7 @@ def test_replay_wraps_recorded_frames_around_a_cylinder(tmp_path, capsys):
     frames = np.zeros((3, 4, 4), bool)
     frames[0, 1, [3, 0]] = frames[1, 2] = frames[2, 3, 1] = True
     np.save(tmp_path / "frames.npy", frames)
-    assert cli.main(["simulate", str(tmp_path / "frames.npy"), "--closed", "--json"]) == 0
+    assert cli.main(["replay", str(tmp_path / "frames.npy"), "--closed", "--json"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     ((seam,), (ring,), (cell,)) = (line["zones"] for line in lines)
     assert (seam["area_cells"], seam["x_mm"], seam["y_mm"], seam["winding"]) == (2, pytest.approx(35.0), 10.0, "")

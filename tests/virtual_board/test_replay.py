@@ -1,4 +1,4 @@
-"""Recorded frames through the compiled gateware and back, as `contactfpga simulate` does it."""
+"""Recorded frames through the compiled gateware and back, as `contactfpga replay` does it."""
 
 import functools
 import itertools
@@ -123,8 +123,8 @@ def test_a_lost_frame_is_an_error(monkeypatch):
 
 @pytest.fixture
 def run(run):
-    """Runs `contactfpga simulate`; returns status, output and errors."""
-    return functools.partial(run, "simulate")
+    """Runs `contactfpga replay`; returns status, output and errors."""
+    return functools.partial(run, "replay")
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ COMMANDS = {
     "flash": "Write a bitstream to a board.",
     "latency": "Measure the time from a touch to the last byte, through USB and to your code, on simulated gateware.",
     "record": "Record a board, or all boards of a robot, into an MCAP file; repair one that was not closed.",
-    "simulate": "Send recorded frames through the compiled gateware.",
+    "replay": "Send recorded frames through the compiled gateware.",
     "plot": "Draw a recording: where, when and how large it was touched.",
     "export": "Write a recording as a table: Parquet, NPZ or CSV.",
     "publish": "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one.",
@@ -60,7 +60,6 @@ RENAMED = {
     "arm": "study arm",
     "surface": "body surface",
     "recover": "record --recover",
-    "replay": "simulate",
 }
 """Old names of commands, which work in this release; the next one refuses them."""
 

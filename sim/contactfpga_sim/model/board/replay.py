@@ -230,7 +230,7 @@ class _Collector:
 
 
 def to_json(index: int, result: ReplayedFrame, skin: Skin) -> dict[str, object]:
-    """One input frame as ``contactfpga simulate --json`` prints it: as ``contactfpga zones --json`` does, with its
+    """One input frame as ``contactfpga replay --json`` prints it: as ``contactfpga zones --json`` does, with its
     number in the input and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
     cycles = {
         "last_row_to_first_record": result.first_record,

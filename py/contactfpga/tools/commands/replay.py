@@ -1,4 +1,4 @@
-"""`contactfpga simulate`: recorded frames through the compiled gateware."""
+"""`contactfpga replay`: recorded frames through the compiled gateware."""
 
 from __future__ import annotations
 
