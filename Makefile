@@ -150,7 +150,7 @@ $(VENV)/.stamp-venv:
 define install
 @echo ">>> Installing contactfpga[$(1)] into $(VENV): $(2)"
 PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
-    $(PY) -m pip install --disable-pip-version-check --editable '.[$(1)]'
+    $(PY) scripts/install.py $(VENV)/install.log --editable '.[$(1)]'
 @touch $@
 endef
 
