@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sample import sample
+from terminals import on_terminal
 
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.shipped import examples
@@ -266,6 +267,13 @@ def test_zones_come_with_no_compiler(both, tmp_path, kit, hidden):
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["pressed"] > 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_terminal_is_told_which_it_is_and_how_to_get_the_other(both):
+    both(Skin())  # or this is skipped
+    status, said = on_terminal(["zones", "sim://", "--json", "--once"], 200)
+    assert status == 0
+    assert f"runs as WebAssembly; native code, which {webassembly.NATIVE}=1 compiles, is" in said.splitlines()[0]
 
 
 def test_other_skins_need_one_and_say_so_in_a_line(tmp_path):
