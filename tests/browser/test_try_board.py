@@ -25,7 +25,7 @@ ODD = 643  # clocks, no multiple of a scan's: touches fall anywhere in one
 def by_page(steps: list[dict]) -> tuple[bytes, list[int], dict]:
     """What the page's board sends, its cycle after each step, and what the page's decoder reads in it all."""
     given = "\n".join(map(json.dumps, steps))
-    lines = node("board.mjs", str(assemble.BOARD), str(assemble.DECODER), kit(), given=given, timeout=3000).splitlines()
+    lines = node("board.mjs", str(assemble.BOARD), str(assemble.DECODER), kit(), given=given, timeout=7200).splitlines()
     *done, read = map(json.loads, lines)
     runs = [each for each in done if each]
     return bytes.fromhex("".join(each["bytes"] for each in runs)), [each["cycle"] for each in runs], read
@@ -58,7 +58,7 @@ def test_all_scenes_give_the_native_boards_bytes():
     assert len({frame["cells"] for frame in read["frames"]}) > 8
 
 
-@pytest.mark.timeout(3000)
+@pytest.mark.timeout(7200)
 @pytest.mark.parametrize("count", sample([3000, 1_000_000], quick=[3000]))
 def test_random_frames_give_the_native_boards_bytes(count, record_property):
     total = 0
