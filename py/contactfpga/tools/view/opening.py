@@ -21,8 +21,9 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
-from contactfpga.tools.view import server
+from contactfpga.tools.view import page, server
 from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, holds_robot
+from contactfpga.tools.view.cameras import Cameras
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
@@ -43,20 +44,24 @@ class View:
     """Shows a source in a server's page."""
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
-        self._source = source
+        self._source, self._hand = source, hand
+        page.dress(server)
         self.stage = Stage(server, Tiles(source.sheet), source.cells)
-        self.panel = Panel(server, source, hand)
+        self.stage.carry()
+        cameras = Cameras(server, self.stage.sides, lambda: self.stage.points_m)
+        self.panel = Panel(server, source, hand, cameras)
         self._told_s = 0.0
         self._moment: Moment | None = None
         self.drawn = 0
         """Moments drawn."""
-        self.stage.look()
         if hand is not None:
             self.stage.press_with(hand)
 
     def step(self) -> None:
         """Wait for a moment and draw it."""
         moment = self._source.poll()
+        if self._hand is not None and self.stage.limb is not None:
+            self.stage.limb.press(self._hand.fingers)
         if moment is not None:
             self._moment = moment
             self.stage.draw(moment)
@@ -66,6 +71,8 @@ class View:
             self.panel.write(self._moment)
 
 
+FOREARM = {"rows": 16, "columns": 16, "closed": True, "surface": "cylinder", "radius_mm": 45.0}
+"""The sheet that is shown where nothing is named, as in examples/forearm.toml."""
 SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
 """Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
 
@@ -176,12 +183,12 @@ def _cells(named: ViewRequest) -> LoadCells | None:
 
 
 def _virtual(named: ViewRequest) -> Any:
-    """A virtual board; with nothing named an untouched one of the Skin, or of the reference Skin at a slower clock."""
+    """A virtual board; with nothing named an untouched one of the Skin, or a sheet around a forearm."""
     if named.port is not None:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
         return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")
-    return transport.virtual_board("sim://?scene=nothing", Skin().replace(**SLOW))
+    return transport.virtual_board("sim://?scene=nothing", Skin(**FOREARM, **SLOW))
 
 
 def browse(url: str) -> None:

@@ -39,7 +39,10 @@ OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
 """Cells: open; closed on a virtual board that sends zones only, which is its own truth; closed, as the board reports;
 perhaps made by other closed ones; of a link without data."""
 
-CIRCLE, TRAIL, PUSH = (rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE))
+CIRCLE, TRAIL, PUSH, AXIS = (
+    rgb(color)
+    for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE, picture_style.GRAY)
+)
 
 
 def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:

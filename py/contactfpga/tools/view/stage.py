@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga.robot.haptics import LoadCells
-from contactfpga.tools.view import picture
+from contactfpga.tools.view import contacts, glow, picture, ruler
+from contactfpga.tools.view.cameras import Side
 from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.limb import FOAM_MM, Limb, add_plate
 from contactfpga.tools.view.sources import Moment
 from contactfpga.tools.view.tiles import MM, Tiles
 from contactfpga.tracking.tracks import Tracks
@@ -17,14 +19,12 @@ if TYPE_CHECKING:
     import viser
 
 NODE = "/sheet"
-FILLED = 0.9
+FILLED = 0.86
 """Share of the pitch that a tile takes."""
 THICK = 0.08
 """Its height, of the pitch."""
 AMBIENT, SIDE = 1.2, 0.7
 """Lights: mostly from all sides, so that a color means the same everywhere."""
-FAR, PANEL = 0.9, 0.14
-"""How far the camera is from the sheet, of its diagonal, and how far it looks past it, of that."""
 LABELS = 24
 """Contacts that have their number written beside them."""
 
@@ -63,21 +63,68 @@ class Stage:
         self._lines: dict[str, Any] = {}
         self._points: Any = None
         self._labels: list[Any] = []
+        self._glow: Any = None
+        self.limb: Limb | None = None
+        self._carried = False
         self._trails = picture.Trails(tiles.surface, 1.5 * self._lift_mm)
         self._colors: np.ndarray | None = None
 
-    def look(self) -> None:
-        """Set light and camera of those who come so that the sheet is in view and its colors are as chosen."""
-        scene = self._server.scene
-        light(self._server, (0.3, -0.5, 1.0))
-        tiles, camera = self.tiles, self._server.initial_camera
-        normal, away, aside = (mean(each) for each in (tiles.normals, tiles.along_y, tiles.along_x))
-        far = FAR * tiles.size_mm * MM
-        middle = tiles.middle_mm * MM + PANEL * far * aside  # beside the panel, not under it
-        camera.look_at = tuple(middle)
-        camera.position = tuple(middle + far * (0.9 * normal - 0.45 * away))
-        camera.near = 0.02 * far
-        scene.set_up_direction(tuple(away) if abs(normal[2]) < 0.5 else (0.0, 0.0, 1.0))
+    def carry(self) -> None:
+        """Draw what the sheet is on, and its rows, columns, origin and scale."""
+        sheet, server, self._carried = self.tiles.sheet, self._server, True
+        if sheet.closed:
+            self.limb = Limb(server, self.tiles, self._node)
+        else:
+            add_plate(server, self.tiles, self._node)
+        shade(server)
+        drawn = ruler.ruler(self.tiles, 1.5 * self._lift_mm + (FOAM_MM if sheet.closed else 0.0))
+        server.scene.add_line_segments(
+            f"{self._node}/axes", drawn.axes, picture.AXIS, thickness=2.5, thickness_units="screen"
+        )
+        for number, mark in enumerate(drawn.marks):
+            server.scene.add_label(
+                f"{self._node}/mark{number}",
+                mark.text,
+                position=mark.point,
+                anchor="center-center",
+                font_screen_scale=0.7,
+                depth_test=sheet.closed,
+            )
+
+    @property
+    def points_m(self) -> np.ndarray:
+        """(n, 3) of all that is to be in view."""
+        tiles = self.tiles
+        if self.limb is not None:
+            return self.limb.points_mm * MM
+        sheet = tiles.sheet
+        x = np.array([-1.4, sheet.columns + 0.4])[:, None] * sheet.pitch_x_mm
+        y = np.array([-1.4, sheet.rows + 0.4]) * sheet.pitch_y_mm
+        points, _ = tiles.surface.place(*(each.ravel() for each in np.broadcast_arrays(x, y)))
+        return np.concatenate([points, tiles.points_mm]) * MM
+
+    @property
+    def sides(self) -> dict[str, Side]:
+        """Where to look from: obliquely, straight, from one side, and from behind."""
+        tiles = self.tiles
+        if tiles.sheet.radius_mm is None:
+            normal, away, aside = (mean(each) for each in (tiles.normals, tiles.along_y, tiles.along_x))
+            over = Side(0.8 * normal - 0.55 * away - 0.12 * aside, normal)
+            return {
+                "overview": over,
+                "front": Side(normal, away),
+                "side": Side(aside + 0.35 * normal, normal),
+                "back": Side(0.6 * away + 0.8 * normal, normal),
+            }
+        middle = tiles.sheet.columns // 8
+        front, along = tiles.normals[middle], tiles.along_y[middle]
+        up = np.cross(front, along)
+        return {
+            "overview": Side(front + 0.45 * up + 0.5 * along, up),
+            "front": Side(front, up),
+            "side": Side(along + 0.25 * up + 0.3 * front, up),
+            "back": Side(-front, up),
+        }
 
     def draw(self, moment: Moment) -> None:
         """Show it. Only what differs is sent."""
@@ -88,7 +135,7 @@ class Stage:
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
-        self._draw_labels(moment.tracks)
+        self._draw_labels(moment)
         self._draw_arrows(self._forces(moment))
 
     def draw_no_data(self) -> None:
@@ -101,6 +148,16 @@ class Stage:
     def _color(self, colors: np.ndarray) -> None:
         if self._colors is None or not np.array_equal(colors, self._colors):
             self.cells.batched_colors = self._colors = colors
+            if self._carried:
+                self._draw_glow(glow.glow(self.tiles, colors))
+
+    def _draw_glow(self, found: glow.Glow) -> None:
+        if len(found.centers_mm):
+            self._glow = self._server.scene.add_gaussian_splats(
+                f"{self._node}/glow", found.centers_mm, found.spreads_mm2, found.colors, found.opacities, scale=MM
+            )
+        elif self._glow is not None:
+            self._glow.visible = False
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -151,19 +208,19 @@ class Stage:
             precision="float32",
         )
 
-    def _draw_labels(self, tracks: Tracks) -> None:
-        shown = [track for track in tracks.active if track.zone.x_mm is not None][:LABELS]
+    def _draw_labels(self, moment: Moment) -> None:
+        shown = [row for row in contacts.rows(moment) if row.id is not None and row.x_mm is not None][:LABELS]
         while len(self._labels) < len(shown):
             path = f"{self._node}/contact{len(self._labels)}"
-            self._labels.append(self._server.scene.add_label(path, "", anchor="bottom-left"))
-        for label, track in zip(self._labels, shown):
-            x_mm, y_mm = track.zone.x_mm, track.zone.y_mm
-            assert x_mm is not None
-            assert y_mm is not None
-            point, normal = self.tiles.surface.place(x_mm, y_mm)
-            label.position = (np.array(point) + 0.4 * self._pitch_mm * np.array(normal)) * MM
-            area = track.zone.area_cells
-            label.text = f"#{track.id}: {area} cell{'' if area == 1 else 's'}"
+            self._labels.append(
+                self._server.scene.add_label(path, "", anchor="bottom-left", font_screen_scale=0.8)
+            )
+        for number, (label, row) in enumerate(zip(self._labels, shown)):
+            assert row.x_mm is not None
+            assert row.y_mm is not None
+            point, normal = self.tiles.surface.place(row.x_mm, row.y_mm)
+            label.position = (np.array(point) + 0.6 * self._pitch_mm * np.array(normal)) * MM
+            label.text = row.caption if number < contacts.MOST else f"#{row.id}"
             label.visible = True
         for label in self._labels[len(shown) :]:
             label.visible = False
@@ -192,6 +249,16 @@ class Stage:
             place = self._met(eye, np.array(to) - eye)
             if place is not None:
                 hand.drag(event.client_id, *place)
+
+
+def shade(server: viser.ViserServer) -> None:
+    """Light from above and in front, a little from below, and less from all sides: forms show."""
+    scene = server.scene
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.configure_environment_map(None)
+    scene.add_light_ambient("/light/all", intensity=0.9)
+    scene.add_light_directional("/light/key", intensity=2.0, position=(0.3, -0.5, 1.0))
+    scene.add_light_directional("/light/rim", color=(225, 232, 245), intensity=0.8, position=(-0.6, 0.8, -0.2))
 
 
 def light(server: viser.ViserServer, side: tuple[float, float, float]) -> None:
