@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactfpga.tools.view.tiles import Tiles
+
 if TYPE_CHECKING:
     import viser
 
@@ -63,6 +65,28 @@ def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_R
     position = across * right + up * upward + depth * ahead
     middle = (float(depths.min()) + float(depths.max())) / 2
     return Placed(position, position + (middle - depth) * ahead)
+
+
+def sides_of(tiles: Tiles) -> dict[str, Side]:
+    """Of a sheet: obliquely, straight at it, along it, and from behind. One around a limb lies, with row 0 on the
+    left."""
+    if tiles.sheet.radius_mm is None:
+        normal, away, aside = (each.mean(0) for each in (tiles.normals, tiles.along_y, tiles.along_x))
+        return {
+            "overview": Side(0.8 * normal - 0.55 * away - 0.12 * aside, normal),
+            "front": Side(normal, away),
+            "side": Side(aside + 0.35 * normal, normal),
+            "back": Side(0.6 * away + 0.8 * normal, normal),
+        }
+    column = tiles.sheet.columns // (8 if tiles.sheet.closed else 2)
+    front, along = tiles.normals[column], tiles.along_y[column]
+    up = np.cross(front, along)
+    return {
+        "overview": Side(front + 0.45 * up + 0.5 * along, up),
+        "front": Side(front, up),
+        "side": Side(along + 0.8 * front + 0.3 * up, up),
+        "back": Side(-front, up),
+    }
 
 
 class Cameras:

@@ -43,12 +43,12 @@ class Row:
         return f"{self.link} {'' if self.id is None else f'#{self.id}'}".strip()
 
     @property
-    def caption(self) -> str:
-        """What is written beside it."""
+    def lines(self) -> tuple[str, str]:
+        """Name and place; what else is known."""
         parts = [f"{self.area_mm2:,.0f} mm²"]
         parts += [] if self.age_s is None else [f"{self.age_s:.1f} s"]
         parts += [] if self.force_n is None else [f"{self.force_n:.1f} N"]
-        return f"#{self.id}   {self.place} mm\n{'   '.join(parts)}"
+        return f"{self.name}   {self.place} mm".strip(), "   ".join(parts)
 
 
 def rows(moment: Moment, link: str = "") -> list[Row]:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.tiles import MM, Tiles
-from contactfpga.zones.around import across
 
 if TYPE_CHECKING:
     import viser
@@ -18,8 +15,8 @@ FOAM_MM = 5.0
 """Thickness of the foam, which is drawn and presses nothing: the default of a Skin's `[cover]`."""
 UNDER_MM = 1.2
 """From the cells to what carries them."""
-DENT = 0.75
-"""Depth of a finger in the foam, of its thickness."""
+LEFT_MM = 1.0
+"""What is left of it over a closed cell."""
 SIDES = 72
 """Of a solid of revolution."""
 
@@ -32,7 +29,7 @@ class Limb:
     def __init__(self, server: viser.ViserServer, tiles: Tiles, node: str):
         sheet = tiles.sheet
         assert sheet.radius_mm is not None
-        self._tiles, self._dents = tiles, ()
+        self._tiles = tiles
         low, high = -sheet.pitch_y_mm, sheet.rows * sheet.pitch_y_mm
         radius = sheet.radius_mm
         self._profile = foam_profile(radius, low, high)
@@ -44,12 +41,10 @@ class Limb:
         self.points_mm = np.concatenate([revolved(profile)[0] for profile, _ in parts.values()])
         """(n, 3) of all that is drawn."""
 
-    def press(self, fingers: Sequence[Finger]) -> None:
-        """Dent the foam under the fingers."""
-        if (dents := tuple(fingers)) != self._dents:
-            self._dents = dents
-            vertices, _ = revolved(self._profile)
-            self._foam.vertices = (dented(vertices, self._tiles, dents) * MM).astype(np.float32)
+    def press(self, closed: np.ndarray) -> None:
+        """Dent the foam over these cells, (n,) bool row by row."""
+        vertices, _ = revolved(self._profile)
+        self._foam.vertices = (dented(vertices, self._tiles, closed) * MM).astype(np.float32)
 
 
 def forearm(radius: float, low: float, high: float) -> dict[str, tuple[np.ndarray, tuple[int, int, int]]]:
@@ -60,9 +55,9 @@ def forearm(radius: float, low: float, high: float) -> dict[str, tuple[np.ndarra
         "core": (np.array([(0, low - 4), (core, low - 4), (core, high + 4), (0, high + 4)], float), CORE),
         "elbow collar": (_ring(core, rim, low - 12, low), COLLAR),
         "wrist collar": (_ring(core, rim, high, high + 12), COLLAR),
-        "elbow": (_rounded(0.92 * core, low - 12 - 0.36 * length, low - 12, 0.9 * core), JOINT),
-        "wrist": (_tapered(0.9 * core, 0.55 * core, high + 12, high + 12 + 0.2 * length), JOINT),
-        "flange": (_ring(0.0, 0.68 * core, high + 12 + 0.2 * length, high + 22 + 0.2 * length), COLLAR),
+        "elbow": (_rounded(0.92 * core, low - 12 - 0.28 * length, low - 12, 0.9 * core), JOINT),
+        "wrist": (_tapered(0.9 * core, 0.55 * core, high + 12, high + 12 + 0.15 * length), JOINT),
+        "flange": (_ring(0.0, 0.68 * core, high + 12 + 0.15 * length, high + 22 + 0.15 * length), COLLAR),
     }
 
 
@@ -76,17 +71,18 @@ def foam_profile(radius: float, low: float, high: float) -> np.ndarray:
     return np.concatenate([begin, np.stack([np.full(len(between), radius + FOAM_MM), between], -1), end])
 
 
-def dented(vertices: np.ndarray, tiles: Tiles, fingers: Sequence[Finger]) -> np.ndarray:
-    """The same (n, 3) mm, toward the axis where fingers press."""
+def dented(vertices: np.ndarray, tiles: Tiles, closed: np.ndarray) -> np.ndarray:
+    """The same (n, 3) mm, toward the axis over closed cells and a little around them."""
     sheet = tiles.sheet
     assert sheet.radius_mm is not None
-    around = np.arctan2(vertices[:, 1], vertices[:, 0])
+    turns = np.arctan2(vertices[:, 1], vertices[:, 0])
     radii = np.hypot(vertices[:, 0], vertices[:, 1])
-    depths = np.zeros(len(vertices))
-    for finger in fingers:
-        off_x = across(around * sheet.radius_mm - finger.x_mm, 2 * np.pi * sheet.radius_mm)
-        off = np.hypot(off_x, vertices[:, 2] - finger.y_mm) / finger.radius_mm
-        depths = np.maximum(depths, DENT * FOAM_MM * np.exp(-(off**2)))
+    whole = np.ones(len(vertices))
+    for x_mm, y_mm in zip(tiles.x_mm[closed], tiles.y_mm[closed]):
+        columns = np.angle(np.exp(1j * (turns - x_mm / sheet.radius_mm))) * sheet.radius_mm / sheet.pitch_x_mm
+        away = np.hypot(columns, (vertices[:, 2] - y_mm) / sheet.pitch_y_mm)
+        whole *= 1 - np.exp(-(away**4))
+    depths = (FOAM_MM - LEFT_MM) * (1 - whole)
     inner = np.maximum(radii - depths, np.minimum(radii, sheet.radius_mm))
     return np.concatenate([vertices[:, :2] * (inner / radii)[:, None], vertices[:, 2:]], -1)
 
@@ -142,7 +138,12 @@ def _tapered(begin: float, end: float, low: float, high: float) -> np.ndarray:
 
 
 def _add(
-    server: viser.ViserServer, name: str, vertices: np.ndarray, faces: np.ndarray, color: Any, opacity: float | None = None
+    server: viser.ViserServer,
+    name: str,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    color: Any,
+    opacity: float | None = None,
 ) -> Any:
     return server.scene.add_mesh_simple(
         name,

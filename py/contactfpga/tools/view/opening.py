@@ -23,7 +23,7 @@ from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.tools.view import page, server
 from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, holds_robot
-from contactfpga.tools.view.cameras import Cameras
+from contactfpga.tools.view.cameras import Cameras, sides_of
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
@@ -44,11 +44,10 @@ class View:
     """Shows a source in a server's page."""
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
-        self._source, self._hand = source, hand
+        self._source = source
         page.dress(server)
         self.stage = Stage(server, Tiles(source.sheet), source.cells)
-        self.stage.carry()
-        cameras = Cameras(server, self.stage.sides, lambda: self.stage.points_m)
+        cameras = Cameras(server, sides_of(self.stage.tiles), lambda: self.stage.points_m)
         self.panel = Panel(server, source, hand, cameras)
         self._told_s = 0.0
         self._moment: Moment | None = None
@@ -60,8 +59,6 @@ class View:
     def step(self) -> None:
         """Wait for a moment and draw it."""
         moment = self._source.poll()
-        if self._hand is not None and self.stage.limb is not None:
-            self.stage.limb.press(self._hand.fingers)
         if moment is not None:
             self._moment = moment
             self.stage.draw(moment)
@@ -105,6 +102,8 @@ class ViewRequest:
     """Of a recording of several boards."""
     units: str | Path | None = None
     """File of the pressure units; by default what ``sim://`` names."""
+    flat: bool = False
+    """With nothing named: a flat sheet in place of the one around a forearm."""
     reading: Reading = silent
     """Told how far a recording is read that has no index."""
 
@@ -148,6 +147,8 @@ def _check(named: ViewRequest) -> None:
         if getattr(named, name) is not None and (is_body or recorded):
             other = "sets it for each link" if is_body else "is a recording"
             raise ContactFPGAError(f"--{name} is for a board; {port} {other}")
+    if named.flat and (port is not None or named.skin is not None):
+        raise ContactFPGAError("--flat is for the sheet that is shown where nothing is named")
     if named.link is not None and not recorded:
         raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
@@ -188,7 +189,7 @@ def _virtual(named: ViewRequest) -> Any:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
         return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")
-    return transport.virtual_board("sim://?scene=nothing", Skin(**FOREARM, **SLOW))
+    return transport.virtual_board("sim://?scene=nothing", Skin().replace(**SLOW, **({} if named.flat else FOREARM)))
 
 
 def browse(url: str) -> None:

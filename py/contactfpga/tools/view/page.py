@@ -1,9 +1,11 @@
-"""How viser's page looks here: its panel under the sheet on a phone, and none of its own marks over the sheet."""
+"""How viser's page looks here: its panel under the sheet on a phone, and none of its own marks over the sheet;
+and a picture of it."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import viser
@@ -13,8 +15,8 @@ PANEL_PX = 330
 
 STYLE = """
 @media (max-width: 36em) {
-  div:has(> .mantine-Paper-root[style*="bottom: 0"]) { flex-direction: column; }
-  div:has(> .mantine-Paper-root[style*="bottom: 0"]) > div:has([data-dock-root]) { height: auto !important; min-height: 0; }
+  :has(> .mantine-Paper-root[style*="bottom: 0"]) { flex-direction: column; }
+  :has(+ .mantine-Paper-root[style*="bottom: 0"]) { height: auto !important; min-height: 0; }
   .mantine-Paper-root[style*="bottom: 0"] {
     position: relative !important; width: 100% !important; max-height: 46% !important; flex-shrink: 0;
   }
@@ -26,6 +28,7 @@ STYLE = """
 .contacts th:first-child, .contacts td:first-child { text-align: left; }
 .contacts tbody tr { border-top: 1px solid var(--mantine-color-default-border); }
 .contact-list { padding: 0.4rem 0.6rem; min-height: 8.2rem; }
+.chart { padding: 0 0.6rem; }
 .contact-list b { font-size: 0.95rem; }
 """
 
@@ -39,19 +42,50 @@ SCRIPT = """
     for (const one of window.__viserMutable?.scene?.children ?? [])
       if (one.line && one.cone) one.line.visible = one.cone.visible = false;
   }, true);
+  window.contactfpgaPicture = (lines) => {
+    const seen = window.__viserMutable.canvas, card = document.createElement("canvas");
+    const size = 14 * seen.width / seen.clientWidth, step = 1.6 * size;
+    card.width = seen.width;
+    card.height = seen.height + step * (lines.length + 1);
+    const pen = card.getContext("2d"), colors = getComputedStyle(document.body);
+    pen.fillStyle = colors.backgroundColor;
+    pen.fillRect(0, 0, card.width, card.height);
+    pen.drawImage(seen, 0, 0);
+    pen.fillStyle = colors.color;
+    lines.forEach((line, number) => {
+      pen.font = `${number ? "" : "bold "}${size}px sans-serif`;
+      pen.fillText(line, size, seen.height + step * (number + 1));
+    });
+    card.toBlob((file) => {
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(file);
+      link.download = "contactfpga.png";
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
+  };
 })();
 """
-"""Before a drag: without viser's arrow from its beginning to the mouse, and without the cross it turns around."""
+"""Before a drag: without viser's arrow from its beginning to the mouse, and without the cross it turns around. And a
+picture of what is seen, in the page's colors, with lines of text under it."""
 
 
 def dress(server: viser.ViserServer) -> None:
     """For all who come. viser has no setting for any of this, but sends a script to the page where a part of it asks
     for one."""
-    from viser import _messages
-
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.set_panel_label("contactfpga")
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(PANEL_PX)
-    source = SCRIPT.replace("STYLE", json.dumps(STYLE))
-    server._websock_server.queue_message(_messages.RunJavascriptMessage(source))
+    _run(server._websock_server, SCRIPT.replace("STYLE", json.dumps(STYLE)))
+
+
+def picture(client: Any, lines: Sequence[str]) -> None:
+    """Have this browser save what it shows as `contactfpga.png`, with these lines under it."""
+    _run(client._websock_connection, f"window.contactfpgaPicture({json.dumps(list(lines))})")
+
+
+def _run(to: Any, source: str) -> None:
+    from viser import _messages
+
+    to.queue_message(_messages.RunJavascriptMessage(source))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -10,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.tools.view import contacts, controls, picture
+from contactfpga.tools.view import chart, contacts, controls, picture
 from contactfpga.tools.view.cameras import Cameras
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.playback import SPEEDS, Playback
-from contactfpga.tools.view.sources import CHART_S, Moment, Source, paced
+from contactfpga.tools.view.sources import Moment, Source, paced
 
 if TYPE_CHECKING:
     import viser
@@ -39,13 +38,9 @@ TRUTH = (
 """Of the legend: name and value of a color, its mark, what it means."""
 
 FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {picture.MM_PER_N:g} mm per newton")
-CHART_BLUE = "#2b8fd0"
-"""Lighter than the pressed cells', to be read on a dark panel too."""
 TITLE = 36
 MOST_N = 30.0
 """Of the mouse's finger."""
-WHOLE = (1, 2, 5, 10, 20, 50, 100, 200, 500)
-"""Steps of an axis that counts."""
 
 
 class Panel:
@@ -57,7 +52,7 @@ class Panel:
         gui = server.gui
         self._table = gui.add_html(contacts.table(()))
         self._timeline = TimelineControls(server, source) if isinstance(source, Playback) else None
-        self._chart = self._add_chart(server)
+        self._chart = gui.add_html("")
         controls.add(server, cameras, self._caption)
         if hand is not None:
             self._add_mouse(server, hand)
@@ -66,33 +61,13 @@ class Panel:
         with gui.add_folder("Colors"):
             gui.add_markdown(legend(source, hand is not None))
 
-    def _add_chart(self, server: viser.ViserServer) -> Any:
-        none = np.array([-1.0, 0.0])
-        return server.gui.add_uplot(
-            (none, none * 0, none * 0),
-            (
-                {},
-                {"label": "contacts", "stroke": picture_style.VERMILLION, "width": 2, "scale": "y"},
-                {"label": "area, cm²", "stroke": CHART_BLUE, "width": 2, "scale": "cm2"},
-            ),
-            scales=scales(none * 0, none * 0),
-            axes=(
-                {"label": "seconds, now at 0", "incrs": WHOLE, "space": 34, "size": 28, "labelSize": 18},
-                {"scale": "y", "stroke": picture_style.VERMILLION, "incrs": WHOLE, "size": 34},
-                {"scale": "cm2", "side": 1, "stroke": CHART_BLUE, "size": 40, "grid": {"show": False}},
-            ),
-            legend={"live": False},
-            height=150,
-            padding=(12, 0, 0, 0),  # the highest number is not cut
-        )
-
     def _add_mouse(self, server: viser.ViserServer, hand: Hand) -> None:
         sheet = self._source.sheet
         pitch_mm = max(sheet.pitch_x_mm, sheet.pitch_y_mm)
         with server.gui.add_folder("Fingers"):
             server.gui.add_markdown(MOUSE)
             low, high = round(0.5 * pitch_mm, 1), round(3 * pitch_mm, 1)
-            radius = server.gui.add_slider("radius, mm", low, high, 0.1, min(max(hand.radius_mm, low), high))
+            radius = server.gui.add_slider("radius, mm", low, high, 0.1, round(min(max(hand.radius_mm, low), high), 1))
             force = None
             if self._source.cells is not None or hand.board.by_force:
                 force = server.gui.add_slider("force, N", 0.5, MOST_N, 0.1, hand.force_n)
@@ -114,26 +89,9 @@ class Panel:
         self._moment = moment
         self._table.content = contacts.table(() if moment is None else contacts.rows(moment))
         self._facts.content = as_markdown(facts(self._source, moment))
-        strip = self._source.meter.strip
-        if len(strip.seconds) > 1:
-            self._chart.data = (strip.seconds, strip.zones, strip.area_mm2 / 100)
-            if (wanted := scales(strip.zones, strip.area_mm2 / 100)) != self._chart.scales:
-                self._chart.scales = wanted
+        self._chart.content = f'<div class="chart">{chart.chart(self._source.meter.strip)}</div>'
         if self._timeline is not None:
             self._timeline.write()
-
-
-def scales(zones: np.ndarray, area_cm2: np.ndarray) -> dict[str, Any]:
-    """Of the chart's axes: from 0 to a round number, so that they change seldom."""
-    x = {"time": False, "range": (-CHART_S, 0)}
-    return {"x": x, "y": {"range": (0, _top(zones, 2))}, "cm2": {"range": (0, _top(area_cm2, 10))}}
-
-
-def _top(values: np.ndarray, least: int) -> int:
-    """1, 2 or 5 times a power of ten."""
-    wanted = max(least, math.ceil(values.max()))
-    power = int(10 ** (len(str(wanted)) - 1))
-    return next(times * power for times in (1, 2, 5, 10) if times * power >= wanted)
 
 
 class TimelineControls:
@@ -197,4 +155,3 @@ def legend(source: Source, virtual: bool) -> str:
     rows += [FORCE] if source.cells is not None else []
     rows += [TRUTH] if virtual and not cells else []
     return "\n".join(f"{_MARK.format(color=color, mark=mark)} {what}  " for _, color, mark, what in rows)
-

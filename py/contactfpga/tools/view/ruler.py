@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga.tools.view import picture
 from contactfpga.tools.view.tiles import MM, Tiles
+
+if TYPE_CHECKING:
+    import viser
 
 BEYOND = 1.1
 """From the outermost cells to the numbers, in pitches."""
-MARKS = 5
+MARKS = 4
 """Numbers along an edge, about."""
 AXIS = 2.5
 """Length of an axis, in pitches."""
@@ -44,7 +49,7 @@ def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
         return (np.array(point) + lift_mm * np.array(normal)) * MM
 
     left, below = (-0.5 if sheet.closed else -BEYOND) * pitch_x, -BEYOND * pitch_y
-    marks = [Mark(named("column", n, pitch_x), at(n * pitch_x, below)) for n in numbers(sheet.columns, sheet.closed)]
+    marks = [Mark(named("column", n, pitch_x), at(n * pitch_x, below)) for n in numbers(sheet.columns)]
     for x_mm in (left, left + sheet.columns / 2 * pitch_x) if sheet.closed else (left,):
         marks += [Mark(named("row", n, pitch_y), at(x_mm, n * pitch_y)) for n in numbers(sheet.rows)]
     steps = np.linspace(0, AXIS, 9)
@@ -53,16 +58,23 @@ def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
     return Ruler(np.concatenate([_segments(each) for each in (along_x, along_y)]), tuple(marks))
 
 
-def numbers(count: int, closed: bool = False) -> list[int]:
-    """Of some lines among so many: the first, round ones, and the last where the ends do not meet."""
-    step = max(1, round(count / MARKS))
-    last = [] if closed else [count - 1]
-    return [number for number in range(0, count, step) if number < count - max(1, step // 2)] + last
+def add(server: viser.ViserServer, node: str, tiles: Tiles, lift_mm: float) -> None:
+    """Draw it. What is behind a limb is hidden by it."""
+    drawn, scene = ruler(tiles, lift_mm), server.scene
+    scene.add_line_segments(f"{node}/axes", drawn.axes, picture.AXIS, thickness=2.5, thickness_units="screen")
+    for number, mark in enumerate(drawn.marks):
+        where = {"position": mark.point, "anchor": "center-center", "depth_test": tiles.sheet.closed}
+        scene.add_label(f"{node}/mark{number}", mark.text, font_screen_scale=0.7, **where)
+
+
+def numbers(count: int) -> range:
+    """Of some lines among so many, evenly spaced from the first."""
+    return range(0, count, max(1, round(count / MARKS)))
 
 
 def named(kind: str, number: int, pitch_mm: float) -> str:
     """Number and place of a line."""
-    return f"{kind} {number}: 0 mm" if number == 0 else f"{number}: {number * pitch_mm:.0f}"
+    return f"{kind} 0" if number == 0 else f"{number}: {number * pitch_mm:.0f} mm"
 
 
 def _segments(points: list[np.ndarray]) -> np.ndarray:

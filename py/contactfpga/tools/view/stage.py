@@ -8,12 +8,10 @@ import numpy as np
 
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.tools.view import contacts, glow, picture, ruler
-from contactfpga.tools.view.cameras import Side
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.limb import FOAM_MM, Limb, add_plate
 from contactfpga.tools.view.sources import Moment
 from contactfpga.tools.view.tiles import MM, Tiles
-from contactfpga.tracking.tracks import Tracks
 
 if TYPE_CHECKING:
     import viser
@@ -23,8 +21,6 @@ FILLED = 0.86
 """Share of the pitch that a tile takes."""
 THICK = 0.08
 """Its height, of the pitch."""
-AMBIENT, SIDE = 1.2, 0.7
-"""Lights: mostly from all sides, so that a color means the same everywhere."""
 LABELS = 24
 """Contacts that have their number written beside them."""
 
@@ -38,7 +34,15 @@ FACES = np.array(
 class Stage:
     """Draws moments of one sheet."""
 
-    def __init__(self, server: viser.ViserServer, tiles: Tiles, load_cells: LoadCells | None = None, node: str = NODE):
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        tiles: Tiles,
+        load_cells: LoadCells | None = None,
+        node: str = NODE,
+        carried: bool = True,
+    ):
+        """``carried``: drawn on a limb or a plate, with its rows and columns numbered."""
         self._load_cells = load_cells
         self._arrows: Any = None
         self.rotation, self.point_m = np.eye(3), np.zeros(3)
@@ -46,7 +50,9 @@ class Stage:
         self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
-        self._lift_mm = 0.06 * self._pitch_mm
+        self.limb = Limb(server, tiles, node) if carried and sheet.closed else None
+        under_mm = 0.0 if self.limb is None else FOAM_MM
+        self._lift_mm = under_mm + 0.06 * self._pitch_mm
         scene = server.scene
         size = np.array([sheet.pitch_x_mm * FILLED, sheet.pitch_y_mm * FILLED, self._pitch_mm * THICK])
         self.cells = scene.add_batched_meshes_simple(
@@ -63,33 +69,18 @@ class Stage:
         self._lines: dict[str, Any] = {}
         self._points: Any = None
         self._labels: list[Any] = []
-        self._glow: Any = None
-        self.limb: Limb | None = None
-        self._carried = False
-        self._trails = picture.Trails(tiles.surface, 1.5 * self._lift_mm)
+        self._glow = glow.Glow(server, f"{node}/glow", tiles, under_mm) if carried else None
+        self._trails = picture.Trails(tiles.surface, self._lift_mm + 0.03 * self._pitch_mm)
         self._colors: np.ndarray | None = None
+        if carried:
+            self._carry(under_mm)
 
-    def carry(self) -> None:
-        """Draw what the sheet is on, and its rows, columns, origin and scale."""
-        sheet, server, self._carried = self.tiles.sheet, self._server, True
-        if sheet.closed:
-            self.limb = Limb(server, self.tiles, self._node)
-        else:
-            add_plate(server, self.tiles, self._node)
-        shade(server)
-        drawn = ruler.ruler(self.tiles, 1.5 * self._lift_mm + (FOAM_MM if sheet.closed else 0.0))
-        server.scene.add_line_segments(
-            f"{self._node}/axes", drawn.axes, picture.AXIS, thickness=2.5, thickness_units="screen"
-        )
-        for number, mark in enumerate(drawn.marks):
-            server.scene.add_label(
-                f"{self._node}/mark{number}",
-                mark.text,
-                position=mark.point,
-                anchor="center-center",
-                font_screen_scale=0.7,
-                depth_test=sheet.closed,
-            )
+    def _carry(self, under_mm: float) -> None:
+        """Draw what the sheet is on, its rows, columns and origin."""
+        if self.limb is None:
+            add_plate(self._server, self.tiles, self._node)
+        ruler.add(self._server, self._node, self.tiles, under_mm + 0.2 * self._pitch_mm)
+        light(self._server, (0.3, -0.5, 1.0))
 
     @property
     def points_m(self) -> np.ndarray:
@@ -102,29 +93,6 @@ class Stage:
         y = np.array([-1.4, sheet.rows + 0.4]) * sheet.pitch_y_mm
         points, _ = tiles.surface.place(*(each.ravel() for each in np.broadcast_arrays(x, y)))
         return np.concatenate([points, tiles.points_mm]) * MM
-
-    @property
-    def sides(self) -> dict[str, Side]:
-        """Where to look from: obliquely, straight, from one side, and from behind."""
-        tiles = self.tiles
-        if tiles.sheet.radius_mm is None:
-            normal, away, aside = (mean(each) for each in (tiles.normals, tiles.along_y, tiles.along_x))
-            over = Side(0.8 * normal - 0.55 * away - 0.12 * aside, normal)
-            return {
-                "overview": over,
-                "front": Side(normal, away),
-                "side": Side(aside + 0.35 * normal, normal),
-                "back": Side(0.6 * away + 0.8 * normal, normal),
-            }
-        middle = tiles.sheet.columns // 8
-        front, along = tiles.normals[middle], tiles.along_y[middle]
-        up = np.cross(front, along)
-        return {
-            "overview": Side(front + 0.45 * up + 0.5 * along, up),
-            "front": Side(front, up),
-            "side": Side(along + 0.25 * up + 0.3 * front, up),
-            "back": Side(-front, up),
-        }
 
     def draw(self, moment: Moment) -> None:
         """Show it. Only what differs is sent."""
@@ -148,16 +116,10 @@ class Stage:
     def _color(self, colors: np.ndarray) -> None:
         if self._colors is None or not np.array_equal(colors, self._colors):
             self.cells.batched_colors = self._colors = colors
-            if self._carried:
-                self._draw_glow(glow.glow(self.tiles, colors))
-
-    def _draw_glow(self, found: glow.Glow) -> None:
-        if len(found.centers_mm):
-            self._glow = self._server.scene.add_gaussian_splats(
-                f"{self._node}/glow", found.centers_mm, found.spreads_mm2, found.colors, found.opacities, scale=MM
-            )
-        elif self._glow is not None:
-            self._glow.visible = False
+            if self._glow is not None:
+                self._glow.show(colors)
+            if self.limb is not None:
+                self.limb.press(picture.lit(colors))
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -212,15 +174,13 @@ class Stage:
         shown = [row for row in contacts.rows(moment) if row.id is not None and row.x_mm is not None][:LABELS]
         while len(self._labels) < len(shown):
             path = f"{self._node}/contact{len(self._labels)}"
-            self._labels.append(
-                self._server.scene.add_label(path, "", anchor="bottom-left", font_screen_scale=0.8)
-            )
+            self._labels.append(self._server.scene.add_label(path, "", anchor="bottom-left", font_screen_scale=0.8))
         for number, (label, row) in enumerate(zip(self._labels, shown)):
             assert row.x_mm is not None
             assert row.y_mm is not None
             point, normal = self.tiles.surface.place(row.x_mm, row.y_mm)
-            label.position = (np.array(point) + 0.6 * self._pitch_mm * np.array(normal)) * MM
-            label.text = row.caption if number < contacts.MOST else f"#{row.id}"
+            label.position = (np.array(point) + (self._lift_mm + 0.5 * self._pitch_mm) * np.array(normal)) * MM
+            label.text = "\n".join(row.lines) if number < contacts.MOST else row.name
             label.visible = True
         for label in self._labels[len(shown) :]:
             label.visible = False
@@ -251,28 +211,15 @@ class Stage:
                 hand.drag(event.client_id, *place)
 
 
-def shade(server: viser.ViserServer) -> None:
-    """Light from above and in front, a little from below, and less from all sides: forms show."""
-    scene = server.scene
-    scene.configure_default_lights(enabled=False, cast_shadow=False)
-    scene.configure_environment_map(None)
-    scene.add_light_ambient("/light/all", intensity=0.9)
-    scene.add_light_directional("/light/key", intensity=2.0, position=(0.3, -0.5, 1.0))
-    scene.add_light_directional("/light/rim", color=(225, 232, 245), intensity=0.8, position=(-0.6, 0.8, -0.2))
+EVERYWHERE, KEY, RIM = 0.9, 2.0, 0.8
+"""How strong the lights are."""
 
 
 def light(server: viser.ViserServer, side: tuple[float, float, float]) -> None:
-    """From all sides, and a little from this one."""
+    """From all sides, from this one and less from the opposite one, so that forms show."""
     scene = server.scene
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.configure_environment_map(None)
-    scene.add_light_ambient("/light/all", intensity=AMBIENT)
-    scene.add_light_directional("/light/side", intensity=SIDE, position=side)
-
-
-def mean(directions: np.ndarray) -> np.ndarray:
-    """The direction between them, or the first one where they turn all around."""
-    found = directions.mean(0)
-    length = float(np.linalg.norm(found))
-    unit: np.ndarray = found / length if length > 0.1 else directions[0]
-    return unit
+    scene.add_light_ambient("/light/all", intensity=EVERYWHERE)
+    scene.add_light_directional("/light/key", intensity=KEY, position=side)
+    scene.add_light_directional("/light/rim", intensity=RIM, position=(-side[0], -side[1], -0.2 * side[2]))

@@ -29,6 +29,10 @@ WATCH = """
     const context = probe.getContext('2d', {willReadFrequently: true});
     const now = () => performance.timeOrigin + performance.now();
     document.addEventListener('pointerup', () => { window.clicked_ms = now(); }, true);
+    window.box = () => {
+        const box = canvas.getBoundingClientRect();
+        return [box.x, box.y, box.width, box.height];
+    };
     window.pixels = (x, y) => {
         context.clearRect(0, 0, 9, 9);
         context.drawImage(canvas, x * canvas.width - 4, y * canvas.height - 4, 9, 9, 0, 0, 9, 9);
@@ -110,8 +114,8 @@ class Visitor:
 
     def _pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
         x, y = self.place(x_mm, y_mm)
-        size = self.page.viewport_size
-        return x * size["width"], y * size["height"]
+        left, top, width, height = self.page.evaluate("window.box()")
+        return left + x * width, top + y * height
 
 
 def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
