@@ -107,7 +107,15 @@ class Cameras:
 
     def show(self, client: Any, name: str) -> None:
         """Turn this browser's camera to a side."""
-        self._set(client.camera, self.sides[name])
+        self.look(client.camera, self.sides[name])
+
+    def look(self, camera: Any, side: Side) -> None:
+        """Have this camera hold all that is shown, from there."""
+        placed = fitted(self._points(), side, camera.aspect, camera.fov)
+        with camera.client.atomic():
+            camera.up_direction = side.up
+            camera.position = placed.position
+            camera.look_at = placed.look_at
 
     def _follow(self, client: Any) -> None:
         self._sizes[client.client_id] = _size(client.camera)
@@ -119,14 +127,7 @@ class Cameras:
         size = _size(camera)
         if self._sizes.get(camera.client.client_id) != size:
             self._sizes[camera.client.client_id] = size
-            self._set(camera, Side(camera.position - camera.look_at, camera.up_direction))
-
-    def _set(self, camera: Any, side: Side) -> None:
-        placed = fitted(self._points(), side, camera.aspect, camera.fov)
-        with camera.client.atomic():
-            camera.up_direction = side.up
-            camera.position = placed.position
-            camera.look_at = placed.look_at
+            self.look(camera, Side(camera.position - camera.look_at, camera.up_direction))
 
 
 def _size(camera: Any) -> tuple[int, int]:

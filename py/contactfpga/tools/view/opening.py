@@ -47,8 +47,8 @@ class View:
         self._source = source
         page.dress(server)
         self.stage = Stage(server, Tiles(source.sheet), source.cells)
-        cameras = Cameras(server, sides_of(self.stage.tiles), lambda: self.stage.points_m)
-        self.panel = Panel(server, source, hand, cameras)
+        self.cameras = Cameras(server, sides_of(self.stage.tiles), lambda: self.stage.points_m)
+        self.panel = Panel(server, source, hand, self.cameras)
         self._told_s = 0.0
         self._moment: Moment | None = None
         self.drawn = 0

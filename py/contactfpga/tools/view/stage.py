@@ -179,7 +179,7 @@ class Stage:
             assert row.x_mm is not None
             assert row.y_mm is not None
             point, normal = self.tiles.surface.place(row.x_mm, row.y_mm)
-            label.position = (np.array(point) + (self._lift_mm + 0.5 * self._pitch_mm) * np.array(normal)) * MM
+            label.position = (np.array(point) + (self._lift_mm + 0.9 * self._pitch_mm) * np.array(normal)) * MM
             label.text = "\n".join(row.lines) if number < contacts.MOST else row.name
             label.visible = True
         for label in self._labels[len(shown) :]:
