@@ -244,7 +244,6 @@ def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
     hand, view, sheet = shown.hand, shown.view, sheet_of(shown)
     assert hand is not None
     assert isinstance(view, View)
-    hand.radius_mm = 1.1 * max(sheet.pitch_x_mm, sheet.pitch_y_mm)
     hand.drag("strokes", one.strokes[0] * sheet.pitch_x_mm, one.strokes[1] * sheet.pitch_y_mm)
     if one.presses:
         hand.drag("presses", PRESSED[0] * sheet.pitch_x_mm, PRESSED[1] * sheet.pitch_y_mm)
