@@ -53,6 +53,13 @@ def test_a_camera_holds_all_and_is_as_near_as_it_can_be(aspect, rng):
         assert np.abs(places).max() == rim
 
 
+def test_a_camera_straight_above_holds_all_too():
+    points = np.array([(x, y, 0.0) for x in (0.0, 0.1) for y in (0.0, 0.2)])
+    placed = fitted(points, Side(np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 1.0])), 1.0)
+    assert placed.position[:2] == pytest.approx([0.05, 0.1])
+    assert placed.position[2] == pytest.approx(0.1 * cameras.ROOM / math.tan(cameras.FOV_RAD / 2))
+
+
 @pytest.mark.parametrize("tiles", [FLAT, FOREARM])
 def test_each_side_of_a_sheet_can_be_looked_at(tiles):
     sides = cameras.sides_of(tiles)
@@ -262,9 +269,10 @@ def test_only_closed_cells_shine():
     cells = [3 * 16 + 5, 3 * 16 + 6]
     wanted = FOREARM.points_mm[cells] + 5 * FOREARM.normals[cells]
     assert found.centers_mm == pytest.approx(np.tile(wanted, (2, 1)))
-    for center, spread in zip(found.centers_mm, found.spreads_mm2):
+    for center, spread, (share, _, _) in zip(found.centers_mm, found.spreads_mm2, np.repeat(glow.PARTS, 2, axis=0)):
         outward = center * [1, 1, 0] / np.hypot(*center[:2])
-        assert outward @ spread @ outward == pytest.approx(np.linalg.eigvalsh(spread)[0]), "flat on the sheet"
+        assert spread @ outward == pytest.approx((0.3 * 10 * share) ** 2 * outward), "thin along the normal"
+        assert spread[2, 2] == pytest.approx((10 * share) ** 2), "as wide as a row"
     unknown = np.tile(np.array(picture.UNKNOWN, np.uint8), (256, 1))
     for dark in (picture.tile_colors(frame(0, [])), unknown):
         assert len(glow.blobs(FOREARM, dark, 5.0).centers_mm) == 0

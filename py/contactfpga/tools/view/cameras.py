@@ -52,6 +52,8 @@ def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_R
     """
     ahead = -side.toward / np.linalg.norm(side.toward)
     right = np.cross(ahead, side.up)
+    if np.linalg.norm(right) < 1e-6:  # straight from above: any way is up
+        right = np.cross(ahead, np.eye(3)[np.abs(ahead).argmin()])
     right /= np.linalg.norm(right)
     upward = np.cross(right, ahead)
     depths = points @ ahead

@@ -17,6 +17,8 @@ UNDER_MM = 1.2
 """From the cells to what carries them."""
 LEFT_MM = 1.0
 """What is left of it over a closed cell."""
+REACH = 1.6
+"""From a closed cell to where the foam is whole, in pitches."""
 SIDES = 72
 """Of a solid of revolution."""
 
@@ -79,9 +81,11 @@ def dented(vertices: np.ndarray, tiles: Tiles, closed: np.ndarray) -> np.ndarray
     radii = np.hypot(vertices[:, 0], vertices[:, 1])
     whole = np.ones(len(vertices))
     for x_mm, y_mm in zip(tiles.x_mm[closed], tiles.y_mm[closed]):
-        columns = np.angle(np.exp(1j * (turns - x_mm / sheet.radius_mm))) * sheet.radius_mm / sheet.pitch_x_mm
-        away = np.hypot(columns, (vertices[:, 2] - y_mm) / sheet.pitch_y_mm)
-        whole *= 1 - np.exp(-(away**4))
+        rows = (vertices[:, 2] - y_mm) / sheet.pitch_y_mm
+        near = np.flatnonzero(np.abs(rows) < REACH)
+        turned = np.remainder(turns[near] - x_mm / sheet.radius_mm + np.pi, 2 * np.pi) - np.pi
+        columns = turned * sheet.radius_mm / sheet.pitch_x_mm
+        whole[near] *= 1 - np.exp(-((columns**2 + rows[near] ** 2) ** 2))
     depths = (FOAM_MM - LEFT_MM) * (1 - whole)
     inner = np.maximum(radii - depths, np.minimum(radii, sheet.radius_mm))
     return np.concatenate([vertices[:, :2] * (inner / radii)[:, None], vertices[:, 2:]], -1)

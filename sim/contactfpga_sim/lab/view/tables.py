@@ -277,7 +277,7 @@ def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path)
         play(shown, visitor, shot((0.45 + number / FRAMES) % 1))
         frames.append(Image.open(io.BytesIO(visitor.page.screenshot())).convert("RGB"))
     first, *rest = frames[2:]
-    first.save(clip, save_all=True, append_images=rest, duration=FRAME_MS, loop=0, quality=QUALITY, method=6)
+    first.save(clip, save_all=True, append_images=rest, duration=FRAME_MS, loop=0, quality=QUALITY)
 
 
 def plotted(path: Path) -> None:
