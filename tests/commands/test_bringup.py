@@ -43,9 +43,11 @@ def test_a_fault_is_found_and_named_and_no_other(name):
 
 
 @pytest.mark.slow
-def test_columns_that_are_joined_read_alike():
-    found, _ = brought_up(Faults(shorts=Shorts(columns=((2, 3),))), only=[steps.link, steps.lines, steps.switches])
-    assert "columns 2 and 3 always read alike: joined, by solder or a short circuit" in faults_of(found)
+@pytest.mark.parametrize("lines", ["rows", "columns"])
+def test_lines_that_are_joined_read_alike(lines):
+    """Also neighbors, between which a switch may move while a frame is scanned."""
+    found, _ = brought_up(Faults(shorts=Shorts(**{lines: ((2, 3),)})), only=[steps.switches])
+    assert faults_of(found) == [f"{lines} 2 and 3 always read alike: joined, by solder or a short circuit"]
 
 
 def test_a_stuck_column_is_named():

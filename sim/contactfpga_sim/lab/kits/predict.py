@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed
+from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed_by
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force, Sheet, feel
@@ -131,7 +131,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
     nominal = extracted(lay_out(skin, stated)).circuit
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
-    needs = [needed(one, skin.row_lines, skin.column_lines, skin.diodes) for one in drawn]
+    needs = [needed_by(skin, one) for one in drawn]
     values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
         "settle_us": (
             "a row selected until the slowest column reads right",
