@@ -29,7 +29,7 @@ CLOSED = {"closed": True, "surface": "cylinder"}
         ({"pitch_y_mm": 5.0}, "dome", r"pitch_y_mm is 5; a cell with DOME_5MM_4LEG, .* needs 5\.2 mm"),
         ({"pitch_x_mm": 6.9}, "tact", r"pitch_x_mm is 6\.9; a cell with TACT_4\.5MM, .* needs 7 mm"),
         ({}, "spring", r"part is 'spring'; it must be one of dome, tact"),
-        (dict(rows=20, columns=8, radius_mm=12.0, **CLOSED), "dome", r"rows is 20; .* has place for at most 14 rows, 2"),
+        (dict(rows=20, columns=8, radius_mm=12.0, **CLOSED), "dome", r"rows is 20; .* place for at most 14 rows, 2"),
         (
             dict(rows=3, columns=4, row_drive="74hc595", column_read="74hc165", radius_mm=5.0, **CLOSED),
             "dome",
