@@ -39,7 +39,7 @@ help: ## list the targets
 check: ## look for Python and a C++ compiler; say what to install
 	@sh scripts/check
 
-sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model and draw the scenes
+sim: $(VENV)/.stamp-sim ## run the gateware against the golden model and draw the scenes
 	$(PY) -m contactfpga_sim.demo $(ARGS)
 
 test: $(VENV)/.stamp-test | compiler ## run the tests, in some minutes
@@ -118,6 +118,10 @@ format: $(VENV)/.stamp-lint ## apply the style that `make lint` checks
 docs: $(VENV)/.stamp-docs ## build the pages into build/docs
 	$(PY) -m sphinx -W --keep-going -b html docs build/docs
 
+release-check: $(VENV)/.stamp-boards $(VENV)/.stamp-test $(VENV)/.stamp-docs ## build what a release publishes and use it with no compiler [ARGS="--tag v0.1.0"]
+	$(PY) scripts/release.py make $(ARGS)
+	$(PY) scripts/release.py try build/release/dist --offline
+
 clean: ## delete what was built; keep .venv
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find py hdl sim tests docs scripts -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -146,11 +150,11 @@ $(VENV)/.stamp-venv:
 define install
 @echo ">>> Installing contactfpga[$(1)] into $(VENV): $(2)"
 PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
-    $(PY) -m pip install --disable-pip-version-check --editable '.[$(1)]'
+    $(PY) scripts/install.py $(VENV)/install.log --editable '.[$(1)]'
 @touch $@
 endef
 
-$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
+$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt

@@ -8,6 +8,8 @@ from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
 
+from contactfpga.helptext import HEAD
+
 project = "contactfpga"
 copyright = "the contactfpga authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
@@ -41,7 +43,9 @@ def block_math(translator: HTML5Translator, node: nodes.math_block) -> None:
 
 def read_sections(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Arguments of functions and classes. Docstrings of attributes are sentences: napoleon would take what comes before
-    their first colon for a type, and show it last."""
+    their first colon for a type, and show it last. Fields of a class have entries of their own."""
+    if what == "class" and HEAD in lines:
+        del lines[lines.index(HEAD) :]
     if what not in ("attribute", "data", "property"):
         lines[:] = GoogleDocstring(list(lines), Config(), None, what, name, obj, options).lines()
 

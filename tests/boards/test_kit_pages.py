@@ -104,7 +104,7 @@ def test_a_file_that_is_wrong_is_refused(tmp_path):
     with pytest.raises(KitError, match=r"settle_us is 1, outside its interval 1\.2 to 2"):
         predictions.load(kit)
     file.write_text("[[prediction]]\nnome = 1\n")
-    with pytest.raises(KitError, match=r"unknown key 'nome' in \[prediction\]; known are name, what"):
+    with pytest.raises(KitError, match=r"unknown key 'nome' in \[prediction\]; did you mean 'name'\?"):
         predictions.load(kit)
 
 

@@ -68,13 +68,13 @@ def test_the_workflow_may_only_read_and_ends_in_time():
     for name, job in found["jobs"].items():
         assert job["timeout-minutes"] <= 60, name
         assert "permissions" not in job, name
-        for step in job["steps"]:
-            assert re.fullmatch(r"actions/[a-z-]+@v\d+", step.get("uses", "actions/checkout@v1")), (name, step)
 
 
 @pytest.mark.skipif(not shutil.which("actionlint"), reason="actionlint is not installed; a pre-commit hook runs it")
 def test_actionlint_finds_no_fault():
-    done = subprocess.run(["actionlint", WORKFLOW], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        ["actionlint", *WORKFLOW.parent.glob("*.yml")], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -73,6 +73,8 @@ class Programmer:
     tool: str
     options: tuple[str, ...]
     install: str
+    wheel: str = ""
+    """Command of a wheel that holds the same program; "" for none. It starts only where the system has libusb."""
 
 
 @dataclasses.dataclass(frozen=True)

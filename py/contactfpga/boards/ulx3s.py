@@ -10,7 +10,7 @@ from contactfpga.skin import Skin
 _FT232H = Bridge("FT232H", (0x0403, 0x6014), None, 12_000_000, high_speed=True)  # on a module of its own
 _FT231X = Bridge("FT231X", (0x0403, 0x6015), None, 3_000_000)
 # fujprog is the maker's, but distributions package openFPGALoader. Without -f the bitstream is lost at power-off.
-_LOADER = Programmer("openFPGALoader", ("-b", "ulx3s", "-f"), "sudo apt install openfpgaloader")
+_LOADER = Programmer("openFPGALoader", ("-b", "ulx3s", "-f"), "sudo apt install openfpgaloader", "openfpgaloader-cli")
 _PULLS: dict[str, dict[str, object]] = {"col2row": {"PULLMODE": "UP"}, "row2col": {"PULLMODE": "DOWN"}}
 
 

@@ -7,7 +7,7 @@ import functools
 from pathlib import Path
 
 from contactfpga.boards import find
-from contactfpga.boards.spec import BoardSpec
+from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
@@ -44,6 +44,11 @@ class Kit:
     def skin_path(self) -> Path:
         """The Skin's file, with the tables ``[circuit]`` and ``[cover]``."""
         return self.folder / "skin.toml"
+
+    @property
+    def bitstream(self) -> Path:
+        """The bitstream that a release carries; a source tree has none."""
+        return bitstream_path(self.board, self.folder)
 
     @functools.cached_property
     def skin(self) -> Skin:

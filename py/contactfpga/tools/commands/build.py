@@ -14,7 +14,7 @@ from contactfpga import terminal
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.boards.wiring import Connection, Output, Wire, ohms
-from contactfpga.design import buildable, kits
+from contactfpga.design import buildable
 from contactfpga.design.circuit import Circuit, CircuitError, check_times, load_checked, load_circuit
 from contactfpga.errors import UNSOLVED, ContactFPGAError
 from contactfpga.skin import Skin
@@ -30,7 +30,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
     flags.design(parser, "Skin to build (default: one that fits the board).")
-    parser.add_argument("--output", metavar="DIR", help="Folder for the results (default: build/BOARD).")
+    output = "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit)."
+    parser.add_argument("--output", metavar="DIR", help=output)
     start = "Seed of place and route (default: 1)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
     check = "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would."
@@ -43,10 +44,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command; :data:`UNSOLVED` where ``--check`` finds that something does not fit."""
     from contactfpga_hdl.board import sites
 
-    board = flags.board(args)
-    if board is None:
-        known = " or --kit ".join(kits.names())
-        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {known}")
+    board = flags.named_board(args)
     design = flags.designed(args, board.skin, board.load)
     if args.check:
         return _check(args, board, design)
@@ -125,7 +123,7 @@ def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> 
     """Build the bitstream and print what it takes; the same for JSON."""
     from contactfpga_hdl.board import build
 
-    folder = outputs.folder(args.output or default_folder(board))
+    folder = outputs.folder(args.output or default_folder(board, args.kit))
     try:
         report = build.build(skin, board, folder, args.seed)
     except build.BitstreamFailed as error:
@@ -143,9 +141,9 @@ def _described(skin: Skin | Several) -> str:
     return f"{skin.rows}x{skin.columns}, report {skin.report!r}"
 
 
-def default_folder(board: BoardSpec) -> Path:
-    """Where the bitstream of a board is put and looked for."""
-    return Path("build") / board.name
+def default_folder(board: BoardSpec, kit: str | None) -> Path:
+    """Where the bitstream of a board, or of a kit, is put and looked for."""
+    return Path("build", "kits", kit) if kit else Path("build", board.name)
 
 
 DIODES = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from contactfpga.boards import find
+from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.design import kits
 from contactfpga.driver import driver
@@ -66,6 +66,15 @@ def board(args: argparse.Namespace) -> BoardSpec | None:
     found = kits.kit(args.kit).board
     if args.board and args.board != found.name:
         raise ContactFPGAError(f"the kit {args.kit!r} is for {found.name}, not {args.board}; leave the board out")
+    return found
+
+
+def named_board(args: argparse.Namespace) -> BoardSpec:
+    """As :func:`board`; raises :class:`ContactFPGAError` where neither a board nor a kit is named."""
+    found = board(args)
+    if found is None:
+        known = " or --kit ".join(kits.names())
+        raise ContactFPGAError(f"name a board, {', '.join(BOARDS)}, or a kit: --kit {known}")
     return found
 
 

@@ -1,0 +1,142 @@
+"""What a release consists of, and the first minute of somebody who installs it.
+
+    python scripts/release.py make [--tag v0.1.0]     everything, from the last commit, into build/release
+    python scripts/release.py try build/release/dist  install it into a new environment and use it
+
+``make release-check`` does both. ``make`` needs the extras boards, test and docs. ``try`` needs Python alone; with
+``--offline`` the wheels of the dependencies lie in the folder ``wheels`` beside the distribution.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+RELEASE = ROOT / "build" / "release"
+CONSTRAINTS = ROOT / "pip-constraints.txt"
+FIRST = "sim,view"
+"""The extras of the first minute."""
+
+
+def main() -> int:
+    """The command; its status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    steps = parser.add_subparsers(dest="step", required=True)
+    made = steps.add_parser("make", help="build everything from the last commit")
+    made.add_argument("--tag", help="refuse a tag that is not the version's")
+    tried = steps.add_parser("try", help="install a distribution and use it")
+    tried.add_argument("dist", type=Path)
+    tried.add_argument("--offline", action="store_true", help="take dependencies from the folder wheels beside it")
+    args = parser.parse_args()
+    if args.step == "make":
+        make(args.tag)
+    else:
+        first_minute(args.dist, args.offline)
+    return 0
+
+
+def make(tag: str | None) -> None:
+    """Write ``tree``, ``dist``, ``kits``, ``docs`` and ``wheels`` below :data:`RELEASE`."""
+    shutil.rmtree(RELEASE, ignore_errors=True)
+    tree = exported(RELEASE / "tree")
+    if tag is not None and tag != (version := f"v{run('import contactfpga; print(contactfpga.__version__)', tree)}"):
+        sys.exit(f"the tag is {tag}, the package's version {version}; change one of them")
+    run("from contactfpga_sim import carried; carried.check()", tree)
+    bitstreams(tree, RELEASE / "kits")
+    dist = RELEASE / "dist"
+    command("-m", "hatchling", "build", "--directory", dist, cwd=tree)
+    command("-m", "sphinx", "-W", "-q", "-b", "html", tree / "docs", RELEASE / "docs", tree=tree)
+    (wheel,) = dist.glob("*.whl")
+    pip = ("-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--constraint", CONSTRAINTS)
+    command(*pip, "--dest", RELEASE / "wheels", f"{wheel}[{FIRST}]")
+    (RELEASE / "wheels" / wheel.name).unlink()
+    files = sorted([*dist.iterdir(), *(RELEASE / "kits").iterdir()])
+    sums = "".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files)
+    (RELEASE / "SHA256SUMS").write_text(sums)
+    print(sums, end="")
+
+
+def exported(folder: Path) -> Path:
+    """The files of the last commit, and nothing that lies beside them."""
+    folder.mkdir(parents=True)
+    packed = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout
+    with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder
+
+
+def bitstreams(tree: Path, folder: Path) -> None:
+    """Build that of each kit twice, compare, and put one where the wheel is built from. ``folder`` has copies."""
+    folder.mkdir()
+    for kit in run("from contactfpga.design import kits; print(*kits.names())", tree).split():
+        built = [build(tree, kit, RELEASE / "built" / f"{kit}-{turn}") for turn in (1, 2)]
+        one, other = (file.read_bytes() for file in built)
+        if one != other:
+            sys.exit(f"two builds of the kit {kit} gave two bitstreams: {built[0]} and {built[1]}")
+        shutil.copy(built[0], tree / "examples" / "kits" / kit)
+        shutil.copy(built[0], folder / f"contactfpga-{kit}{built[0].suffix}")
+
+
+def build(tree: Path, kit: str, folder: Path) -> Path:
+    """The bitstream of a kit, built in ``folder``."""
+    text = command("-m", "contactfpga", "build", "--kit", kit, "--output", folder, "--json", tree=tree)
+    return Path(json.loads(text)["bitstream"])
+
+
+def first_minute(dist: Path, offline: bool) -> None:
+    """Install the wheel into a new environment; with no compiler on the PATH, read zones from a virtual board."""
+    (wheel,) = dist.resolve().glob("*.whl")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        scripts = environment(folder / "venv", wheel, offline)
+        (folder / "bin").mkdir()
+        clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "PIP_"))}
+        alone = clean | {"PATH": str(folder / "bin"), "CONTACTFPGA_CACHE": str(folder / "cache")}
+        started = time.monotonic()
+        found = subprocess.run(
+            [scripts / "contactfpga", "zones", "sim://", "--seconds", "3"],
+            cwd=folder, env=alone, text=True, capture_output=True, timeout=120,
+        )  # fmt: skip
+        print(found.stdout[-2000:], found.stderr[-2000:], sep="\n")
+        if found.returncode or "mm" not in found.stdout:
+            sys.exit(f"contactfpga zones sim:// ended with status {found.returncode} and showed no zone")
+        print(f"zones of a virtual board from {wheel.name}, with no compiler: {time.monotonic() - started:.1f} s")
+
+
+def environment(folder: Path, wheel: Path, offline: bool) -> Path:
+    """A new environment with the wheel and the extras :data:`FIRST`; returns the folder of its commands."""
+    venv.create(folder, with_pip=True)
+    scripts = folder / ("Scripts" if os.name == "nt" else "bin")
+    source = ["--no-index", "--find-links", wheel.parents[1] / "wheels"] if offline else []
+    pip = [scripts / "python", "-m", "pip", "--isolated", "install", "--quiet", "--constraint", CONSTRAINTS, *source]
+    subprocess.run([*pip, f"{wheel}[{FIRST}]"], check=True)
+    return scripts
+
+
+def run(program: str, tree: Path) -> str:
+    """What a Python program prints, with the packages of ``tree``."""
+    return command("-c", program, tree=tree).strip()
+
+
+def command(*words: object, tree: Path | None = None, cwd: Path | None = None) -> str:
+    """What this Python prints when it is called with these arguments, with the packages of ``tree`` if one is given."""
+    paths = os.pathsep.join(str(tree / name) for name in ("py", "hdl", "sim")) if tree else ""
+    env = os.environ | ({"PYTHONPATH": paths} if tree else {})
+    call = [sys.executable, *map(str, words)]
+    return subprocess.run(call, cwd=cwd or ROOT, env=env, check=True, text=True, stdout=subprocess.PIPE).stdout
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,69 @@
+"""What the package carries as WebAssembly: boards, and the C header for a page in a browser.
+
+    python -m contactfpga_sim.carried
+
+builds those that are not of these sources, in a clone and with the extra ``release``.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from contactfpga import terminal
+from contactfpga.shipped import examples
+from contactfpga.skin import Skin
+from contactfpga.tools.view import opening
+from contactfpga_sim import demo
+from contactfpga_sim.model.board import compiled, webassembly
+
+DECODER = "decoder"
+_DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
+
+
+def skins() -> dict[str, Skin]:
+    """By name: what ``sim://`` and ``view`` show by themselves, what ``make sim`` runs, and the kits."""
+    kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
+    shown = {"reference": Skin(), "view": Skin().replace(**opening.SLOW)}
+    return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
+
+
+def keys() -> dict[str, str]:
+    """By name the key that each file has to have."""
+    boards = {name: compiled.carried_key(skin) for name, skin in skins().items()}
+    return boards | {DECODER: webassembly.c_key(_DECODER_C)}
+
+
+def stale() -> list[str]:
+    """Names of files that are missing, damaged, or not built from these sources."""
+    return [name for name, key in keys().items() if webassembly.file(key) is None]
+
+
+def check() -> None:
+    """End the program where the package would be released with one of them."""
+    if names := stale():
+        sys.exit(f"{', '.join(names)}: not built from these sources; run python -m contactfpga_sim.carried")
+
+
+def build(name: str) -> bytes:
+    """What a file holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        if name == DECODER:
+            return webassembly.build_c(_DECODER_C, Path(folder))
+        return webassembly.build_board(compiled.model_of(skins()[name]), Path(folder))
+
+
+def main() -> int:
+    """Build what is stale and write the list."""
+    for name in stale():
+        data = build(name)
+        webassembly.path_of(name).write_bytes(data)
+        terminal.say(f"{name}: built, {len(data) / 1e3:.1f} kB")
+    webassembly.write_list(keys())
+    terminal.say(f"{webassembly.FOLDER} is built from these sources.")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
