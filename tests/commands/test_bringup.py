@@ -176,7 +176,7 @@ def test_200_planted_sheets_are_found_out():
         values = bench.fitted.values
         assert len(values) == 2, (seed, name)
         covered.append(all(one.low <= getattr(circuit, one.name) <= one.high for one in values))
-    assert 0.93 <= sum(covered) / SHEETS <= 0.97
+    assert 0.92 <= sum(covered) / SHEETS <= 0.98, "two standard deviations of the share about 95 %"
 
 
 # ---- the command
