@@ -175,7 +175,7 @@ def copy(tmp_path, monkeypatch):
     shutil.copytree(webassembly.FOLDER, folder)
     monkeypatch.setattr(webassembly, "FOLDER", folder)
     monkeypatch.setattr(webassembly, "LIST", folder / "files.json")
-    webassembly.write_list(carried.keys())
+    webassembly.write_list({name: {"key": key} for name, key in carried.keys().items()})
     assert carried.stale() == []
     carried.check()
     return folder
