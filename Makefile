@@ -115,6 +115,9 @@ format: $(VENV)/.stamp-lint ## apply the style that `make lint` checks
 	$(PY) -m ruff check --fix
 	$(PY) -m ruff format
 
+try: $(VENV)/.stamp-docs ## write the page that runs a board in the browser into build/try.html
+	$(PY) docs/try/assemble.py build/try.html
+
 docs: $(VENV)/.stamp-docs ## build the pages into build/docs
 	$(PY) -m sphinx -W --keep-going -b html docs build/docs
 

@@ -1,5 +1,7 @@
 """Sphinx configuration."""
 
+import sys
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -9,6 +11,9 @@ from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
 
 from contactfpga.helptext import HEAD
+
+sys.path.append(str(Path(__file__).parent / "try"))
+import assemble
 
 project = "contactfpga"
 copyright = "the contactfpga authors"
@@ -50,6 +55,13 @@ def read_sections(app: Sphinx, what: str, name: str, obj: Any, options: Any, lin
         lines[:] = GoogleDocstring(list(lines), Config(), None, what, name, obj, options).lines()
 
 
+def write_try(app: Sphinx, error: Exception | None) -> None:
+    """The page that runs a board in the browser, beside the others; it is one file."""
+    if error is None and app.builder.format == "html":
+        (Path(app.outdir) / "try.html").write_text(assemble.page(), encoding="utf-8")
+
+
 def setup(app: Sphinx) -> None:
+    app.connect("build-finished", write_try)
     app.connect("autodoc-process-docstring", read_sections)
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))

@@ -108,11 +108,15 @@ class Guard:
         """Lead the browser to the same page without the token, so that it stays out of the address line. The page does
         it by itself: after a redirect a browser that came by a link of another site would keep its cookie back."""
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-        page = f"<!doctype html><title>contactfpga</title><script>location.replace({_PAGE!r})</script>\n"
+        dark = "matchMedia('(prefers-color-scheme: dark)').matches"
+        page = (
+            "<!doctype html><title>contactfpga</title>"
+            f"<script>location.replace({dark} ? {_DARK!r} : {_PAGE!r})</script>\n"
+        )
         return Response(200, page, {**_HEADERS, "Content-Type": "text/html; charset=utf-8", "Set-Cookie": cookie})
 
 
-_PAGE = "/"
+_PAGE, _DARK = "/", "/?darkMode"
 _HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY"}
 _NO_TOKEN = Response(403, "The token is missing or is another one; open the whole address that the server printed.\n")
 
