@@ -2,7 +2,8 @@
 
     python -m contactfpga_sim.carried
 
-builds those that are not of these sources, in a clone and with the extra ``release``.
+builds those that are not of these sources, in a clone and with the extra ``release``, which is not needed where the
+gateware is what it was and only its text is another one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
 def skins() -> dict[str, Skin]:
     """By name: what ``sim://`` and ``view`` show by themselves, what ``make sim`` runs, and the kits."""
     kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
-    shown = {"reference": Skin(), "view": Skin().replace(**opening.SLOW)}
+    shown = {"reference": Skin(), "view": opening.usual_skin(flat=False), "view-flat": opening.usual_skin(flat=True)}
     return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
 
 
@@ -55,14 +56,25 @@ def build(name: str) -> bytes:
 
 
 def main() -> int:
-    """Build what is stale and write the list."""
-    for name in stale():
-        data = build(name)
-        webassembly.path_of(name).write_bytes(data)
-        terminal.say(f"{name}: built, {len(data) / 1e3:.1f} kB")
-    webassembly.write_list(keys())
+    """Build what is of another design, and write the list."""
+    files, late = dict(webassembly.listed()["files"]), stale()
+    for name, key in keys().items():
+        if name in late:
+            files[name] = {"key": key, "design": _renewed(name, files.get(name, {}))}
+    webassembly.write_list({name: files[name] for name in keys()})
     terminal.say(f"{webassembly.FOLDER} is built from these sources.")
     return 0
+
+
+def _renewed(name: str, before: dict[str, str]) -> str:
+    """The key of a file's design; the file is built where it is not of that design."""
+    design = webassembly.c_key(_DECODER_C) if name == DECODER else compiled.design_key(skins()[name])
+    path = webassembly.path_of(name)
+    whole = path.is_file() and webassembly.sum_of(path.read_bytes()) == before.get("sha256")
+    if not whole or design != before.get("design"):
+        path.write_bytes(data := build(name))
+        terminal.say(f"{name}: built, {len(data) / 1e3:.1f} kB")
+    return design
 
 
 if __name__ == "__main__":

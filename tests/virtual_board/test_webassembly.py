@@ -175,7 +175,7 @@ def copy(tmp_path, monkeypatch):
     shutil.copytree(webassembly.FOLDER, folder)
     monkeypatch.setattr(webassembly, "FOLDER", folder)
     monkeypatch.setattr(webassembly, "LIST", folder / "files.json")
-    webassembly.write_list(carried.keys())
+    webassembly.write_list({name: {"key": key} for name, key in carried.keys().items()})
     assert carried.stale() == []
     carried.check()
     return folder
@@ -205,6 +205,20 @@ def test_what_is_of_other_sources_is_not_run_and_not_released(copy, monkeypatch,
     assert carried.stale() == list(SKINS)
     with pytest.raises(SystemExit, match=r"reference, .*python -m contactfpga_sim\.carried"):
         carried.check()
+
+
+@pytest.mark.parametrize(("design", "built"), [(True, []), (False, ["reference"])], ids=["same", "other"])
+def test_only_files_of_another_design_are_built_again(copy, monkeypatch, design, built):
+    files = webassembly.listed()["files"]
+    files["reference"] = {"key": "of an older text", "design": compiled.design_key(Skin()) if design else "another"}
+    webassembly.write_list(files)
+    found, before = [], (copy / "reference.wasm").read_bytes()
+    monkeypatch.setattr(carried, "build", lambda name: found.append(name) or before)
+    assert carried.stale() == ["reference"]
+    assert carried.main() == 0
+    assert found == built
+    assert carried.stale() == []
+    assert webassembly.listed()["files"]["reference"]["design"] == compiled.design_key(Skin())
 
 
 def test_a_key_is_the_same_beside_other_packages_but_those_that_build(copy, monkeypatch):

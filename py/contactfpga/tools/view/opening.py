@@ -189,7 +189,12 @@ def _virtual(named: ViewRequest) -> Any:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
         return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")
-    return transport.virtual_board("sim://?scene=nothing", Skin().replace(**SLOW, **({} if named.flat else FOREARM)))
+    return transport.virtual_board("sim://?scene=nothing", usual_skin(named.flat))
+
+
+def usual_skin(flat: bool) -> Skin:
+    """Of the sheet that is shown where nothing is named."""
+    return Skin().replace(**SLOW, **({} if flat else FOREARM))
 
 
 def browse(url: str) -> None:

@@ -229,7 +229,12 @@ def library_of(skin: Skin) -> Library:
 
 def carried_key(skin: Skin) -> str:
     """Of the WebAssembly."""
-    return webassembly.board_key(skin, _DRIVER, _defines(skin))
+    return webassembly.board_key(webassembly.gateware_of(skin), _DRIVER, _defines(skin))
+
+
+def design_key(skin: Skin) -> str:
+    """The same by what the gateware is elaborated to, whatever its text."""
+    return webassembly.board_key(native.component_key(model_of(skin).elaborate()), _DRIVER, _defines(skin))
 
 
 def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:

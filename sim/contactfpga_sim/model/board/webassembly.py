@@ -25,7 +25,8 @@ from contactfpga_sim.model.board import native, sources
 
 FOLDER = Path(__file__).parent / "wasm"
 LIST = FOLDER / "files.json"
-"""By name of a file its key and its sum; and the versions of the tools that built them."""
+"""By name of a file its key, the key of its design, which is no other where only texts are, and its sum; and the
+versions of the tools that built them."""
 
 NATIVE = "CONTACTFPGA_NATIVE"
 """Environment variable; where it says something, native code is compiled, which is faster."""
@@ -171,10 +172,10 @@ def listed() -> dict[str, Any]:
     return found
 
 
-def write_list(keys: Mapping[str, str]) -> None:
-    """Write :data:`LIST`, of files by name and key that were built here."""
-    files = {name: {"key": key, "sha256": sum_of(path_of(name).read_bytes())} for name, key in keys.items()}
-    LIST.write_text(json.dumps({"tools": tools(), "files": files}, indent=1) + "\n", encoding="utf-8", newline="\n")
+def write_list(files: Mapping[str, Mapping[str, str]]) -> None:
+    """Write :data:`LIST`, of files by name."""
+    found = {name: {**keys, "sha256": sum_of(path_of(name).read_bytes())} for name, keys in files.items()}
+    LIST.write_text(json.dumps({"tools": tools(), "files": found}, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def path_of(name: str) -> Path:
@@ -185,8 +186,7 @@ def path_of(name: str) -> Path:
 def file(key: str) -> Path | None:
     """The file that was built of what the key stands for, if it is carried."""
     for name, made in listed()["files"].items():
-        path = path_of(name)
-        if made["key"] == key and path.is_file():
+        if made["key"] == key and (path := path_of(name)).is_file():
             if sum_of(path.read_bytes()) == made["sha256"]:
                 return path
             print(f"contactfpga: {path} is damaged; install contactfpga again", file=sys.stderr)
@@ -198,12 +198,17 @@ def tools() -> dict[str, str]:
     return {tool: sources.version(tool) or listed()["tools"][tool] for tool in _TOOLS}
 
 
-def board_key(skin: Skin, driver: str, defines: Mapping[str, int | str]) -> str:
-    """Of the board of a Skin, with this file and these constants of its driver."""
-    gateware = sources.texts("contactfpga_hdl.top", (sources.HOST, sources.GATEWARE))
+def board_key(gateware: str, driver: str, defines: Mapping[str, int | str]) -> str:
+    """Of a board: what stands for its gateware, this file and these constants of its driver."""
     options = (_FLAGS, native.FLATTEN, native.TO_CPP, sorted(defines.items()))
     drivers = (*sorted(native.DRIVERS.glob("*.h")), native.DRIVERS / driver)
-    return _key(skin.fingerprint, skin.name, gateware, options, *(sum_of(file.read_bytes()) for file in drivers))
+    return _key(gateware, options, *(sum_of(file.read_bytes()) for file in drivers))
+
+
+def gateware_of(skin: Skin) -> str:
+    """Stands for the gateware of a Skin, by the text of its modules. Cheap, as nothing is elaborated."""
+    text = sources.texts("contactfpga_hdl.top", (sources.HOST, sources.GATEWARE))
+    return repr((skin.fingerprint, skin.name, text))
 
 
 def c_key(source: Path) -> str:
