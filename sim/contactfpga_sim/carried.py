@@ -26,7 +26,7 @@ _DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
 def skins() -> dict[str, Skin]:
     """By name: what ``sim://`` and ``view`` show by themselves, what ``make sim`` runs, and the kits."""
     kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
-    shown = {"reference": Skin(), "view": opening.usual_skin(flat=False), "view-flat": opening.usual_skin(flat=True)}
+    shown = {"reference": Skin(), "view": opening.own_skin(), "view-flat": opening.own_skin(flat=True)}
     return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
 
 

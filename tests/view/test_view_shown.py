@@ -263,19 +263,24 @@ def test_the_plate_reaches_beyond_the_cells_and_under_them():
     assert vertices.max(0)[:2] == pytest.approx([158.5, 126.8])
 
 
-def test_only_closed_cells_shine():
-    colors = picture.tile_colors(frame(0, []), closed((3, 5), (3, 6)).reshape(16, 16))
-    found = glow.blobs(FOREARM, colors, lift_mm=5.0)
-    cells = [3 * 16 + 5, 3 * 16 + 6]
-    wanted = FOREARM.points_mm[cells] + 5 * FOREARM.normals[cells]
-    assert found.centers_mm == pytest.approx(np.tile(wanted, (2, 1)))
-    for center, spread, (share, _, _) in zip(found.centers_mm, found.spreads_mm2, np.repeat(glow.PARTS, 2, axis=0)):
+def test_each_cell_has_light_over_it():
+    found = glow.blobs(FOREARM, lift_mm=5.0)
+    assert found.centers_mm == pytest.approx(np.tile(FOREARM.points_mm + 5 * FOREARM.normals, (2, 1)))
+    for center, spread, (share, _, _) in zip(found.centers_mm, found.spreads_mm2, np.repeat(glow.PARTS, 256, axis=0)):
         outward = center * [1, 1, 0] / np.hypot(*center[:2])
         assert spread @ outward == pytest.approx((0.3 * 10 * share) ** 2 * outward), "thin along the normal"
         assert spread[2, 2] == pytest.approx((10 * share) ** 2), "as wide as a row"
-    unknown = np.tile(np.array(picture.UNKNOWN, np.uint8), (256, 1))
-    for dark in (picture.tile_colors(frame(0, [])), unknown):
-        assert len(glow.blobs(FOREARM, dark, 5.0).centers_mm) == 0
+
+
+def test_only_closed_cells_shine():
+    colors = picture.tile_colors(frame(0, []), closed((3, 5), (3, 6)).reshape(16, 16))
+    tints, opacities = glow.shine(colors)
+    cells = [3 * 16 + 5, 3 * 16 + 6]
+    assert np.flatnonzero(opacities).tolist() == cells + [256 + cell for cell in cells]
+    assert tuple(tints[256 + cells[0]]) == picture.TRUE
+    assert (tints[cells[0]] > picture.TRUE).all()
+    for dark in (picture.OPEN, picture.UNKNOWN):
+        assert not glow.shine(np.tile(np.array(dark, np.uint8), (256, 1)))[1].any()
 
 
 # ---- the chart

@@ -68,10 +68,14 @@ class View:
             self.panel.write(self._moment)
 
 
-FOREARM = {"rows": 16, "columns": 16, "closed": True, "surface": "cylinder", "radius_mm": 45.0}
-"""The sheet that is shown where nothing is named, as in examples/forearm.toml."""
-SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
-"""Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
+FOREARM = Skin(rows=16, columns=16, closed=True, surface="cylinder", radius_mm=45.0)
+"""As in examples/forearm.toml."""
+
+
+def own_skin(flat: bool = False) -> Skin:
+    """Of the virtual sheet that is shown where nothing is named: at a third of the usual clock, to keep up with real
+    time."""
+    return (Skin() if flat else FOREARM).replace(clock_hz=4_000_000, baud=2_000_000, send="on_change")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -189,12 +193,7 @@ def _virtual(named: ViewRequest) -> Any:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
         return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")
-    return transport.virtual_board("sim://?scene=nothing", usual_skin(named.flat))
-
-
-def usual_skin(flat: bool) -> Skin:
-    """Of the sheet that is shown where nothing is named."""
-    return Skin().replace(**SLOW, **({} if flat else FOREARM))
+    return transport.virtual_board("sim://?scene=nothing", own_skin(named.flat))
 
 
 def browse(url: str) -> None:

@@ -96,6 +96,7 @@ class Visitor:
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
         """From the first to the last, which is held for a while; the button stays down."""
         self.page.mouse.move(*self._pixel(*places[0]))
+        self.page.wait_for_timeout(hold_ms)  # the page finds out what the mouse is over
         self.page.mouse.down()
         for place in places[1:]:
             self.page.mouse.move(*self._pixel(*place), steps=8)

@@ -216,7 +216,7 @@ SWING_RAD = 0.22
 """The camera turns so far to both sides."""
 STEP_MS = 350
 """Between two frames, so that board and browser have drawn what moved."""
-QUALITY = 62
+QUALITY = 50
 """Of a frame, of 100."""
 
 
