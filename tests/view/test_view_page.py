@@ -62,13 +62,13 @@ def arrow(page):
 def test_a_drag_presses_and_no_arrow_covers_the_sheet(seen):
     shown, visitor = seen
     sheet = shown.view.stage.tiles.sheet
-    visitor.drag(*((1.5 * sheet.pitch_x_mm, row * sheet.pitch_y_mm) for row in (4, 7, 9)), hold_ms=1000)
+    visitor.drag(*((2 * sheet.pitch_x_mm, row * sheet.pitch_y_mm) for row in (4, 7, 9)), hold_ms=1000)
     for _ in range(100):
         if shown.hand.fingers and abs(shown.hand.fingers[0].y_mm - 90) < 2:
             break
         visitor.page.wait_for_timeout(100)
     (finger,) = shown.hand.fingers
-    assert (finger.x_mm, finger.y_mm) == pytest.approx((1.5 * sheet.pitch_x_mm, 90), abs=3)
+    assert (finger.x_mm, finger.y_mm) == pytest.approx((2 * sheet.pitch_x_mm, 90), abs=3)
     assert arrow(visitor.page) == [True, False]
     visitor.page.mouse.up()
 
