@@ -7,12 +7,12 @@ import numpy as np
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import EVENT
-from contactfpga_sim.model.golden import label, request
+from contactfpga_sim.model.golden import label
 from contactfpga_sim.model.golden.facts import Facts, facts
 from contactfpga_sim.model.golden.frame import Divider, Items, Packer, Queue, join
 from contactfpga_sim.model.golden.hello import State
 from contactfpga_sim.model.golden.link import Link
-from contactfpga_sim.model.golden.request import Reception
+from contactfpga_sim.model.golden.request import Reception, heard
 from contactfpga_sim.model.golden.scan import Scan, last_number
 from contactfpga_sim.model.golden.trace import Trace
 from contactfpga_sim.model.golden.zones import Departure
@@ -59,11 +59,11 @@ class GoldenBoard:
             begun, before = self._received[-1]
             free = begun + 10 * known.bit_clocks * len(before)
         self._received.append((max(self.cycle, free), data))
-        heard = request.heard(self._received, known.bit_clocks, bool(known.commands), known.closing)
-        for one in heard.requests[len(self._heard.requests) :]:
+        now = heard(self._received, known.bit_clocks, bool(known.commands), known.closing)
+        for one in now.requests[len(self._heard.requests) :]:
             if one.hello:
                 self._line.want_hello(one.cycle + 1)
-        self._heard.requests[:], self._heard.numbers[:] = heard.requests, heard.numbers
+        self._heard.requests[:], self._heard.numbers[:] = now.requests, now.numbers
 
     def run(self, cycles: int) -> None:
         """Run clock cycles; a scan that is over becomes a frame."""

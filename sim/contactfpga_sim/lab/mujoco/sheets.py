@@ -199,7 +199,7 @@ def _body(model: Any, plan: Plan) -> int:
 
 
 def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
-    """By geom the number of the link whose sheet it wears, -1 for none; the last entry is of contacts without a geom."""
+    """By geom the number of the link whose sheet it wears, -1 for none; the last one is for contacts without a geom."""
     owner = np.full(model.ngeom + 1, -1)
     for number, (name, of) in enumerate(zip(body.links, bodies)):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from contactfpga.inputs.values import shown
 from contactfpga.robot.body import Body, BodyError
 from contactfpga.robot.body.plan import Plan
 from contactfpga.surfaces import CylinderSurface, PlaneSurface
@@ -23,7 +24,7 @@ def wear(spec: Any, robot: str | Path) -> None:
     for name, plan in Body.load(robot).links.items():
         body = spec.body(plan.frame)
         if body is None:
-            raise BodyError(f"link {name!r}: frame is {plan.frame!r}; the model has no such body")
+            raise BodyError(f"link {shown(name)}: frame is {shown(plan.frame)}; the model has no such body")
         geom = body.add_geom(name=name, mass=0)
         if isinstance(plan.surface, PlaneSurface):
             _box(geom, plan)
@@ -66,7 +67,7 @@ def _hull(spec: Any, geom: Any, plan: Plan) -> None:
     """Of the cells' places, and of places below them on a sheet that is nearly flat."""
     skin = plan.skin
     x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
-    points, normals = plan.surface.place(x, y)
+    points, normals = (np.asarray(each) for each in plan.surface.place(x, y))
     vertices = 1e-3 * np.concatenate([points.reshape(-1, 3), (points - 1e3 * BACK_M * normals).reshape(-1, 3)])
     spec.add_mesh(name=geom.name, uservert=vertices.ravel())
     geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, geom.name

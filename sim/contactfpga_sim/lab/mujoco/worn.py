@@ -71,7 +71,8 @@ class WornSheet:
         """From now on these touch it."""
         if touches or self.touches:
             self.touches = touches
-            self.forces_n = self._cells.forces_n(self._loads())
+            loads = self._loads()
+            self.forces_n = self._cells.forces_n(loads) if loads else np.zeros(self.closed.shape)
             closed = self._cells.closed_by(self.forces_n, self.closed)
             if not np.array_equal(closed, self.closed):
                 self.closed = closed
