@@ -25,6 +25,8 @@ from contactfpga_sim.lab.usb import BridgeSettings
 
 LEAD_S = 0.01
 """From the boards' power-up to MuJoCo's first step; in it they are opened."""
+LOOK_S = 2.5e-4
+"""Until then the boards go on by this."""
 
 COVER = Cover(model="hertz")
 """Of a link whose Skin's file has no table ``[cover]``."""
@@ -79,15 +81,16 @@ class Sheets(Mapping[str, WornSheet]):
         self._steps = 0
         self._joints, self._history = _joints(model, self.body), JointHistory()
         self._every = max(1, round(1e-3 / model.opt.timestep))
-        self._open()
+        self._open(seed)
 
-    def _open(self) -> None:
-        ports = {name: SteppedPort(worn, self.step) for name, worn in self._worn.items()}
+    def _open(self, seed: int) -> None:
+        ports = {name: SteppedPort(worn, self.step, seed) for name, worn in self._worn.items()}
         for name, port in ports.items():
             self._worn[name].board = driver.open(port, self._worn[name].skin)
         for name, port in ports.items():
+            while (worn := self._worn[name]).clock() < LEAD_S:  # frames go on coming
+                worn.run(min(LEAD_S, worn.clock() + LOOK_S))
             port.still = False
-            self._worn[name].run(self.clock())
 
     # ---- time
 

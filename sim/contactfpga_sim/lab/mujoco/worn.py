@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import random
 from collections.abc import Callable
 
 import numpy as np
@@ -46,7 +47,7 @@ class WornSheet:
         self.dead = False
         """Set it, and the board stands still from then on: its pins stay, it sends nothing."""
         self.line: Callable[[bytes], bytes] = bytes
-        """What becomes of the bytes that the USB chip delivers; one that raises :class:`~contactfpga.PortLost` is a
+        """What becomes of each packet that the USB chip delivers; one that raises :class:`~contactfpga.PortLost` is a
         plug that was pulled."""
         pitches = (1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
         self._cells = cells_of(cover, skin.rows, skin.columns, *pitches, seed)
@@ -129,8 +130,8 @@ class WornSheet:
         """The bytes that came to the program since it was asked last."""
         found = b""
         while self._coming and self._coming[0][0] <= self._clock_s + 1e-12:
-            found += self._coming.popleft()[1]
-        return self.line(found)
+            found += self.line(self._coming.popleft()[1])
+        return found
 
     def send(self, data: bytes) -> None:
         """Bytes from the host."""
@@ -163,8 +164,9 @@ class WornSheet:
 class SteppedPort:
     """A :class:`contactfpga.driver.transport.SimulatedPort`: the whole robot goes on while one waits for a board."""
 
-    def __init__(self, worn: WornSheet, step: Callable[[], None]):
+    def __init__(self, worn: WornSheet, step: Callable[[], None], seed: int):
         self._worn, self._step = worn, step
+        self.rng = random.Random(seed)
         self.still = True
         """The robot stands still, and the board alone goes on."""
 
