@@ -1,4 +1,4 @@
-"""Three reflexes for one joint at 1 kHz: stop, back off, follow. Each is asked with a snapshot and says how fast to turn.
+"""Three reflexes for one joint at 1 kHz: stop, back off, follow. Each takes a snapshot and says how fast to turn.
 
 The snapshot is of :class:`contactfpga.mujoco.Sheets`, or of an open :class:`contactfpga.body.Body` on a real robot. "No
 data" is never "no contact": where the newest frame is older than SILENCE_S, or tells of a fault, each of them stops.

@@ -115,31 +115,30 @@ def paired(contacts, true):
 
 
 def test_each_touch_of_four_links_is_where_mujoco_has_it(robot):
-    """Two on each link: as many contacts, the place within 2 mm in the mean and 6 at most, in the robot's base frame
-    through its joints; and the normal."""
+    """Two on each link, in the robot's base frame through its joints: as many contacts; the place as its covariance
+    states, and never beyond the corner of a cell; the normal."""
     rng, links = np.random.default_rng(0), Body.load(robot).links
-    errors, normals = [], []
-    for _ in range(3):
+    errors, stated, normals = [], [], []
+    for _ in range(2):
         touches = [one for name, plan in links.items() for one in random_touches(rng, name, plan.skin, 2)]
         contacts, true = heard(robot, touches, golden=True)
         assert len(contacts) == len(true) == 8
         pairs = paired(contacts, true)
         assert len({id(other) for _, other in pairs}) == 8
         errors += [1e3 * np.linalg.norm(other[0] - one.point_m) for one, other in pairs]
+        stated += [1e3 * np.sqrt(np.trace(one.covariance_m2)) for one in contacts]
         normals += [float(np.dot(one.normal, other[1])) for one, other in pairs]
-    print(np.mean(errors), max(errors), min(normals))
-    assert np.mean(errors) < 3.5
-    assert max(errors) < 8
+    assert 0.5 < np.linalg.norm(errors) / np.linalg.norm(stated) < 1.1
+    assert max(errors) < np.hypot(10.0, 17.7) / 2
     assert min(normals) > 0.98
 
 
 def test_the_forces_of_units_are_mujocos(robot):
-    """One push, and two, on the chest: each within 10 %."""
+    """One push, and two, on the chest: each within 10 %, by what the units' noise and the places leave open."""
     rng, skin = np.random.default_rng(1), Body.load(with_units(robot)).links["chest"].skin
     shares = []
-    for count in (1, 2, 2):
+    for count in (1, 2):
         contacts, true = heard(robot, random_touches(rng, "chest", skin, count), golden=False)
         assert len(contacts) == len(true) == count
         shares += [one.normal_n / other[2] - 1 for one, other in paired(contacts, true)]
-    print(shares)
-    assert np.abs(shares).max() < 0.15
+    assert np.abs(shares).max() < 0.1

@@ -1,5 +1,8 @@
 """A robot in MuJoCo that wears sheets: which switch a ball closes, with what force, and what the driver says of it."""
 
+import textwrap
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -138,3 +141,21 @@ def test_a_link_that_the_model_lacks_is_refused_by_name(tmp_path):
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     with pytest.raises(BodyError, match=r"frame is 'link'; the model has no such body"):
         Sheets(model, mujoco.MjData(model), robot(tmp_path))
+
+
+def test_the_wrapper_on_the_page_feels(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "mujoco.md").read_text()
+    block = page[page.rindex("    import numpy as np") :]
+    names = {}
+    exec(textwrap.dedent(block), names)
+    toml = robot(tmp_path)
+    model, data = pressed(toml, [("link", 40.0, 70.0, 3.0)])
+    felt = names["Felt"](model, data, toml, "link")
+    for _ in range(2):
+        assert not felt.reset()[-12:].any()
+        for _ in range(100):
+            seen = felt.step([3.0])
+        assert seen[-12:-10] == pytest.approx([40.0, 70.0], abs=2)
+        for _ in range(100):
+            felt.step([-1.0])
+    felt.sheets.close()

@@ -110,6 +110,11 @@ class Sheets(Mapping[str, WornSheet]):
         for worn in self._worn.values():
             worn.run(self.clock())
 
+    def reset(self) -> None:
+        """Put MuJoCo's state back to its start. The boards go on, as those of a robot that is carried back."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._pushed[:] = 0.0
+
     def _press(self, foam: Mapping[tuple[int, int], Floats]) -> None:
         """Let what touches in this step press; ``foam``: by contact and link its force in N on the link."""
         data, plans = self.data, list(self.body.links.values())
