@@ -39,7 +39,7 @@ help: ## list the targets
 check: ## look for Python and a C++ compiler; say what to install
 	@sh scripts/check
 
-sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model and draw the scenes
+sim: $(VENV)/.stamp-sim ## run the gateware against the golden model and draw the scenes
 	$(PY) -m contactfpga_sim.demo $(ARGS)
 
 test: $(VENV)/.stamp-test | compiler ## run the tests, in some minutes
@@ -115,6 +115,9 @@ format: $(VENV)/.stamp-lint ## apply the style that `make lint` checks
 	$(PY) -m ruff check --fix
 	$(PY) -m ruff format
 
+try: $(VENV)/.stamp-docs ## write the page that runs a board in the browser into build/try.html
+	$(PY) docs/try/assemble.py build/try.html
+
 docs: $(VENV)/.stamp-docs ## build the pages into build/docs
 	$(PY) -m sphinx -W --keep-going -b html docs build/docs
 
@@ -150,11 +153,11 @@ $(VENV)/.stamp-venv:
 define install
 @echo ">>> Installing contactfpga[$(1)] into $(VENV): $(2)"
 PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
-    $(PY) -m pip install --disable-pip-version-check --editable '.[$(1)]'
+    $(PY) scripts/install.py $(VENV)/install.log --editable '.[$(1)]'
 @touch $@
 endef
 
-$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
+$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt

@@ -1,5 +1,7 @@
 """Sphinx configuration."""
 
+import sys
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -7,6 +9,11 @@ from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
+
+from contactfpga.helptext import HEAD
+
+sys.path.append(str(Path(__file__).parent / "try"))
+import assemble
 
 project = "contactfpga"
 copyright = "the contactfpga authors"
@@ -41,11 +48,20 @@ def block_math(translator: HTML5Translator, node: nodes.math_block) -> None:
 
 def read_sections(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Arguments of functions and classes. Docstrings of attributes are sentences: napoleon would take what comes before
-    their first colon for a type, and show it last."""
+    their first colon for a type, and show it last. Fields of a class have entries of their own."""
+    if what == "class" and HEAD in lines:
+        del lines[lines.index(HEAD) :]
     if what not in ("attribute", "data", "property"):
         lines[:] = GoogleDocstring(list(lines), Config(), None, what, name, obj, options).lines()
 
 
+def write_try(app: Sphinx, error: Exception | None) -> None:
+    """The page that runs a board in the browser, beside the others; it is one file."""
+    if error is None and app.builder.format == "html":
+        (Path(app.outdir) / "try.html").write_text(assemble.page(), encoding="utf-8")
+
+
 def setup(app: Sphinx) -> None:
+    app.connect("build-finished", write_try)
     app.connect("autodoc-process-docstring", read_sections)
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))

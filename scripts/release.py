@@ -53,7 +53,7 @@ def make(tag: str | None) -> None:
     tree = exported(RELEASE / "tree")
     if tag is not None and tag != (version := f"v{run('import contactfpga; print(contactfpga.__version__)', tree)}"):
         sys.exit(f"the tag is {tag}, the package's version {version}; change one of them")
-    run("from contactfpga_sim.model.board import wasm; wasm.check()", tree)
+    run("from contactfpga_sim import carried; carried.check()", tree)
     bitstreams(tree, RELEASE / "kits")
     dist = RELEASE / "dist"
     command("-m", "hatchling", "build", "--directory", dist, cwd=tree)

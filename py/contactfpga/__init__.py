@@ -1,19 +1,30 @@
 """Contact zones of a switch-matrix skin, from an FPGA to Python.
 
-What it offers is imported when it is used first: so the command `contactfpga` takes Ctrl-C before numpy is loaded.
+>>> import contactfpga
+>>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+>>> for zone in zones:
+...     print(zone.area_mm2, zone.x_mm, zone.y_mm)
+400.0 55.0 75.0
+400.0 95.0 75.0
+
+``read_zones()`` takes the board that is plugged in, and ``open()`` gives every frame of it. ``help(contactfpga.Zone)``
+shows what a zone has.
 """
+
+# What it offers is imported when it is used first: so the command `contactfpga` takes Ctrl-C before numpy is loaded.
 
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from contactfpga.driver.board import Board
+    from contactfpga.driver.board import AsyncBoard, Board
     from contactfpga.driver.driver import open, read_zones
     from contactfpga.driver.events import Silence
     from contactfpga.driver.stats import Stats
     from contactfpga.driver.subscription import Events, Subscription
     from contactfpga.errors import (
+        AddressError,
         BoardClosed,
         BoardSilent,
         ContactFPGAError,
@@ -48,6 +59,8 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 __all__ = [
+    "AddressError",
+    "AsyncBoard",
     "Batch",
     "Board",
     "BoardClosed",
@@ -93,14 +106,14 @@ __all__ = [
 ]
 
 _NAMES = {
-    "driver.board": "Board",
+    "driver.board": "AsyncBoard Board",
     "driver.driver": "open read_zones",
     "driver.events": "Silence",
     "driver.stats": "Stats",
     "driver.subscription": "Events Subscription",
     "errors": (
-        "BoardClosed BoardSilent ContactFPGAError MissingExtra MissingTool NoData NoSuchCommand OnlyNoise PortBusy "
-        "PortLost PortNotFound ReadTimeout ReplayEnded SkinMismatch VersionMismatch"
+        "AddressError BoardClosed BoardSilent ContactFPGAError MissingExtra MissingTool NoData NoSuchCommand OnlyNoise "
+        "PortBusy PortLost PortNotFound ReadTimeout ReplayEnded SkinMismatch VersionMismatch"
     ),
     "instruments.self_test": "SelfTest",
     "instruments.watch": "Suspicion Watch",
@@ -122,6 +135,8 @@ _PLACES = {name: module for module, names in _NAMES.items() for name in names.sp
 def __getattr__(name: str) -> Any:
     if name in _PLACES:
         found = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+        if isinstance(found, type):
+            import_module(f"{__name__}.helptext").complete(found)
     elif not name.startswith("_") and find_spec(f"{__name__}.{name}") is not None:
         found = import_module(f"{__name__}.{name}")
     else:

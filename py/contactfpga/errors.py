@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shlex
+import sys
 from typing import Any
 
 UNSOLVED = 3
@@ -9,18 +12,29 @@ UNSOLVED = 3
 
 
 class ContactFPGAError(Exception):
-    """Base of every error of this package."""
+    """Base of every error of this package.
+
+    >>> try:
+    ...     contactfpga.open("sim://?scene=elbow")
+    ... except contactfpga.ContactFPGAError as error:
+    ...     type(error).__name__
+    'AddressError'
+    """
 
 
 class SkinError(ContactFPGAError, ValueError):
     """A Skin that cannot work; the message names the field, its value and the limit."""
 
 
+class AddressError(ContactFPGAError):
+    """A port's name that names no port, such as one with an option or a scene that does not exist."""
+
+
 class PortNotFound(ContactFPGAError):
     """No port, or no single one, could be chosen or opened."""
 
 
-class PortBusy(PortNotFound):
+class PortBusy(ContactFPGAError):
     """The port is there, and open in this program or another one."""
 
 
@@ -74,10 +88,28 @@ class MissingExtra(ContactFPGAError, ImportError):
 
     def __init__(self, what: str, extra: str):
         self.what = what
-        super().__init__(
-            f"{what} needs more than is installed; in the folder of contactfpga's sources, install it with: "
-            f"pip install '.[{extra}]'"
-        )
+        """What needs it."""
+        super().__init__(f"{what} needs more than is installed; install it with: {pip_install(extra)}")
+
+
+def pip_install(extra: str) -> str:
+    """The command that adds an extra to what is installed for this Python, from a wheel or from a source tree."""
+    quote = '"' if sys.platform == "win32" else "'"
+    python = sys.executable or "python"
+    if os.sep in (inside := python.removeprefix(os.getcwd() + os.sep)):
+        python = inside
+    package, where = ("contactfpga", "") if _installed() else (".", ", in the folder of contactfpga's sources")
+    return f"{shlex.quote(python)} -m pip install {quote}{package}[{extra}]{quote}{where}"
+
+
+def _installed() -> bool:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        version("contactfpga")
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 class MissingTool(ContactFPGAError):

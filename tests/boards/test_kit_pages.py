@@ -2,6 +2,7 @@
 
 import dataclasses
 import datetime
+import random
 import re
 import tomllib
 from pathlib import Path
@@ -18,6 +19,7 @@ from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.lab import latency
 from contactfpga_sim.lab.kits import predict
+from contactfpga_sim.model.board.compiled import CompiledBoard
 
 ONE = Prediction(
     "settle_us", "what", "us", 1.0, 0.5, 2.0, "circuit", "contactfpga settle", datetime.date(2026, 11, 24), "abc"
@@ -31,7 +33,7 @@ def test_a_kit_has_predictions_of_each_model(name):
     assert {one.model for one in found.values()} == {"gateware", "bridge", "circuit", "cover"}
     for one in found.values():
         assert one.low <= one.value <= one.high
-        assert one.command.startswith("contactfpga ")
+        assert one.command.startswith(("contactfpga ", "python -m contactfpga_sim.lab.kits.predict "))
         assert re.fullmatch("[0-9a-f]{8}", one.commit)
 
 
@@ -51,6 +53,27 @@ def test_predictions_are_what_is_computed_today(name):
     felt = predict.closing_n(load_cover(kit.skin_path), 1e-3 * kit.skin.pitch_x_mm, 0)
     for number, force in enumerate(felt):
         assert found[f"closing_{number}_n"].value == pytest.approx(force, rel=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", kits.names())
+def test_breaks_of_any_line_at_any_time_are_told_as_predicted(name):
+    """40 breaks on the compiled board: none takes longer, and their median is that of as many chances."""
+    kit, rng = kits.kit(name), random.Random(1)
+    clocks, found = kit.skin.clock_hz // 10**6, []
+    with CompiledBoard(kit.skin, ["contact"]) as board:
+        for _ in range(40):
+            board.cut({}, {})
+            board.restart()
+            board.run(rng.randrange(700 * clocks, 1300 * clocks))
+            board.take("contact")
+            cut, start = {rng.randrange(kit.skin.rows): 0}, board.cycle
+            board.cut(*rng.choice([(cut, {}), ({}, cut)]))
+            board.run(700 * clocks)
+            found.append((int(board.take("contact")["cycle"][0]) - start) / clocks)
+    predicted = predictions.load(kit)
+    assert max(found) <= predicted["break_worst_us"].high
+    assert np.median(found) == pytest.approx(predicted["break_median_us"].value, rel=0.4)
 
 
 def test_draws_are_spread_about_what_is_stated():
@@ -81,7 +104,7 @@ def test_a_file_that_is_wrong_is_refused(tmp_path):
     with pytest.raises(KitError, match=r"settle_us is 1, outside its interval 1\.2 to 2"):
         predictions.load(kit)
     file.write_text("[[prediction]]\nnome = 1\n")
-    with pytest.raises(KitError, match=r"unknown key 'nome' in \[prediction\]; known are name, what"):
+    with pytest.raises(KitError, match=r"unknown key 'nome' in \[prediction\]; did you mean 'name'\?"):
         predictions.load(kit)
 
 

@@ -26,7 +26,7 @@ UNITS = contactfpga.examples() / "units.toml"
         ('frame = "torso"', 'frame = "leg"', "link 'chest': frame is 'leg'; the URDF has no such link"),
         ('port = "b"', 'port = "a"', "links 'arm' and 'chest' have one port, 'a'"),
         ("mirrored = true", "mirrored = 1", "link 'chest': mirrored is 1; it must be true or false"),
-        ("mirrored = true", "mirored = true", "link 'chest': unknown key 'mirored'; known are name"),
+        ("mirrored = true", "mirored = true", "link 'chest': unknown key 'mirored'; did you mean 'mirrored'?"),
         ("mirrored = true", "late_s = 0.001", "link 'chest': late_s is 0.001; a board of this Skin may be silent for"),
         ("mirrored = true", "late_s = 1\nsilent_s = 0.5", "link 'chest': late_s is 1 and silent_s 0.5; late_s must be"),
         ("mirrored = true", 'surface = "none.npz"', "none.npz"),
@@ -37,7 +37,7 @@ UNITS = contactfpga.examples() / "units.toml"
         ("two.urdf", "package://nobody/x.urdf", "no Python package 'nobody' is installed"),
         ("two.urdf", "package://contactfpga/../x.urdf", "it must name a file inside the package"),
         ('"round.toml"', "3", "link 'arm': skin is 3; it must be a text"),
-        ("[[links]]", "[[link]]", "unknown key 'link'; known are urdf, links"),
+        ("[[links]]", "[[link]]", "unknown key 'link'; did you mean 'links'?"),
     ],
 )
 def test_robot_that_cannot_be_is_refused_in_one_line(robot, capsys, old, new, says):

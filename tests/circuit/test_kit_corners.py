@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from contactfpga.design import kits
-from contactfpga.design.circuit import load_circuit, needed, patterns, phases
+from contactfpga.design.circuit import load_circuit, needed_by, patterns, phases
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
 from contactfpga.design.sheet import lay_out
@@ -31,7 +31,7 @@ def test_times_are_enough_at_the_corners(name, celsius, supply_v):
     skin = kits.kit(name).skin
     stated = load_circuit(kits.kit(name).skin_path)
     circuit = extracted(lay_out(skin, stated)).circuit.replace(supply_v=supply_v)
-    needs = needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
+    needs = needed_by(skin, circuit)
     for what in PHASES if skin.reads_rows else ("settle", "precharge"):
         pattern = getattr(needs, what).pattern
         network = Network(circuit, patterns.named(skin.row_lines, skin.column_lines)[pattern])

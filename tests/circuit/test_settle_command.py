@@ -5,8 +5,11 @@ import re
 
 import pytest
 
-from contactfpga.design.circuit import Circuit, needed
+from contactfpga.boards import BOARDS
+from contactfpga.design import buildable
+from contactfpga.design.circuit import Circuit, CircuitError, check_times, needed
 from contactfpga.errors import UNSOLVED
+from contactfpga.skin import Skin
 from contactfpga.tools import cli
 
 SMALL = ["settle", "--rows", "2", "--columns", "3"]
@@ -117,3 +120,23 @@ def test_a_skin_without_diodes(capsys, tmp_path):
     path.write_text('diodes = "none"\nconnectivity = 4\n')
     assert cli.main(["settle", "--skin", str(path)]) == 1
     assert "diodes is 'none'" in capsys.readouterr().err
+
+
+SCANNED = Skin(rows=5, columns=5, precharge_us=1.0, settle_us=5.0, guard=True)
+
+
+def test_guard_lines_count_as_lines_in_every_answer(tmp_path, capsys):
+    """A time that is enough for 5x5 lines is not enough for 5x5 with guard lines, which are those of 6x6."""
+    bare, guarded = (needed(Circuit(), size, size).settle.us(1.3) for size in (5, 6))
+    assert bare < guarded
+    skin = SCANNED.replace(settle_us=bare)
+    check_times(Circuit(), skin.replace(guard=False))
+    with pytest.raises(CircuitError, match=f"settle_us = {guarded:g} would do"):
+        check_times(Circuit(), skin)
+    path = tmp_path / "skin.toml"
+    path.write_text(skin.to_toml())
+    assert cli.main(["settle", "--skin", str(path)]) == UNSOLVED
+    said = capsys.readouterr().out
+    assert said.startswith("5x5 and guard lines, col2row")
+    assert f"the Skin's settle_us = {bare:g}: too short, {guarded:.2f} needed" in said
+    assert buildable.proposed(BOARDS["ulx3s-12f"], skin, Circuit())["settle_us"] == guarded

@@ -73,7 +73,7 @@ def test_a_circuit_that_cannot_be_is_refused(skin_file, old, new, message):
 
 def test_a_skin_without_diodes_states_no_circuit():
     with pytest.raises(CircuitError, match="diodes is 'none'"):
-        check(Circuit(), 8, 8, "none")
+        check(Circuit(), Skin(diodes="none", connectivity=4))
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_projections_count_only_where_they_are_made():
     found = problems(circuit, 64, 64, projects=True)
     assert ["touched row" in found[0].what, "pin of a column" in found[1].what, len(found)] == [True, True, 2]
     with pytest.raises(CircuitError, match="row_pull_ohm = 27000 would do"):
-        check(circuit, 64, 64, projects=True)
+        check(circuit, Skin(rows=64, columns=64, scan="reversal", precharge_us=0.25))
 
 
 def test_where_no_pull_helps_that_is_said():

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contactfpga import shipped
 from contactfpga.tools import cli, commands
 from contactfpga.tools.commands import study
 from contactfpga_sim.lab.studies import STUDIES
@@ -18,6 +19,18 @@ HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich sci
 
 
 # ---- starting
+
+
+def test_without_a_command_the_first_steps_are_shown(capsys):
+    assert cli.main([]) == 2
+    steps, said = capsys.readouterr().err.split("\n\n")
+    assert said == "contactfpga --help lists all commands, contactfpga COMMAND --help the options of one.\n"
+    assert len(steps.splitlines()) == 5
+    for step in steps.splitlines():
+        assert len(step) < 80
+        command, what = re.fullmatch(r"  (contactfpga \S.*?)   +(\S.*)", step).groups()
+        assert what
+        assert cli._parser().parse_args(command.split()[1:]).command == command.split()[1]
 
 
 def test_help_names_every_command(capsys, monkeypatch):
@@ -48,6 +61,46 @@ def test_every_command_explains_itself(name, capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert f"usage: {name} " in said
     assert PARSERS[name].description in said
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("zone", "argument COMMAND: 'zone' is none; did you mean 'zones'?"),
+        ("study flip", "argument TOPIC: 'flip' is none; did you mean 'flips'?"),
+        ("xyz", "argument COMMAND: 'xyz' is none; known are zones, view, body, wire"),
+    ],
+)
+def test_a_word_that_is_no_command(typed, said, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(typed.split())
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_pages_are_files_in_a_source_tree_and_addresses_elsewhere(tmp_path, monkeypatch):
+    assert shipped.with_pages("see docs/net.md#keys") == "see docs/net.md#keys"
+    monkeypatch.setattr(shipped, "__file__", str(tmp_path / "lib/site-packages/contactfpga/shipped.py"))
+    address = "https://github.com/contactfpga/contactfpga/blob/main/docs/net.md"
+    assert shipped.with_pages("see docs/net.md#keys, (docs/net.md)") == f"see {address}#keys, ({address})"
+    assert shipped.with_pages("mydocs/net.mdx stays") == "mydocs/net.mdx stays"
+
+
+EITHER = {
+    "--frame": {"NAME", None},  # of a coordinate frame: any name, or one of two
+    "--output": {"FILE", "DIR"},
+}
+"""What an option takes in one command or another where that is not the same."""
+
+
+def test_an_option_takes_the_same_in_every_command():
+    """A newcomer learns `--units FILE` once: elsewhere it is no switch."""
+    taken = {}
+    for parser in cli.leaves(cli._parser()):
+        for action in parser._actions:
+            takes = "nothing" if action.nargs == 0 else action.metavar
+            for option in action.option_strings:
+                taken.setdefault(option, {}).setdefault(takes, []).append(parser.prog)
+    assert {option: found for option, found in taken.items() if len(found) > 1 and {*found} != EITHER.get(option)} == {}
 
 
 @pytest.mark.parametrize(
@@ -141,13 +194,6 @@ def test_an_old_name_works_and_names_the_new_one(old, new, capsys):
 
 def test_topics_of_study_are_studies():
     assert set(study.TOPICS) <= set(STUDIES)
-
-
-def test_without_a_command_help_is_shown(capsys):
-    assert cli.main([]) == 2
-    said = capsys.readouterr().err
-    assert "\n    zones " in said
-    assert "contactfpga zones sim://" in said
 
 
 def test_version(capsys):

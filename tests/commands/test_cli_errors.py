@@ -1,7 +1,13 @@
 """What can go wrong with a command: it says so in a sentence."""
 
+import importlib.metadata
+import os
+import sys
+
 import pytest
 from sample import sample
+
+from contactfpga import errors
 
 # ---- what can go wrong
 
@@ -66,4 +72,27 @@ sys.exit(cli.main(sys.argv[1:]))
     assert result.stderr.count("\n") == 1
     if "rich" in module:
         assert "rich" in result.stderr
-    assert f"in the folder of contactfpga's sources, install it with: pip install '.[{extra}]'" in result.stderr
+    assert f" -m pip install 'contactfpga[{extra}]'\n" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("folder", "python", "shown"),
+    [
+        ("/home/me/clone", "/home/me/clone/.venv/bin/python", ".venv/bin/python"),
+        ("/home/me", "/usr/bin/python3", "/usr/bin/python3"),
+        ("/home/me/bin", "/home/me/bin/python", "/home/me/bin/python"),
+        ("/home/me", "/opt/my tools/python", "'/opt/my tools/python'"),
+    ],
+)
+def test_an_extra_goes_to_the_python_that_lacks_it(monkeypatch, folder, python, shown):
+    monkeypatch.setattr(os, "getcwd", lambda: folder)
+    monkeypatch.setattr(sys, "executable", python)
+    assert errors.pip_install("net") == f"{shown} -m pip install 'contactfpga[net]'"
+
+
+def test_an_extra_of_sources_that_nobody_installed(monkeypatch):
+    def absent(name):
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", absent)
+    assert errors.pip_install("net").endswith(" -m pip install '.[net]', in the folder of contactfpga's sources")

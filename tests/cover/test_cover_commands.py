@@ -42,7 +42,7 @@ def test_figures_without_matplotlib_name_what_to_install(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     status, _, errors = run("figures")
     assert status == 1
-    assert "pip install '.[sim]'" in errors
+    assert "pip install 'contactfpga[sim]'" in errors
 
 
 ARM = [*("--mass", 0.6, "--radius", 0.038, "--com", 0.15, "--lever", 0.2, "--speed", 0.4)]
@@ -69,7 +69,7 @@ def test_impact_command_with_length_torque_and_gravity(run):
     given = ["--length", 0.2, "--torque", 0.5, "--gravity", "--angle", 0.3]
     modulus = elastic.young_pa(0.75 * 1e5 / math.sqrt(0.019), 0.5)
     for method in ("auto", "quadrature", "ode"):
-        found = json.loads(run("impact", *ARM, *given, "--modulus", modulus, "--method", method, "--json")[1])
+        found = json.loads(run("impact", *ARM, *given, "--modulus", modulus, "--solver", method, "--json")[1])
         assert round(1e3 * found["compression_m"], 6) == 3.809762
         assert found["stiffness"] == pytest.approx(1e5)
 
@@ -150,7 +150,7 @@ def test_sense_command_finds_the_best_thickness(run):
         ),
         (["sense", "--offset", "0", "--contact", "patch", *SWITCH], "--contact is 'patch'; name the model, too"),
         (["sense", "--offset", "0", "--modulus", "1e5", *SWITCH], "--effective-radius is missing; a patch needs"),
-        (["impact", *ARM, "--time", "0.01", "--method", "ode"], "the modulus for a time is found by 'auto' only"),
+        (["impact", *ARM, "--time", "0.01", "--solver", "ode"], "the modulus for a time is found by 'auto' only"),
         (["design", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -182,9 +182,7 @@ def test_design_command(run):
 def test_figures_command(run, tmp_path, suffix):
     data = tmp_path / "foam.csv"
     data.write_text("force,deformation\n0,0\n10,1.1e-3\n20,1.9e-3\n30,3e-3\n")
-    status, out, _ = run(
-        "figures", "--output", tmp_path, "--format", suffix, "--data", data, "--design", FIRST, "--json"
-    )
+    status, out, _ = run("figures", "--output", tmp_path, "--format", suffix, "--data", data, "--case", FIRST, "--json")
     assert status == 0
     found = json.loads(out)
     names = sorted(Path(file).name for file in found["files"])
@@ -193,6 +191,6 @@ def test_figures_command(run, tmp_path, suffix):
     assert min(map(len, before)) > 3000
     assert found["stiffness_n_m"] == pytest.approx(1 / 0.098e-3)
     assert 0.99 < found["correlation"] < 1
-    out = run("figures", "--output", tmp_path, "--format", suffix, "--data", data, "--design", FIRST)[1]
+    out = run("figures", "--output", tmp_path, "--format", suffix, "--data", data, "--case", FIRST)[1]
     assert "line: 10.2 N/mm, correlation 0.99" in out
     assert [Path(file).read_bytes() for file in found["files"]] == before

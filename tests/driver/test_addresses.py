@@ -10,10 +10,10 @@ import contactfpga
 from contactfpga.driver import recording
 from contactfpga.driver.address import Sim, parse
 from contactfpga.driver.finding import Candidate
-from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.tools import cli
-from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board import native, webassembly
 from contactfpga_sim.model.board.pty_board import PtyBoard
 
 
@@ -46,7 +46,7 @@ def test_an_address_has_one_reading(address, meant):
     ],
 )
 def test_what_is_no_address_is_told(address, message):
-    with pytest.raises(PortNotFound) as caught:
+    with pytest.raises(AddressError) as caught:
         parse(address)
     assert message in str(caught.value)
     assert str(caught.value).startswith(address)
@@ -154,28 +154,29 @@ def test_errors_cannot_command_the_terminal(capsys, monkeypatch):
     def fail(*_, **__):
         raise native.CompileFailed("line 1 \x1b[2J\nline 2")
 
+    monkeypatch.setenv(webassembly.NATIVE, "1")
     monkeypatch.setattr(native, "load", fail)
     assert cli.main(["zones", "--json", "sim://"]) == 1
     assert capsys.readouterr().err == "contactfpga: line 1 \\x1b[2J\nline 2\n"
 
 
 @pytest.mark.parametrize(
-    ("port", "said"),
+    ("port", "kind", "said"),
     [
-        ("", "the port has no name"),
-        ("xyz://there", "xyz:// is not known; there are sim://, replay://FILE and zenoh://KEY"),
-        ("my touches.mcap", "is a file; to play a recording name 'replay://my touches.mcap' as the port"),
-        ("robot.toml", "is a file; for the boards of a robot there is: contactfpga body robot.toml"),
-        ("replay://touches.mcap?speed=2", "; the options are ?pace=1, ?start=SECONDS and ?link=NAME"),
-        ("replay://what?.mcap", "is the path right?"),
-        ("none", "is the board plugged in? `contactfpga doctor --list` lists the ports"),
+        ("", AddressError, "the port has no name"),
+        ("xyz://there", AddressError, "xyz:// is not known; there are sim://, replay://FILE and zenoh://KEY"),
+        ("my touches.mcap", AddressError, "is a file; to play a recording name 'replay://my touches.mcap' as the port"),
+        ("robot.toml", AddressError, "is a file; for the boards of a robot there is: contactfpga body robot.toml"),
+        ("replay://touches.mcap?speed=2", PortNotFound, "; the options are ?pace=1, ?start=SECONDS and ?link=NAME"),
+        ("replay://what?.mcap", PortNotFound, "is the path right?"),
+        ("none", PortNotFound, "is the board plugged in? `contactfpga doctor --list` lists the ports"),
     ],
 )
-def test_what_is_no_port_is_refused_with_the_next_step(port, said, tmp_path, monkeypatch):
+def test_what_is_no_port_is_refused_with_the_next_step(port, kind, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("my touches.mcap", "robot.toml"):
         (tmp_path / name).touch()
-    with pytest.raises(PortNotFound) as caught:
+    with pytest.raises(kind) as caught:
         contactfpga.open(port)
     assert said in str(caught.value)
 

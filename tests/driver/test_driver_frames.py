@@ -168,6 +168,71 @@ def test_a_task_that_is_canceled_takes_no_frame(board):
         assert queue.next(LONG).sequence == sent
 
 
+def test_a_board_is_awaited(board):
+    """Others go on while a task waits, and nobody waits in the loop's own thread."""
+
+    async def use():
+        ticks = 0
+
+        async def tick():
+            nonlocal ticks
+            while True:
+                ticks += 1
+                await asyncio.sleep(0.001)
+
+        async with contactfpga.open(board.path, timeout=LONG) as opened:
+            beside = asyncio.create_task(tick())
+            found = [(await opened.next(LONG)).sequence, (await opened.read(LONG)).sequence]
+            waiting = asyncio.create_task(opened.next(LONG))
+            while ticks < 50:
+                await asyncio.sleep(0.01)
+            assert not waiting.done()
+            await asyncio.to_thread(board.send, b"".join(board.frame() for _ in range(6)))
+            found.append((await waiting).sequence)
+            found += (await opened.batch(0.0, LONG)).frames["sequence"].tolist()
+            with pytest.raises(contactfpga.ReadTimeout, match="no frame waits"):
+                await opened.next(timeout=0)
+            with pytest.raises(contactfpga.ReadTimeout, match=r"no frame within 0\.05 s"):
+                await opened.next(timeout=0.05)
+            await asyncio.to_thread(board.send, board.frame() + board.frame())
+            while opened.stats.frames < len(found) + 2:
+                await asyncio.sleep(0.01)
+            found.append((await opened.latest()).sequence)
+            beside.cancel()
+            assert (opened.sheet.rows, opened.stats.lost, opened.board.sheet) == (16, 0, opened.sheet)
+        with pytest.raises(contactfpga.BoardClosed):
+            await opened.next()
+        return found
+
+    found = asyncio.run(use())
+    assert found == [*range(found[0], found[0] + 8), found[0] + 9]
+
+
+def test_close_wakes_a_task_that_waits(board):
+    async def use():
+        async with contactfpga.open(board.path, timeout=LONG) as opened:
+            await opened.next(LONG)
+            waiting = asyncio.create_task(opened.next(LONG))
+            await asyncio.sleep(0.05)
+        with pytest.raises(contactfpga.BoardClosed):
+            await waiting
+
+    asyncio.run(use())
+
+
+def test_a_canceled_next_takes_no_frame(board):
+    async def use():
+        async with contactfpga.open(board.path, timeout=LONG) as opened:
+            await opened.next(LONG)
+            with pytest.raises(TimeoutError):
+                await asyncio.wait_for(opened.next(LONG), 0.05)
+            sent = board.sent
+            await asyncio.to_thread(board.send, board.frame())
+            assert (await opened.next(LONG)).sequence == sent
+
+    asyncio.run(use())
+
+
 @pytest.mark.parametrize("report", ["moments", "barycenter", "cells"])
 @pytest.mark.parametrize("surface", [{}, {"surface": "cylinder", "radius_mm": 60.0}])
 def test_a_batch_holds_what_the_frames_hold(report, surface):

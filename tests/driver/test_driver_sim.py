@@ -90,9 +90,9 @@ def test_simulated_board_of_a_file(tmp_path):
 
 
 def test_simulated_board_with_an_unknown_option():
-    with pytest.raises(contactfpga.PortNotFound, match=r"scene=NAME"):
+    with pytest.raises(contactfpga.AddressError, match=r"scene=NAME"):
         contactfpga.open("sim://?color=red")
-    with pytest.raises(contactfpga.PortNotFound, match="scene 'elbow' is not known"):
+    with pytest.raises(contactfpga.AddressError, match="scene 'elbow' is not known"):
         contactfpga.open("sim://?scene=elbow")
 
 

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 HEAD = """
 import contactfpga, os, sys, threading, time
-from contactfpga import BoardClosed, ContactFPGAError, PortNotFound
+from contactfpga import BoardClosed, ContactFPGAError, PortBusy
 port = sys.argv[1]
 
 def child(work, end=sys.exit):
@@ -130,7 +130,7 @@ contactfpga.read_zones(port)
 def work():
     try:
         contactfpga.read_zones(port)
-    except PortNotFound as error:
+    except PortBusy as error:
         assert "another program" in str(error), error
     else:
         raise AssertionError("the child reads the parent's port")

@@ -160,13 +160,43 @@ def test_a_search_writes_to_no_port(three):
 def test_a_search_does_not_disturb_an_open_board(three):
     three[0].slice = 1 << 16
     with contactfpga.open("name:LEFT", timeout=LONG) as opened:
-        with pytest.raises(contactfpga.PortNotFound, match="in use: this program opened it already"):
+        with pytest.raises(contactfpga.PortBusy, match="in use: this program opened it already") as caught:
             contactfpga.open("name:LEFT")
+        assert not isinstance(caught.value, contactfpga.PortNotFound)
         with contactfpga.open("name:RIGHT", timeout=LONG) as other:
             assert other.name == "RIGHT"
         three[0].send(b"".join(three[0].frame() for _ in range(50)))
         assert opened.read(LONG)
         assert (opened.stats.lost, opened.stats.damaged.total()) == (0, 0)
+
+
+def test_a_port_that_read_zones_keeps_open_goes_to_who_opens_it(board, monkeypatch):
+    """Nobody else can close that one, as in a notebook whose first cell reads zones."""
+    plug_in(monkeypatch, board)
+    for port in (board.path, None):
+        assert len(contactfpga.read_zones(port, LONG)) == 1
+        with contactfpga.open(port, timeout=LONG) as opened:
+            assert len(opened.read(LONG)) == 1
+            with pytest.raises(contactfpga.PortBusy, match="this program opened it already"):
+                contactfpga.read_zones(port, LONG)
+            assert len(opened.read(LONG)) == 1
+        assert len(contactfpga.read_zones(port, LONG)) == 1
+
+
+@pytest.mark.parametrize("level", [None, "DEBUG"])
+def test_the_library_of_ports_logs_its_reads_only_where_it_is_asked_to(board, python, level):
+    """A program that logs everything would get a line for each read of the port."""
+    asked = "" if level is None else f"logging.getLogger('serialx').setLevel('{level}')"
+    code = f"""
+import logging, contactfpga
+logging.basicConfig(level="DEBUG")
+{asked}
+with contactfpga.open("{board.path}", timeout={LONG}) as opened:
+    opened.read({LONG})
+"""
+    lines = python(code).stderr.splitlines()
+    assert any("contactfpga" in line and "the board has a 16x16 Skin" in line for line in lines)
+    assert any("serialx" in line for line in lines) == (level is not None)
 
 
 def test_more_ports_are_searched_where_they_are_named(monkeypatch, board):
@@ -190,4 +220,6 @@ def test_doctor_lists_the_boards(three, capsys, monkeypatch):
     for board in three:
         board.hello_s = 0.0
     assert cli.main(["doctor", "--list"]) == 1
-    assert "no board said hello" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no board said hello" in said
+    assert "are listened to where CONTACTFPGA_PORTS names them" in said

@@ -51,7 +51,7 @@ def test_a_recording_plays_in_its_own_time_where_that_is_asked_for(tmp_path, pac
 
 @pytest.mark.parametrize("pace", ["0", "-1", "fast", "nan", "inf"])
 def test_a_pace_that_cannot_be(tmp_path, pace):
-    with pytest.raises(contactfpga.PortNotFound, match="must be a positive number"):
+    with pytest.raises(contactfpga.AddressError, match="must be a positive number"):
         contactfpga.open(f"replay://{tmp_path}/frames.bin?pace={pace}")
 
 

@@ -9,7 +9,7 @@ import pytest
 from model_board import DirectPort
 
 import contactfpga
-from contactfpga import ContactFPGAError, PortLost, PortNotFound, Skin
+from contactfpga import AddressError, ContactFPGAError, PortLost, PortNotFound, Skin
 from contactfpga.driver import finding, sheets
 from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
@@ -258,9 +258,9 @@ def test_sheets_at_a_serial_port(capsys):
 def test_numbers_of_sheets_end_a_port():
     assert SheetOf.parse("/dev/ttyUSB0#1") == SheetOf("/dev/ttyUSB0", 1)
     assert SheetOf.parse("sim://?skin=a#b.toml") is None
-    with pytest.raises(PortNotFound, match="port#16: sheets have the numbers 0 to 15"):
+    with pytest.raises(AddressError, match="port#16: sheets have the numbers 0 to 15"):
         SheetOf.parse("port#16")
-    with pytest.raises(PortNotFound, match="port#1#0: it names two sheets; give one number, as in port#0"):
+    with pytest.raises(AddressError, match="port#1#0: it names two sheets; give one number, as in port#0"):
         contactfpga.open("port#1#0")
 
 

@@ -282,7 +282,7 @@ def test_addresses():
     ],
 )
 def test_addresses_that_cannot_be_are_refused_before_anything_is_opened(name, said):
-    with pytest.raises(contactfpga.PortNotFound) as caught:
+    with pytest.raises(contactfpga.AddressError) as caught:
         contactfpga.open(name)
     assert said in str(caught.value)
 

@@ -72,7 +72,9 @@ def test_the_workflow_may_only_read_and_ends_in_time():
 
 @pytest.mark.skipif(not shutil.which("actionlint"), reason="actionlint is not installed; a pre-commit hook runs it")
 def test_actionlint_finds_no_fault():
-    done = subprocess.run(["actionlint", *WORKFLOW.parent.glob("*.yml")], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        ["actionlint", *WORKFLOW.parent.glob("*.yml")], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 

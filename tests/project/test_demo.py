@@ -50,11 +50,11 @@ def test_the_engines_agree_on_what_a_touch_costs():
     assert runs[0].events > 1000
 
 
-def test_without_perl_the_scenes_through_cocotb_are_left_out_and_that_is_said(monkeypatch, capsys, tmp_path):
+def test_without_its_tools_the_scenes_through_cocotb_are_left_out_and_that_is_said(monkeypatch, capsys, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     engine = next(name for name in demo.ENGINES if name.startswith("cocotb"))
     assert not demo._available(engine)
-    assert "left out: it needs Verilator and perl" in capsys.readouterr().out
+    assert "left out: it needs Verilator, perl, make and c++" in capsys.readouterr().out
 
 
 def test_a_difference_is_told(monkeypatch, capsys, tmp_path):

@@ -210,8 +210,25 @@ def test_the_host_alone_decodes_a_frame(host, tmp_path):
 )
 def test_the_host_alone_names_the_extra_that_is_missing(host, command, extra):
     said = run(host / "contactfpga", *command.split(), cwd=host, status=1).stderr
-    assert " ".join(said.split()).endswith(f"pip install '.[{extra}]'")
+    command = f"{host}/python -m pip install 'contactfpga[{extra}]'"
+    assert " ".join(said.split()).endswith(f"install it with: {command}")
     assert "Traceback" not in said
+
+
+@pytest.mark.slow
+def test_the_host_alone_names_pages_by_their_address(host):
+    said = run(host / "contactfpga", "zones", "--help", cwd=host).stdout
+    assert "https://github.com/contactfpga/contactfpga/blob/main/docs/haptics.md" in said
+
+
+@pytest.mark.slow
+def test_an_extra_is_added_to_the_wheel_that_is_there(host):
+    """Without an index pip lacks what the extra adds, and not contactfpga itself."""
+    pip = [sys.executable, "-m", "pip", "--isolated", "--python", host / "python"]
+    no_config = {"PIP_CONFIG_FILE": os.devnull}
+    refused = run(*pip, "install", "--no-index", "contactfpga[ros]", cwd=host, env=ENVIRONMENT | no_config, status=1)
+    assert "Requirement already satisfied: contactfpga[ros]" in refused.stdout
+    assert "No matching distribution found for contactfpga" not in refused.stderr
 
 
 def test_the_examples_in_a_source_tree():

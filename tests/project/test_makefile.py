@@ -55,6 +55,11 @@ def test_other_folders_will_do(tmp_path, name):
     assert "The path of this folder" not in make(clone(tmp_path / name), "check").stderr
 
 
+@pytest.mark.parametrize(("goal", "asked"), [("sim", False), ("test", True)])
+def test_the_first_command_asks_for_no_compiler(tmp_path, goal, asked):
+    assert ("check compiler" in make(clone(tmp_path / "clone"), "-n", goal).stdout) == asked
+
+
 def test_a_moved_clone_gets_its_environment_anew(tmp_path):
     folder = clone(tmp_path / "clone")
     (folder / ".venv").mkdir()

@@ -109,7 +109,7 @@ def test_without_pyarrow_the_extra_is_named(file, tmp_path, monkeypatch, capsys)
 
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert cli.main(["export", str(file), str(tmp_path / "x.parquet")]) == 1
-    assert "pip install '.[analysis]'" in capsys.readouterr().err
+    assert "pip install 'contactfpga[analysis]'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -40,7 +40,7 @@ def test_what_cannot_be_is_refused_in_a_line(capsys, arguments, said):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--place", "0", "0", "nan"], "argument --place: 'nan' is not a number from -100 to 100 m"),
+        (["--origin-m", "0", "0", "nan"], "argument --origin-m: 'nan' is not a number from -100 to 100 m"),
         (["--zones-hz", "0"], "argument --zones-hz: '0' is not a number above 0 and at most 100000 Hz"),
     ],
 )

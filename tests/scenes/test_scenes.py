@@ -100,7 +100,7 @@ def test_recordings_and_callbacks_are_scenes(tmp_path):
 
 def test_what_is_no_scene_is_refused(tmp_path):
     skin = Skin(rows=2, columns=3)
-    with pytest.raises(ValueError, match=r"'elbow' is not known; take a \.npy or \.npz file or one of fingertip"):
+    with pytest.raises(ValueError, match=r"'elbow' is not known, and no \.npy or \.npz file; known are fingertip"):
         scenes.scene(skin, "elbow")
     with pytest.raises(ValueError, match=r"shape \(1, 3, 2\); the sheet takes \(frames, 2, 3\)"):
         scenes.scene(skin, np.zeros((3, 2), bool))

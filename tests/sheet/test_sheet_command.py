@@ -61,17 +61,17 @@ def test_a_cell_finer_than_its_parts_is_refused_in_one_line(tmp_path, capsys):
 
 @pytest.mark.skipif(not check.there(), reason="KiCad 6 is not installed")
 def test_check_asks_kicad(tmp_path, skin, capsys, monkeypatch):
-    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--check"]) == 0
+    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--kicad"]) == 0
     assert "KiCad: 0 findings" in capsys.readouterr().out
     monkeypatch.setattr(check, "findings", lambda board: ["[clearance]: too near"])
-    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--check"]) == 1
+    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--kicad"]) == 1
     assert "too near" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--margin", "3"], "7"),
+        (["--edge-mm", "3"], "7"),
         (["--part", "spring"], "spring"),
         (["--cable", "-1"], "-1"),
     ],

@@ -29,7 +29,7 @@ CLOSED = {"closed": True, "surface": "cylinder"}
         ({"pitch_y_mm": 5.0}, "dome", r"pitch_y_mm is 5; a cell with DOME_5MM_4LEG, .* needs 5\.2 mm"),
         ({"pitch_x_mm": 6.9}, "tact", r"pitch_x_mm is 6\.9; a cell with TACT_4\.5MM, .* needs 7 mm"),
         ({}, "spring", r"part is 'spring'; it must be one of dome, tact"),
-        (dict(rows=20, columns=8, radius_mm=12.0, **CLOSED), "dome", r"rows is 20: 20 row lines, and 14 find a place"),
+        (dict(rows=20, columns=8, radius_mm=12.0, **CLOSED), "dome", r"rows is 20; .* place for at most 14 rows, 2"),
         (
             dict(rows=3, columns=4, row_drive="74hc595", column_read="74hc165", radius_mm=5.0, **CLOSED),
             "dome",
@@ -59,6 +59,15 @@ def test_each_switch_lies_where_the_skin_has_its_cell():
     }
     cells = set(itertools.product(range(5), range(7))) - {(1, 2)}
     assert found == {(round(column * 6.4, 4), round(-row * 8.25, 4)) for row, column in cells}
+
+
+@pytest.mark.parametrize("guard", [False, True])
+def test_a_closed_sheet_takes_the_rows_that_its_refusal_names(guard):
+    closed = Skin(rows=20, columns=8, radius_mm=12.0, guard=guard, **CLOSED)
+    most = 14 - guard
+    with pytest.raises(SheetError, match=f"at most {most} rows"):
+        lay_out(closed.replace(rows=most + 1))
+    assert lay_out(closed.replace(rows=most)).skin.rows == most
 
 
 def test_a_closed_sheet_goes_on_over_its_seam():

@@ -169,7 +169,7 @@ def test_the_command_says_what_touches_anywhere_come_to(tmp_path, monkeypatch, c
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
     monkeypatch.setattr("contactfpga_sim.lab.arm.report.columns", lambda *given: {})
     monkeypatch.setattr("contactfpga_sim.lab.arm.report.as_json", lambda *given: {})
-    assert cli.main(["study", "arm", "--json", "--places", "6", "--latency", "3", "--jobs", "1"]) == 0
+    assert cli.main(["study", "arm", "--json", "--places", "6", "--latency-us", "3000", "--jobs", "1"]) == 0
     known = json.loads(capsys.readouterr().out)["anywhere"]
     assert list(known) == ["3 ms", "UART", "pin", "limit alone"]
     forces = np.array([one["peak_force_n"] for one in known.values()])

@@ -93,7 +93,7 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
 def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsys, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('like = "paper"\n[link]\nspeed_m_s = 0.1\n')
-    assert cli.main(["study", "arm", "--case", str(path), "--json", "--latency", "3", "--places", "0"]) == 0
+    assert cli.main(["study", "arm", "--case", str(path), "--json", "--latency-us", "3000", "--places", "0"]) == 0
     known = json.loads(capsys.readouterr().out)
     assert "paper" not in known
     assert list(known["runs"]) == ["3 ms", "UART", "pin", "limit alone"]

@@ -47,5 +47,5 @@ def test_the_page_has_what_a_run_gives():
 def test_a_board_without_the_plain_sum_is_refused(capsys):
     with pytest.raises(CaseError, match=r"units is 0; the way 'force' needs units = 3"):
         run(PAPER, "force", skin=Skin())
-    assert cli.main(["study", "arm", "--units", "--case", "push"]) != 0
-    assert "--units runs its own Skin" in capsys.readouterr().err
+    assert cli.main(["study", "arm", "--force-threshold", "--case", "push"]) != 0
+    assert "--force-threshold runs its own Skin" in capsys.readouterr().err

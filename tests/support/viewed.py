@@ -61,10 +61,10 @@ def cookie(port, guard):
     return f"contactfpga-view-{port}={guard.token}"
 
 
-def camera(position=(0.0, 0.0, 1.0)):
-    """What a page says first. It looks straight down."""
-    ahead = ((0.0, 1.0, 0.0, 0.0), position, 0.7, 0.01, 10.0, 100, 100, (*position[:2], 0.0), (0.0, 1.0, 0.0))
-    return _messages.ViewerCameraMessage(*ahead)
+def camera(position=(0.0, 0.0, 1.0), size=(100, 100)):
+    """What a page says first. It looks straight down; ``size``: width and height of its window."""
+    pose, lens = ((0.0, 1.0, 0.0, 0.0), position), (0.7, 0.01, 10.0)
+    return _messages.ViewerCameraMessage(*pose, *lens, *size[::-1], (*position[:2], 0.0), (0.0, 1.0, 0.0))
 
 
 def click(node, ray_origin=(0.0, 0.0, 1.0), ray_direction=(0.0, 0.0, -1.0)):

@@ -108,7 +108,7 @@ def test_command_writes_a_table_that_loads(tube, tmp_path, capsys):
             str(table),
             "--skin",
             str(skin),
-            "--origin",
+            "--origin-mm",
             *origin,
             "--rpy",
             "0.3",

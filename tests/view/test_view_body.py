@@ -136,7 +136,7 @@ def test_a_robot_without_joints_is_shown(tmp_path):
     try:
         shown = bodies.RobotStage(server, Body.load(tmp_path / "robot.toml"))
         shown.move({})
-        shown.look({})
+        assert shown.points_m()[:, 2] == pytest.approx(0.5)
         np.testing.assert_allclose(shown.stages["sheet"].point_m, [0.0, 0.0, 0.5])
     finally:
         serving.stop(server)

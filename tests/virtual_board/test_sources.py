@@ -63,6 +63,7 @@ for line in ["", *sys.stdin.read().splitlines()]:
         before = file.read_bytes()
         file.write_bytes(before + b"#")
     sources._taken.clear()
+    sources.texts.cache_clear()
     print(eval(sys.argv[1], {"native": native, "skin": Skin()}))
     if file:
         file.write_bytes(before)
@@ -70,6 +71,7 @@ assert "amaranth" not in sys.modules
 """
 SIZING = ("sizes.py", "placed.py", "synthesis.py", "tools.py")
 BOARD = "native.skin_key(skin)"
+CARRIED = "__import__('contactfpga_sim.model.board.compiled', fromlist=['']).carried_key(skin)"
 
 
 @pytest.fixture(autouse=True)
@@ -127,6 +129,14 @@ def test_each_file_that_python_loads_for_the_gateware_changes_the_key_of_a_board
     assert len(set(changed.values())) == len(loaded)
     for named in ("derived", "checks", "limits"):
         assert copy / f"py/contactfpga/skin/{named}.py" in changed
+
+
+@pytest.mark.slow
+def test_each_file_that_python_loads_for_one_sheet_changes_the_key_of_a_carried_board(copy, loaded):
+    drivers = copy / "sim/contactfpga_sim/model/board/drivers"
+    now, changed = keys(copy, CARRIED, [*loaded, *drivers.glob("*.h"), drivers / "board.cpp"])
+    left = {str(file.relative_to(copy)) for file, key in changed.items() if key == now}
+    assert left == {"py/contactfpga/skin/several.py", "hdl/contactfpga_hdl/several.py"}
 
 
 def test_a_file_that_the_gateware_does_not_need_leaves_the_key(copy):

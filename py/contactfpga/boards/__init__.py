@@ -4,6 +4,7 @@ from contactfpga.boards.ice40 import ICEBREAKER, ICESTICK
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.boards.ulx3s import ULX3S_12F, ULX3S_12F_FT232H, ULX3S_85F
 from contactfpga.choices.choice import load_own
+from contactfpga.inputs.values import suggestion
 from contactfpga.skin import SkinError
 
 __all__ = ["BOARDS", "find"]
@@ -19,8 +20,8 @@ def find(name: str) -> BoardSpec:
     if name in BOARDS:
         return BOARDS[name]
     if ":" not in name:
-        known = ", ".join(BOARDS)
-        raise SkinError(f"no board is called {name!r}; known are {known}, and 'module:attribute' of your own")
+        known = [*BOARDS, "module:attribute of your own"]
+        raise SkinError(f"no board is called {name!r}; {suggestion(name, known)}")
     board = load_own(name, f"the board {name!r}")
     if not isinstance(board, BoardSpec):
         raise SkinError(f"{name!r} is a {type(board).__name__}; it must be a BoardSpec")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.design.circuit import Circuit, CircuitError, check, check_times, needed, recommended_us
+from contactfpga.design.circuit import Circuit, CircuitError, check, check_times, needed_by, recommended_us
 from contactfpga.skin import Skin, SkinError
 
 _LONGER = (1, 2, 4, 8)
@@ -23,7 +23,7 @@ def findings(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str,
         "baud": lambda: board.check_baud(skin),
     }
     if circuit is not None:
-        asked["levels"] = lambda: check(circuit, skin.rows, skin.columns, skin.diodes, skin.reads_rows)
+        asked["levels"] = lambda: check(circuit, skin)
         asked["times"] = lambda: check_times(circuit, skin)
     return {name: _said(ask) for name, ask in asked.items()}
 
@@ -72,7 +72,7 @@ def _times(skin: Skin, changes: dict[str, Any], circuit: Circuit | None, factor:
     found: dict[str, Any] = {"settle_us": skin.settle_us * factor} if factor > 1 else {}
     if circuit is not None:
         slow = skin.replace(**changes, settle_us=_SLOW_US)  # so that no row is too short to ask
-        needs = needed(circuit, skin.rows, skin.columns, skin.diodes)
+        needs = needed_by(skin, circuit)
         for name, us in recommended_us(slow, needs).items():
             if us is not None and found.get(name, getattr(skin, name)) < us:
                 found[name] = us

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from contactfpga.errors import PortNotFound
+from contactfpga.errors import AddressError
 from contactfpga.inputs.values import number_in
 from contactfpga.skin.several import MOST_SHEETS
 
@@ -50,24 +50,24 @@ class Sim:
     @classmethod
     def parse(cls, name: str) -> Sim:
         """Read an address. ``%`` and two hex digits stand for a byte of UTF-8; all else but ``&`` stands for itself,
-        ``+`` and ``#`` too. Raises :class:`PortNotFound` that says what is wrong."""
+        ``+`` and ``#`` too. Raises :class:`AddressError` that says what is wrong."""
         head, _, query = name.partition("?")
         if head not in ("sim://", "sim:"):
-            raise PortNotFound(f"{name}: {_SIM_FORM}")
+            raise AddressError(f"{name}: {_SIM_FORM}")
         found: dict[str, Any] = {}
         for part in query.split("&") if query else ():
             key, equals, value = part.partition("=")
             if key not in SIM_OPTIONS or not equals:
-                raise PortNotFound(f"{name}: {part!r} is no option; {_SIM_FORM}; {_ESCAPES}")
+                raise AddressError(f"{name}: {part!r} is no option; {_SIM_FORM}; {_ESCAPES}")
             if key in found:
-                raise PortNotFound(f"{name}: {key} is given twice")
+                raise AddressError(f"{name}: {key} is given twice")
             found[key] = _decoded(name, value)
             if not found[key]:
-                raise PortNotFound(f"{name}: {key} is empty; {_SIM_FORM}")
+                raise AddressError(f"{name}: {key} is empty; {_SIM_FORM}")
         if "threshold" in found:
             found["threshold"] = _threshold(name, found["threshold"])
         if "sheets" in found and (other := {"skin", "threshold", "units"} & set(found)):
-            raise PortNotFound(
+            raise AddressError(
                 f"{name}: with sheets there is no {min(other)}; their Skins are in the file of the sheets"
             )
         return cls(**found)
@@ -80,17 +80,17 @@ _ESCAPES = "a % that is meant is written %25, a & %26"
 
 def _decoded(name: str, text: str) -> str:
     if odd := re.search(r"%(?![0-9a-fA-F]{2}).{0,2}", text):
-        raise PortNotFound(f"{name}: {odd[0]!r} is no % with two hex digits; {_ESCAPES}")
+        raise AddressError(f"{name}: {odd[0]!r} is no % with two hex digits; {_ESCAPES}")
     try:
         return unquote(text, errors="strict")
     except UnicodeDecodeError:
-        raise PortNotFound(f"{name}: {text!r} is no UTF-8 once its % are decoded") from None
+        raise AddressError(f"{name}: {text!r} is no UTF-8 once its % are decoded") from None
 
 
 def _threshold(name: str, text: str) -> float:
     value = number_in(text)
     if not math.isfinite(value):
-        raise PortNotFound(f"{name}: threshold is {text!r}; it must be a finite number")
+        raise AddressError(f"{name}: threshold is {text!r}; it must be a finite number")
     return value
 
 
@@ -108,25 +108,25 @@ class Replay:
 
     @classmethod
     def parse(cls, name: str) -> Replay:
-        """Read an address; raises :class:`PortNotFound` that says what is wrong."""
+        """Read an address; raises :class:`AddressError` that says what is wrong."""
         path, *rest = _REPLAY_OPTIONS.split(name.removeprefix(REPLAY), maxsplit=1)
         found: dict[str, str] = {}
         for part in rest[0].split("&") if rest else ():
             key, equals, value = part.partition("=")
             if not equals or key not in ("pace", "start", "link"):
-                raise PortNotFound(f"{name}: {part!r} is no option; there are {REPLAY_FORM}")
+                raise AddressError(f"{name}: {part!r} is no option; there are {REPLAY_FORM}")
             if key in found:
-                raise PortNotFound(f"{name}: {key} is given twice")
+                raise AddressError(f"{name}: {key} is given twice")
             found[key] = value
         pace = _number(name, "pace", found.get("pace"), "a positive number, 1 for the time of the recording")
         start = _number(name, "start", found.get("start"), "a number of seconds, 0 or more")
         if pace == 0:
-            raise PortNotFound(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
+            raise AddressError(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
         link = unquote(found["link"]) if "link" in found else None
         try:
             return cls(Path(path).expanduser(), pace, start or 0.0, link)
         except RuntimeError as error:  # ~nobody
-            raise PortNotFound(f"{name} cannot be opened: {error}") from None
+            raise AddressError(f"{name} cannot be opened: {error}") from None
 
 
 _REPLAY_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
@@ -139,7 +139,7 @@ def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
         return None
     value = number_in(text)
     if not 0 <= value < math.inf:
-        raise PortNotFound(f"{name}: {key} is {text!r}; it must be {wanted}")
+        raise AddressError(f"{name}: {key} is {text!r}; it must be {wanted}")
     return value
 
 
@@ -155,18 +155,18 @@ class Net:
 
     @classmethod
     def parse(cls, name: str) -> Net:
-        """Read an address; raises :class:`PortNotFound` that says what is wrong."""
+        """Read an address; raises :class:`AddressError` that says what is wrong."""
         head, _, query = name.removeprefix(NET).partition("?")
         found: dict[str, str] = {}
         for part in query.split("&") if query else ():
             option, _, value = part.partition("=")
             if option not in ("connect", "config", "wait") or not value or option in found:
-                raise PortNotFound(f"{name}: {part!r} is no option, or given twice; {_NET_FORM}")
+                raise AddressError(f"{name}: {part!r} is no option, or given twice; {_NET_FORM}")
             found[option] = unquote(value)
         try:
             key = checked_key(head)
         except ValueError as error:
-            raise PortNotFound(f"{name}: {error}; {_NET_FORM}") from None
+            raise AddressError(f"{name}: {error}; {_NET_FORM}") from None
         return cls(key, found.get("connect"), found.get("config"), _wait(name, found.get("wait", "0.5")))
 
 
@@ -183,7 +183,7 @@ def checked_key(key: str) -> str:
 def _wait(name: str, text: str) -> float:
     value = number_in(text)
     if not 0 <= value <= 86_400:
-        raise PortNotFound(f"{name}: wait is {text!r}; it must be a number of seconds from 0 to 86400")
+        raise AddressError(f"{name}: wait is {text!r}; it must be a number of seconds from 0 to 86400")
     return value
 
 
@@ -196,14 +196,14 @@ class SheetOf:
 
     @classmethod
     def parse(cls, name: str) -> SheetOf | None:
-        """None where the name is of no sheet. Raises :class:`PortNotFound`."""
+        """None where the name is of no sheet. Raises :class:`AddressError`."""
         found = re.fullmatch(r"(.*)#(\d{1,4})", name)
         if found is None:
             return None
         if int(found[2]) >= MOST_SHEETS:
-            raise PortNotFound(f"{name}: sheets have the numbers 0 to {MOST_SHEETS - 1}")
+            raise AddressError(f"{name}: sheets have the numbers 0 to {MOST_SHEETS - 1}")
         if (once := re.fullmatch(r"(.*?)(#\d{1,4})+", found[1])) is not None:
-            raise PortNotFound(f"{name}: it names two sheets; give one number, as in {once[1]}#{int(found[2])}")
+            raise AddressError(f"{name}: it names two sheets; give one number, as in {once[1]}#{int(found[2])}")
         return cls(found[1], int(found[2]))
 
 
@@ -211,7 +211,7 @@ Address = Serial | Sim | Replay | Net | SheetOf
 
 
 def parse(name: str) -> Address:
-    """Read a port's name. Raises :class:`PortNotFound` that says what is wrong, for a file that is no port as well."""
+    """Read a port's name. Raises :class:`AddressError` that says what is wrong, for a file that is no port as well."""
     if (sheet := SheetOf.parse(name)) is not None:
         return sheet
     if name.startswith(SIM):
@@ -221,7 +221,7 @@ def parse(name: str) -> Address:
     if name.startswith(NET):
         return Net.parse(name)
     if (reason := _no_port(name)) is not None:
-        raise PortNotFound(reason)
+        raise AddressError(reason)
     return Serial(name)
 
 

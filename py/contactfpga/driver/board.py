@@ -5,158 +5,52 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
-from typing import NoReturn, Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
-from contactfpga.driver.events import SideEvent, Silence, checked_deadline
+from contactfpga.driver.events import SideEvent
+from contactfpga.driver.facts import BoardFacts
 from contactfpga.driver.link import Link
-from contactfpga.driver.stats import Stats
-from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
-from contactfpga.driver.transport import Transport, counters_of
+from contactfpga.driver.subscription import Subscription, checked, frame_of
+from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReadTimeout, ReplayEnded
 from contactfpga.instruments.self_test import SelfTest
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
-from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
-from contactfpga.wire.faults import Faults, SelfTestSlot
-from contactfpga.wire.hello import Hello
+from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
 QUEUE = 16_384
 """Frames that wait for :meth:`Board.next` at most."""
 
 
-class Board:
+class Board(BoardFacts):
     """An open port with a board at its other end: a context manager that iterates over every frame.
+
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     for zones in board:
+    ...         if len(zones) == 2:
+    ...             break
 
     Made by :func:`open`. Safe for several threads. :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
     thread that wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another
     process; in a child of ``fork`` it is closed. After :meth:`close` every method raises :class:`BoardClosed`, even one
-    that was already waiting.
+    that was already waiting. In ``async with`` it is an :class:`AsyncBoard`.
     """
 
     def __init__(self, transport: Transport, skin: Skin | None = None, opened: Callable[[Board], object] | None = None):
-        self._expected = skin
-        self._live = transport.live
-        self._threaded = transport.threaded
-        self._link = Link(transport, skin)
-        self._frames = Subscription(self._link, QUEUE)
+        link = Link(transport, skin)
+        super().__init__(link, Subscription(link, QUEUE), skin)
         if opened is not None:
             opened(self)
         self._link.start()
 
-    def __repr__(self) -> str:
-        try:
-            sheet = self.sheet
-        except ContactFPGAError as error:
-            return f"<Board {error}>"
-        return f"<Board {self.port}: {sheet.rows}x{sheet.columns} cells>"
-
-    def __reduce__(self) -> NoReturn:
-        """Not even a copy: the end of one would close the port of the other."""
-        raise TypeError(f"{self.port}: an open board cannot be copied or sent to another process; open its port there")
-
     def __del__(self) -> None:
         if hasattr(self, "_link"):
             self._link.abandon()
-
-    # ---- what is known of the board
-
-    @property
-    def port(self) -> str:
-        """Name of the port."""
-        return self._link.transport.name
-
-    @property
-    def live(self) -> bool:
-        """Whether a board that answers requests is at the other end; False for a recording."""
-        return self._live
-
-    @property
-    def hello(self) -> Hello:
-        """What the board last said about itself, which it does twice per second."""
-        self._link.check_open()
-        if self._link.conversation.hello is None:
-            raise ContactFPGAError(f"{self.port}: no hello has come yet")
-        return self._link.conversation.hello
-
-    @property
-    def sheet(self) -> Sheet:
-        """Lines, lengths and report of the board's sheet, from its hello."""
-        return self.hello.sheet
-
-    @property
-    def name(self) -> str:
-        """The name in the board's Skin; "" if it has none."""
-        return self.hello.name
-
-    @property
-    def fingerprint(self) -> bytes:
-        """Fingerprint of the Skin the board was built from."""
-        return self.hello.fingerprint
-
-    @property
-    def clock_hz(self) -> int:
-        """Clock of the board's gateware in Hz."""
-        return self.hello.clock_hz
-
-    @property
-    def baud(self) -> int:
-        """The board's baud rate."""
-        return self.hello.baud
-
-    @property
-    def skin(self) -> Skin:
-        """The board's whole Skin: the one given to :func:`open`, or the reference Skin if the board has its
-        fingerprint.
-
-        Raises :class:`ContactFPGAError` for any other board, whose hello describes only the :attr:`sheet`.
-        """
-        hello = self.hello
-        for skin in (self._expected, Skin()):
-            if skin is not None and skin.fingerprint == hello.fingerprint:
-                return skin
-        raise ContactFPGAError(
-            f"{self.port}: of this board's Skin only `board.sheet` is known (fingerprint {hello.fingerprint.hex()}); "
-            "give its file: open(port, skin='my.toml')"
-        )
-
-    @property
-    def faults(self) -> Faults | None:
-        """Faults of its lines, as the board last reported them. It does so within 1 ms of a change and after each
-        hello, even when it sends no frame. None if it reported none yet, or its Skin has neither ``guard`` nor
-        ``self_test``."""
-        self._link.check_open()
-        return self._link.conversation.lines.told
-
-    @property
-    def unit_history(self) -> UnitHistory | None:
-        """The last readings of its pressure units, which are in :attr:`Zones.units`, too; None if it has no units."""
-        self._link.check_open()
-        return self._link.conversation.units.history
-
-    @property
-    def silence(self) -> Silence:
-        """How long no frame has come, since the last frame or since the port was opened, and which frame came last."""
-        self._link.check_open()
-        with self._link.changed:
-            return self._link.silence(-math.inf)
-
-    @property
-    def stats(self) -> Stats:
-        """Counters since the port was opened."""
-        stats = self._link.conversation.stats
-        stats.dropped = self._frames.dropped
-        stats.net = counters_of(self._link.transport)
-        return stats
-
-    def clock(self) -> float:
-        """Seconds on the clock that timeouts use: ``time.monotonic``, or simulated time for ``sim://``."""
-        return self._link.clock()
 
     # ---- frames
 
@@ -167,7 +61,7 @@ class Board:
         :class:`SkinMismatch`, :class:`VersionMismatch`.
         """
         timeout = checked(timeout)
-        if not self._live:
+        if not self.live:
             return self.next(timeout)
         zones = frame_of(self._link.read(timeout))
         self._frames.skip_to(zones)
@@ -190,8 +84,8 @@ class Board:
         """
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
-        if self._live:
-            if not self._threaded:
+        if self.live:
+            if not self._link.transport.threaded:
                 self._link.take_what_came()
             self._frames.keep_last()
         return self._frames.next(timeout) if max_age_s is None else self._frames.newest(max_age_s, checked(timeout))
@@ -202,31 +96,6 @@ class Board:
         It waits at most ``timeout`` seconds for the first one. Errors as for :meth:`next`.
         """
         return self._frames.batch(max_s, timeout)
-
-    def subscribe(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Subscription:
-        """A separate queue for every frame from now on; see :class:`Subscription`.
-
-        With ``deadline_s`` it raises :class:`NoData` when no frame comes for longer than that. The deadline must be at
-        least as long as a working board may need: a scan and a frame on the wire, or with ``send = "on_change"`` its
-        keep-alive and a frame. It has no effect in a recording, which has no times of arrival.
-        """
-        self._link.check_open()
-        deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
-        return Subscription(self._link, maxsize, self, deadline_s)
-
-    def events(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Events:
-        """The same for everything that comes: frames, changes of faults, silence; see :class:`Events`. ``deadline_s``
-        as for :meth:`subscribe`, but silence is an event like the others."""
-        self._link.check_open()
-        deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
-        return Events(self._link, maxsize, self, deadline_s)
-
-    def _checked(self, name: str, deadline_s: float) -> float:
-        try:
-            skin: Skin | None = self.skin
-        except ContactFPGAError:
-            skin = None
-        return checked_deadline(name, deadline_s, self.hello, skin)
 
     # ---- commands
 
@@ -303,13 +172,15 @@ class Board:
     ) -> None:
         self.close()
 
-    def close(self) -> None:
-        """Give the port back; may be called twice. Calls that wait in other threads raise :class:`BoardClosed`."""
-        self._link.close()
+    async def __aenter__(self) -> AsyncBoard:
+        return AsyncBoard(self, self._link, self._frames, self._expected)
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
 
     def greet(self, timeout: float) -> None:
         """Wait for the hello without which no frame can be read; keep the frame that answers for :meth:`next`."""
-        if self._live:
+        if self.live:
             self._frames.put_back(self.read(timeout))
             return
         try:
@@ -317,6 +188,57 @@ class Board:
         except ReplayEnded:
             raise ContactFPGAError(f"{self.port} holds no hello; its frames cannot be read") from None
         self._frames.raise_first()
+
+
+class AsyncBoard(BoardFacts):
+    """A board in ``async with``: what waits is awaited, and other tasks go on meanwhile.
+
+    >>> import asyncio
+    >>> async def main():
+    ...     async with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...         return len(await board.next())
+    >>> asyncio.run(main())
+    2
+
+    Every frame comes in ``async for``. :func:`open` itself waits for the board's hello, at most its ``timeout``; where
+    no task may wait that long, open it by ``await asyncio.to_thread(contactfpga.open, port)``. :attr:`board` has the
+    commands, which wait.
+    """
+
+    def __init__(self, board: Board, link: Link, frames: Subscription, expected: Skin | None):
+        super().__init__(link, frames, expected)
+        self.board = board
+        """The same board, whose methods wait."""
+
+    async def read(self, timeout: float = 1.0) -> Zones:
+        """As :meth:`Board.read`."""
+        return await _in_thread(self.board.read, timeout)
+
+    async def next(self, timeout: float = 1.0) -> Zones:
+        """As :meth:`Board.next`. A task that is canceled takes no frame."""
+        return await self._frames.awaited(timeout)
+
+    async def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
+        """As :meth:`Board.latest`."""
+        return await _in_thread(lambda timeout: self.board.latest(timeout, max_age_s=max_age_s), timeout)
+
+    async def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
+        """As :meth:`Board.batch`."""
+        return await _in_thread(lambda timeout: self.board.batch(max_s, timeout), timeout)
+
+    async def __aiter__(self) -> AsyncIterator[Zones]:
+        """Every frame, forever; a recording ends."""
+        async for zones in self._frames:
+            yield zones
+
+
+Found = TypeVar("Found")
+
+
+async def _in_thread(call: Callable[[float], Found], timeout: float) -> Found:
+    import asyncio  # a quarter of what contactfpga.open would load
+
+    return await asyncio.to_thread(call, timeout)
 
 
 @runtime_checkable

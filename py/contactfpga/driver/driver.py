@@ -14,8 +14,8 @@ from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
-from contactfpga.driver.transport import SimulatedPort, connect
-from contactfpga.errors import BoardClosed, PortLost, SkinMismatch
+from contactfpga.driver.transport import SimulatedPort, Transport, connect
+from contactfpga.errors import BoardClosed, PortBusy, PortLost, SkinMismatch
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
@@ -34,6 +34,11 @@ def open(
 ) -> Board:
     """Open a board and wait for its hello.
 
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     zones = board.next()
+    >>> len(zones)
+    2
+
     ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB
     serial number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, else as
     fast as it is read), a virtual board (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed
@@ -45,9 +50,9 @@ def open(
     ``timeout`` in seconds, for the hello. ``trust``: files of Skins may name modules, which are imported and so run
     (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`.
 
-    Raises :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`,
-    :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a Skin that cannot
-    work, and OSError, such as FileNotFoundError, for its file.
+    Raises :class:`AddressError`, :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`,
+    :class:`OnlyNoise`, :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a
+    Skin that cannot work, and OSError, such as FileNotFoundError, for its file.
     """
     timeout = checked(timeout)
     if skin is not None and not isinstance(skin, Skin):
@@ -63,12 +68,13 @@ def open(
         raise TypeError(f"record is {shown(record)}; it must be the name of a file or a Tap")
     if isinstance(port, os.PathLike):
         port = os.fspath(port)
-    if port is None or (isinstance(port, str) and searched(port)):
-        from contactfpga.driver import finding  # all boards, which a named port has no use for
-
-        port = finding.find(port, skin, baud)
     with trusted(trust):
-        transport = connect(port, baud)
+        try:
+            transport = _connected(port, skin, baud)
+        except PortBusy:
+            if not _given_back():
+                raise
+            transport = _connected(port, skin, baud)
     try:
         if record is not None:
             tap = FileTap(record) if isinstance(record, (str, Path)) else record
@@ -88,14 +94,27 @@ def open(
     return board
 
 
+def _connected(port: str | SimulatedPort | None, skin: Skin | None, baud: int) -> Transport:
+    if port is None or (isinstance(port, str) and searched(port)):
+        from contactfpga.driver import finding  # all boards, which a named port has no use for
+
+        port = finding.find(port, skin, baud)
+    return connect(port, baud)
+
+
 _boards: dict[str | None, Board] = {}
-_lock = threading.Lock()
+"""What :func:`read_zones` keeps open."""
+_lock = threading.RLock()
 
 
 def read_zones(port: str | None = None, timeout: float = 1.0) -> Zones:
     """Ask a board for its contact zones: the first complete frame scanned after this call.
 
-    ``port`` as for :func:`open`; it stays open in this process. ``timeout`` in seconds. Past it raises
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> zones[0].area_mm2
+    400.0
+
+    ``port`` as for :func:`open`; it stays open until :func:`open` asks for it. ``timeout`` in seconds. Past it raises
     :class:`ReadTimeout`, which is a :class:`TimeoutError`; see :func:`open` for the others.
     """
     timeout = checked(timeout)
@@ -126,10 +145,18 @@ def _forget(port: str | None, board: Board | None = None) -> None:
         board.close()
 
 
+def _given_back() -> bool:
+    """Close what :func:`read_zones` keeps open, which nobody else can; False where that is nothing."""
+    kept = list(_boards.items())
+    for port, board in kept:
+        _forget(port, board)
+    return bool(kept)
+
+
 @forks.in_child
 def _begin_anew() -> None:
     global _lock
-    _lock = threading.Lock()
+    _lock = threading.RLock()
     _boards.clear()
 
 

@@ -109,7 +109,12 @@ BETWEEN_BYTES = 160
 
 @dataclasses.dataclass(frozen=True)
 class Silence:
-    """No frame came for longer than allowed. This says nothing about the sheet, which may be touched."""
+    """No frame came for longer than allowed. This says nothing about the sheet, which may be touched.
+
+    >>> with contactfpga.open("sim://") as board:
+    ...     board.silence.seconds < 1
+    True
+    """
 
     port: str
     seconds: float

@@ -20,7 +20,7 @@ from contactfpga.driver import sheets
 from contactfpga.driver.address import NAME, USB, SheetOf
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.transport import connect
-from contactfpga.errors import BoardSilent, ContactFPGAError, OnlyNoise, PortNotFound
+from contactfpga.errors import BoardSilent, ContactFPGAError, OnlyNoise, PortBusy, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello, describe
@@ -106,6 +106,8 @@ class Reply:
     """None: no board said one."""
     problem: str
     """Why there is none; "" where there is one."""
+    busy: bool = False
+    """Nobody could listen, because the port is open somewhere."""
 
     def __str__(self) -> str:
         said = self.problem if self.hello is None else f"says hello: {describe(self.hello)}"
@@ -113,7 +115,8 @@ class Reply:
 
 
 def find(port: str | None, skin: Skin | None, baud: int) -> str:
-    """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
+    """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is,
+    and :class:`PortBusy` where it may be at a port that is open."""
     if port is not None and (sheet := SheetOf.parse(port)) is not None:
         return f"{find(sheet.port, None, baud)}#{sheet.number}"
     found = candidates()
@@ -132,7 +135,8 @@ def find(port: str | None, skin: Skin | None, baud: int) -> str:
         return meant[0].candidate.device
     report = "; ".join(map(str, heard))
     if not meant:
-        raise PortNotFound(f"{_nobody(port, skin, heard)}. Candidates: {report}")
+        busy = any(one.busy for one in heard)
+        raise (PortBusy if busy else PortNotFound)(f"{_nobody(port, skin, heard)}. Candidates: {report}")
     raise PortNotFound(f"several boards answer{_of(port, skin)}; name one of them{_hint(meant)}. Candidates: {report}")
 
 
@@ -152,7 +156,7 @@ def _heard(candidate: Candidate, baud: int) -> list[Reply]:
         heard = [one for name in names for one in listen(name, baud).items()]
         return [Reply(dataclasses.replace(candidate, device=name), hello, "") for name, hello in heard]
     except ContactFPGAError as error:
-        return [Reply(candidate, None, str(error))]
+        return [Reply(candidate, None, str(error), isinstance(error, PortBusy))]
 
 
 def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, Hello]:

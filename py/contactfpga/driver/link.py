@@ -18,13 +18,15 @@ from contactfpga.driver.transport import Transport, counters_of
 from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
+from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello, describe
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 LOG = logging.getLogger("contactfpga")
-"""Says at a board's hellos, twice per second at most, which board it is, that it was restarted, and how many frames
-were lost. Silent unless the program sets up logging."""
+"""Says which board it is and that its faults are gone (INFO), that it was restarted, how many frames were lost, and
+which faults it has (WARNING). Silent unless the program sets up logging. Twice per second at most but for faults, which
+it tells as they change."""
 LOG.addHandler(logging.NullHandler())
 
 READ_S = 0.05
@@ -88,7 +90,7 @@ class Link:
         self._reading: int | None = None  # the thread that reads
         self._writing: int | None = None  # the thread that writes
         self._closers = 0  # threads that wait in :meth:`close`
-        self._logged: tuple[int, int] | None = None  # restarts and lost frames; None: not even the first hello
+        self._logged: tuple[int, int, int] | None = None  # restarts, lost frames, stuck columns; None: no hello yet
         self._inherited = False
         forks.watch(self)
 
@@ -278,6 +280,8 @@ class Link:
         if isinstance(event, Hello):
             self._log(event)
             return
+        if isinstance(event, Faults):
+            self._log_fault(f"fault: {', '.join(event.names)}" if event else "")
         item = event.zones if isinstance(event, Arrival) else event
         between = isinstance(item, SideEvent)
         for listener in self.listeners:
@@ -302,12 +306,21 @@ class Link:
         name, stats = self.transport.name, self.conversation.stats
         if self._logged is None:
             LOG.info("%s: the board has %s", name, describe(hello))
-        restarts, lost = self._logged or (0, 0)
+        restarts, lost, stuck = self._logged or (0, 0, 0)
         if stats.restarts > restarts:
             LOG.warning("%s: the board was restarted", name)
         if stats.lost > lost:
             LOG.warning("%s: %d frames were lost, %d since the port was opened", name, stats.lost - lost, stats.lost)
-        self._logged = stats.restarts, stats.lost
+        unnamed = 0 if hello.guard else hello.stuck
+        if unnamed != stuck:
+            self._log_fault(f"columns that read pressed while no row was driven: {unnamed}" if unnamed else "")
+        self._logged = stats.restarts, stats.lost, unnamed
+
+    def _log_fault(self, faults: str) -> None:
+        if faults:
+            LOG.warning("%s: %s", self.transport.name, faults)
+        else:
+            LOG.info("%s: no fault any more", self.transport.name)
 
     def _send(self) -> None:
         """Write what has to be sent, in the order in which the conversation made it: one thread writes at a time, and

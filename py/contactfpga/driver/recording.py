@@ -16,7 +16,7 @@ from contactfpga.driver.address import REPLAY_FORM, Replay
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap import MAGIC, McapStream, files_of
 from contactfpga.driver.transport import Transport, counters_of
-from contactfpga.errors import ContactFPGAError, PortNotFound, ReplayEnded
+from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound, ReplayEnded
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.skin.derived import LONGEST_PACKET
 
@@ -105,7 +105,8 @@ class RecordingTransport:
 
 
 def open_recorded(name: str) -> ByteFile:
-    """The file that ``replay://FILE`` names, open for reading. Raises :class:`PortNotFound`."""
+    """The file that ``replay://FILE`` names, open for reading. Raises :class:`AddressError`,
+    :class:`PortNotFound`."""
     try:
         asked = Replay.parse(name)
         file = open_regular(files_of(asked.path)[0])
@@ -118,10 +119,10 @@ def open_recorded(name: str) -> ByteFile:
         hint = f"the options are {REPLAY_FORM}" if _UNKNOWN.search(name) else "is the path right?"
         raise PortNotFound(f"{name} cannot be opened: {reason}; {hint}") from None
     except ValueError as error:  # a path with a zero byte
-        raise PortNotFound(f"{name} cannot be opened: {error}") from None
+        raise AddressError(f"{name} cannot be opened: {error}") from None
     if asked.start_s or asked.link is not None:
         file.close()
-        raise PortNotFound(
+        raise AddressError(
             f"{name}: this file holds bytes alone; only files of `contactfpga record` take start and link"
         )
     return file

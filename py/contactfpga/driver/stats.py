@@ -34,7 +34,13 @@ class NetCounters:
 
 @dataclasses.dataclass
 class Stats:
-    """What came over one port since it was opened."""
+    """What came over one port since it was opened.
+
+    >>> with contactfpga.open("sim://") as board:
+    ...     zones = board.next()
+    ...     board.stats.lost
+    0
+    """
 
     frames: int = 0
     """Frames received whole and passed on."""

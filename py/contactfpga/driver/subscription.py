@@ -214,17 +214,21 @@ class Listening(Generic[Item]):
                 return
 
     async def __aiter__(self) -> AsyncIterator[Item]:
-        import asyncio  # a quarter of what contactfpga.open would load
-
         while True:
             try:
-                if self._frames:
-                    await asyncio.sleep(0)  # others go on
-                else:
-                    await asyncio.to_thread(self._wait, 1.0)
-                yield self.next()  # which waits for nothing now, and takes no frame if we were canceled above
+                yield await self.awaited()
             except ReplayEnded:
                 return
+
+    async def awaited(self, timeout: float = 1.0) -> Item:
+        """:meth:`next`, while other tasks go on."""
+        import asyncio  # a quarter of what contactfpga.open would load
+
+        if self._frames or timeout == 0:
+            await asyncio.sleep(0)  # others go on
+        else:
+            await asyncio.to_thread(self._wait, timeout)
+        return self.next(timeout)  # which waits for nothing now, and takes no frame if we were canceled above
 
     def _wait(self, timeout: float) -> None:
         """Until something waits, or silence is to be told."""
@@ -262,10 +266,15 @@ class Listening(Generic[Item]):
 
 
 class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
-    """Everything that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one: each
-    :class:`Zones`; :class:`Faults`, first the present ones and then each change, even if no frame is sent; the slots of
-    a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline :class:`Silence`, each time
-    that it passes without a frame.
+    """Everything that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one.
+
+    >>> with contactfpga.open("sim://") as board, board.events() as events:
+    ...     type(events.next()).__name__
+    'Zones'
+
+    It gives each :class:`Zones`; :class:`Faults`, first the present ones and then each change, even if no frame is
+    sent; the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline
+    :class:`Silence`, each time that it passes without a frame.
 
     ``maxsize`` waits at most; beyond, the oldest are dropped, and frames among them counted in :attr:`dropped`.
     """
@@ -284,6 +293,10 @@ class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
 
 class Subscription(Listening[Zones]):
     """Every frame of a board from a moment on: in ``for``, in ``async for``, or one by one.
+
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board, board.subscribe() as frames:
+    ...     len(frames.next())
+    2
 
     At most ``maxsize`` frames wait; beyond that, the oldest are dropped and counted in :attr:`dropped`. With a deadline
     :class:`NoData` is raised each time that it passes without a frame.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import random
 import shlex
@@ -70,6 +71,7 @@ class SerialTransport:
             SerialException,
         )  # 0.1 s that `contactfpga --help` need not wait for
 
+        _quieten("serialx")
         self.name = name
         self._errors: tuple[type[Exception], ...] = (OSError, SerialException)
         alone = PinState.UNDEFINED
@@ -118,6 +120,13 @@ class SerialTransport:
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
 
 
+def _quieten(library: str) -> None:
+    """Of a library that logs each read no line comes unless the program sets a level for it."""
+    logger = logging.getLogger(library)
+    if logger.level == logging.NOTSET:
+        logger.setLevel(logging.WARNING)
+
+
 _SERIAL: weakref.WeakSet[SerialTransport] = weakref.WeakSet()
 """What is open in this process."""
 
@@ -127,10 +136,7 @@ def _user(name: str) -> str:
     place = os.path.realpath(name)
     if all(os.path.realpath(one.name) != place for one in _SERIAL):
         return "another program reads this port; close it first"
-    return (
-        "this program opened it already; go on with that board, or close it first, as `with` does. "
-        "What read_zones() has opened stays open"
-    )
+    return "this program opened it already; go on with that board, or close it first, as `with` does"
 
 
 class SimulatedPort(Protocol):

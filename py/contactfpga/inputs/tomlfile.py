@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from contactfpga.inputs.files import read_small
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import shown, suggestion
 
 Table = TypeVar("Table")
 
@@ -70,7 +70,7 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
     known = [field.name for field in dataclasses.fields(kind)]
     for key in values:
         if key not in known:
-            raise refused(f"unknown key {shown(key)} in [{name}]; known are {', '.join(known)}")
+            raise refused(f"unknown key {shown(key)} in [{name}]; {suggestion(key, known)}")
     return values
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Iterable
 from numbers import Real
 from typing import Any
 
@@ -48,6 +49,15 @@ def shown(value: Any) -> str:
     except (ValueError, RecursionError):  # a number of more digits than Python writes, or lists in lists in lists
         return f"one {type(value).__name__} too long to show"
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 20]}... ({len(text)} characters)"
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """What to say of a name that is not known: the one that is spelled nearly so, or all that there are."""
+    from difflib import get_close_matches  # for whoever misspells alone
+
+    names = list(known)
+    near = get_close_matches(name[:MAX_SHOWN], names, 1)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
 
 
 def shortened(text: str) -> str:

@@ -18,7 +18,16 @@ class LineFinding(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class SelfTest:
-    """A whole self-test, of so many rows and columns: each line was driven alone, and what rose with it was read."""
+    """A whole self-test, of so many rows and columns: each line was driven alone, and what rose with it was read.
+
+    ``board.self_test()`` makes one. Here row 1 rises where row 0 is driven, and the other way round:
+
+    >>> rows_rose = (), (0, 1), (0, 1), ()
+    >>> columns_rose = (), (), (), (0,)
+    >>> slots = map(contactfpga.SelfTestSlot, range(4), rows_rose, columns_rose)
+    >>> contactfpga.SelfTest(tuple(slots), rows=2, columns=1).faults
+    ('rows 0 and 1 joined',)
+    """
 
     slots: tuple[SelfTestSlot, ...] = dataclasses.field(repr=False)
     """As the board sent them: one with no line driven, one per row, one per column."""

@@ -25,7 +25,11 @@ FEW_CELLS = 3
 
 @dataclasses.dataclass(frozen=True)
 class Suspicion:
-    """One thing that is wrong with the sheet, or looks so."""
+    """One thing that is wrong with the sheet, or looks so.
+
+    >>> contactfpga.Suspicion("stuck", "cell (3, 4) is stuck", cells=((3, 4),), time_us=0).cells
+    ((3, 4),)
+    """
 
     kind: Literal["stuck", "held", "flutter"]
     """``stuck``: one to three switches side by side read pressed without a change, while others came and went;
@@ -329,8 +333,14 @@ LOOKS = 100
 
 
 class Watch:
-    """Finds switches that are stuck, loose or dead in a history of frames. It reads no port and waits for nothing, and
-    its time is the frames' time.
+    """Finds switches that are stuck, loose or dead in a history of frames.
+
+    >>> watch = contactfpga.Watch(stuck_s=5.0)
+    >>> with contactfpga.open("sim://") as board:
+    ...     watch.update(board.next())
+    ()
+
+    It reads no port and waits for nothing, and its time is the frames' time.
 
     A cell, or a zone if the board sends zones, is suspected once it has stayed pressed without a change for ``stuck_s``
     seconds while at least ``others`` cells elsewhere came and went since its last change. If nothing else changes, the

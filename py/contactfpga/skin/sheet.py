@@ -10,7 +10,12 @@ from contactfpga.skin.limits import MAX_BARYCENTER_BITS, MAX_LINES, MIN_AROUND
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sheet:
-    """Lines, lengths and report of a sheet. The fields mean what those of :class:`~contactfpga.Skin` mean."""
+    """Lines, lengths and report of a sheet. The fields mean what those of :class:`~contactfpga.Skin` mean.
+
+    >>> zones = contactfpga.read_zones("sim://")
+    >>> zones.sheet.rows, zones.sheet.pitch_y_mm
+    (16, 10.0)
+    """
 
     rows: int
     columns: int

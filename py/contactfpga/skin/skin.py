@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,7 +19,7 @@ from contactfpga.choices.reports import REPORTS, ReportName
 from contactfpga.choices.scans import Scan, ScanName
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import shown, suggestion
 from contactfpga.skin import checks, limits
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.sheet import Sheet, max_zones
@@ -28,6 +28,10 @@ from contactfpga.skin.sheet import Sheet, max_zones
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Skin:
     """A sheet of switches, how it is scanned, and how its contact zones are reported.
+
+    >>> skin = contactfpga.Skin(rows=8, columns=8, pitch_x_mm=12.5, pitch_y_mm=12.5)
+    >>> skin.replace(report="cells").max_zones()
+    16
 
     Every field has a default; together the defaults are the reference Skin. x runs along the columns, y along
     the rows, and cell (row 0, column 0) lies at 0 mm. A Skin that cannot work raises :class:`SkinError`.
@@ -171,8 +175,8 @@ class Skin:
             if unknown == ["sheets"]:
                 steps = f"name one of them, or give all as --sheets {path} or sim://?sheets={path}"
                 raise SkinError(f"{path} names the Skins of several sheets; {steps}")
-            tables = "and the tables [cover] and [circuit]"
-            raise SkinError(f"{path}: unknown key {shown(unknown[0])}; known are {', '.join(known)}, {tables}")
+            known += ["[cover]", "[circuit]"]
+            raise SkinError(f"{path}: unknown key {shown(unknown[0])}; {suggestion(unknown[0], known)}")
         try:
             return cls(**{**(usual or {}), **values})
         except SkinError as error:
@@ -290,3 +294,20 @@ class Skin:
         small = self.rows <= 32 and self.columns <= 32
         most = self.max_zones() if small else min(self.max_zones(), 256)
         return min(most, limits.MAX_DIVIDED_ZONES) if REPORTS[self.report].divided else most
+
+
+def _suggesting(init: Callable[..., None]) -> Callable[..., None]:
+    """The same, but a field that does not exist is refused with the one that is spelled nearly so."""
+    known = [field.name for field in dataclasses.fields(Skin)]
+
+    @functools.wraps(init)
+    def checked(self: Skin, *args: Any, **values: Any) -> None:
+        for name in values:
+            if name not in known:
+                raise TypeError(f"a Skin has no field {name!r}; {suggestion(name, known)}")
+        init(self, *args, **values)
+
+    return checked
+
+
+Skin.__init__ = _suggesting(Skin.__init__)  # type: ignore[method-assign]

@@ -12,7 +12,8 @@ from typing import Any, NoReturn, Protocol
 from contactfpga import __version__, terminal
 from contactfpga.choices.choice import trusted
 from contactfpga.errors import MissingExtra
-from contactfpga.inputs.values import shortened, visible_lines
+from contactfpga.inputs.values import shortened, suggestion, visible_lines
+from contactfpga.shipped import with_pages
 from contactfpga.tools import commands
 from contactfpga.tools.console import interrupt
 
@@ -42,6 +43,15 @@ COMMANDS = {
 }
 """Help of each command. The command itself is the module of this name in :mod:`contactfpga.tools.commands`, a
 :class:`Subcommand` or a :class:`TopicGroup`; it is imported when the command is called."""
+
+FIRST = {
+    "view": "press a virtual sheet in the browser",
+    "zones sim://": "see the zones of a virtual board",
+    "doctor": "check the board that is plugged in",
+    "zones": "see its contact zones, live",
+    "build icebreaker --wiring": "see how to wire a sheet to a board",
+}
+"""What people do first, and what it is for: shown where no command is given."""
 
 RENAMED = {
     "chart": "study chart",
@@ -92,7 +102,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
     args = parser.parse_args(_renamed(sys.argv[1:] if arguments is None else arguments))
     if args.command is None:
-        parser.print_help(sys.stderr)
+        print(_first(), file=sys.stderr)
         return 2
     try:
         with trusted(args.trust):
@@ -104,6 +114,16 @@ def _run(arguments: Sequence[str] | None) -> int:
         return interrupt.failed(MissingExtra(error.what, args.extra) if args.extra else error)
     except ValueError as error:
         return interrupt.failed(error)
+
+
+def _first() -> str:
+    """The first steps, as lines that can be copied."""
+    commands = [f"contactfpga {words}" for words in FIRST]
+    width = max(map(len, commands))
+    steps = [f"  {command:{width}}   {what}" for command, what in zip(commands, FIRST.values())]
+    return "\n".join(
+        [*steps, "", "contactfpga --help lists all commands, contactfpga COMMAND --help the options of one."]
+    )
 
 
 def _renamed(arguments: Sequence[str]) -> list[str]:
@@ -164,6 +184,13 @@ def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Name
     parser.set_defaults(run=run, extra=command.EXTRA)
 
 
+class _Help(argparse.HelpFormatter):
+    """Leaves addresses whole."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return terminal.wrapped(" ".join(text.split()), width).split("\n")
+
+
 class Parser(argparse.ArgumentParser):
     """Takes options anywhere. By itself argparse refuses a word after an option where it could have been left out, as
     the port in `contactfpga record FILE --seconds 2 PORT`.
@@ -178,7 +205,7 @@ class Parser(argparse.ArgumentParser):
     """Topic of a command whose first word names none."""
 
     def __init__(self, *args: Any, add: Callable[[Parser], None] | None = None, **options: Any):
-        super().__init__(*args, **options)
+        super().__init__(*args, **{"formatter_class": _Help, **options})
         self._add = add
 
     def complete(self) -> None:
@@ -186,6 +213,8 @@ class Parser(argparse.ArgumentParser):
         add, self._add = self._add, None
         if add is not None:
             add(self)
+            for action in self._actions:
+                action.help = action.help and with_pages(action.help)
 
     @property
     def topics(self) -> dict[str, Parser]:
@@ -197,6 +226,12 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with argparse's message, in which control characters of the arguments are shown as escapes."""
         super().error(visible_lines(shortened(message)))
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Of a word that is no command, say which one was meant."""
+        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            raise argparse.ArgumentError(action, f"{value!r} is none; {suggestion(value, action.choices)}")
+        super()._check_value(action, value)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does, but with options anywhere."""

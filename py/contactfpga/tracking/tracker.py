@@ -28,6 +28,12 @@ LIMITS = {
 class Tracker:
     """Gives contacts ids that stay: hand it every frame, in order.
 
+    >>> tracker = contactfpga.Tracker()
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     tracks = tracker.update(board.next())
+    >>> [track.id for track in tracks.active]
+    [1, 2]
+
     It neither reads nor waits: time is the frames' own, so a recording gives the same ids as the board did. The tracker
     moves each contact on by its speed and pairs contacts with zones so that the sum of distances within the gate is
     least. On a cylinder distances run along its surface.

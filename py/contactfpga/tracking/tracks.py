@@ -13,7 +13,13 @@ Kind = Literal["down", "move", "merge", "split", "up"]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Track:
-    """One present contact, as of the frame in which it was last seen."""
+    """One present contact, as of the frame in which it was last seen.
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> tracks = contactfpga.Tracker().update(zones)
+    >>> [(track.id, track.zone.x_mm) for track in tracks.active]
+    [(1, 55.0), (2, 95.0)]
+    """
 
     id: int
     """Stays with the contact; no other contact ever has it."""
@@ -50,7 +56,13 @@ class Track:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a contact."""
+    """Something that happened to a contact.
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> tracks = contactfpga.Tracker().update(zones)
+    >>> [(event.kind, event.id) for event in tracks.events]
+    [('down', 1), ('down', 2)]
+    """
 
     kind: Kind
     """``down``: it begins, and ``up``: it ends, once each. ``move``: it is ``move_mm`` from where the last event saw
@@ -81,7 +93,13 @@ class Event:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Tracks:
-    """What :meth:`Tracker.update` returns."""
+    """What :meth:`Tracker.update` returns.
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> tracks = contactfpga.Tracker().update(zones)
+    >>> len(tracks.active), len(tracks.events)
+    (2, 2)
+    """
 
     time_us: int
     """Device time of the frame, in us."""

@@ -19,7 +19,11 @@ STUCK, UNNAMED = "stuck", "unnamed fault"
 
 @dataclasses.dataclass(frozen=True)
 class Faults:
-    """Lines that the board found faulty, counted from 0; of a board whose Skin has ``guard`` or ``self_test``."""
+    """Lines that the board found faulty, counted from 0; of a board whose Skin has ``guard`` or ``self_test``.
+
+    >>> contactfpga.Faults(columns_open=(3,)).named(rows=8, columns=8).names
+    ('column 3 open',)
+    """
 
     rows_open: tuple[int, ...] = ()
     """Rows that do not reach the guard column."""
@@ -60,7 +64,11 @@ def _open(line: str, guard: str, lines: tuple[int, ...], checked: set[int]) -> l
 
 @dataclasses.dataclass(frozen=True)
 class SelfTestSlot:
-    """What the board read in one slot of its self-test."""
+    """What the board read in one slot of its self-test.
+
+    >>> contactfpga.SelfTestSlot(number=1, rows=(0,), columns=()).rows
+    (0,)
+    """
 
     number: int
     rows: tuple[int, ...]

@@ -54,7 +54,12 @@ _MOST_BYTES = 8192
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Hello:
-    """What the board says about itself."""
+    """What the board says about itself.
+
+    >>> with contactfpga.open("sim://") as board:
+    ...     board.hello.baud
+    3000000
+    """
 
     sheet: Sheet
     fingerprint: bytes

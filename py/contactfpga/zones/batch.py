@@ -5,14 +5,19 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contactfpga import surfaces
 from contactfpga.wire.many import FAULT, MISMATCH, MOTION, OVERFLOW
-from contactfpga.zones import around
+from contactfpga.zones import around, tables
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
 
 FRAME_DTYPE = np.dtype(
     [
@@ -44,7 +49,13 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Batch:
     """Consecutive frames and all of their zones: ``batch.zones["x_mm"]`` is an array over all zones, in mm, and
-    ``batch.frames["time_us"]`` one over all frames, in us."""
+    ``batch.frames["time_us"]`` one over all frames, in us.
+
+    >>> with contactfpga.open("sim://?scene=two_fingers") as board:
+    ...     batch = board.batch()
+    >>> float(batch.zones["x_mm"].mean())
+    75.0
+    """
 
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""
@@ -66,6 +77,16 @@ class Batch:
         """(n + 1,) int64: the zones of frame i are ``zones[starts[i] : starts[i + 1]]``."""
         starts: np.ndarray = np.searchsorted(self.zones["frame"], np.arange(len(self.frames) + 1))
         return starts
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each zone, with the fields of :attr:`zones` as columns; ``point_mm`` and ``normal`` are three each
+        (``point_x_mm``). ``pandas.DataFrame(batch.frames)`` has a row for each frame, without zones too. Needs pandas:
+        raises :class:`MissingExtra`."""
+        return tables.to_pandas(self.zones)
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The same as a table of pyarrow, with null in the place of NaN. Raises :class:`MissingExtra`."""
+        return tables.to_arrow(self.zones)
 
     @classmethod
     def of(cls, frames: Sequence[Zones | Run]) -> Batch:

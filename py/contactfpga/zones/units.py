@@ -18,7 +18,14 @@ _ROUNDING = 1 / math.sqrt(12)
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class UnitSamples:
-    """What the pressure units read at one moment, or in one sweep."""
+    """What the pressure units read at one moment, or in one sweep.
+
+    ``zones.units`` is one, or None for a board without units:
+
+    >>> samples = contactfpga.UnitSamples(time_us=0, readings=(512.0,), sigma=(0.3,), saturated=(False,))
+    >>> samples.readings[0]
+    512.0
+    """
 
     time_us: int
     """Device time since power-up: of a frame's first row, to which the readings are interpolated, or of a sweep's first
@@ -32,7 +39,12 @@ class UnitSamples:
 
 
 class UnitHistory:
-    """The last sweeps of a board. Safe for several threads."""
+    """The last sweeps of a board. Safe for several threads.
+
+    >>> with contactfpga.open("sim://") as board:
+    ...     print(board.unit_history)  # this board has no pressure units
+    None
+    """
 
     def __init__(self, facts: UnitFacts, clock_hz: int):
         self.facts = facts

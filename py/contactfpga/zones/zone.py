@@ -7,7 +7,7 @@ import functools
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import TypeVar, overload
+from typing import TYPE_CHECKING, TypeVar, overload
 
 import numpy as np
 
@@ -16,8 +16,12 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
-from contactfpga.zones import around, ghosts, labels, motion
+from contactfpga.zones import around, ghosts, labels, motion, tables
 from contactfpga.zones.units import UnitHistory, UnitSamples
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
 
 DTYPE = np.dtype(
     [
@@ -42,7 +46,12 @@ DIVIDED_DTYPE = np.dtype([(name, DTYPE[name]) for name in DTYPE.names or () if n
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Zone:
-    """One contact zone."""
+    """One contact zone.
+
+    >>> zone = contactfpga.read_zones("sim://?scene=two_fingers")[0]
+    >>> zone.area_mm2, zone.x_mm, zone.y_mm
+    (400.0, 55.0, 75.0)
+    """
 
     area_cells: int
     """Pressed cells."""
@@ -72,6 +81,11 @@ class Zone:
     """On a sheet whose ends meet: ``ring``, a way through the zone's cells leads round the cylinder and back to where
     it began, or ``wound``, it does not, but the cells lie on more than two turns. Else empty."""
 
+    @property
+    def centroid_mm(self) -> tuple[float, float] | None:
+        """(:attr:`x_mm`, :attr:`y_mm`), the zone's barycenter or centroid; None if it has no x."""
+        return None if self.x_mm is None or self.y_mm is None else (self.x_mm, self.y_mm)
+
 
 def order(zone: Zone) -> tuple[bool, float, bool, float, int]:
     """Zones that lie nowhere come last."""
@@ -100,7 +114,14 @@ def closed_records(frame: Frame, sheet: Sheet) -> np.ndarray:
 
 
 class Zones(Sequence[Zone]):
-    """The zones of one frame, sorted by y, x and area; not to be changed."""
+    """The zones of one frame, sorted by y, x and area; not to be changed.
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> len(zones), zones.pressed
+    (2, 8)
+    >>> [zone.area_mm2 for zone in zones]
+    [400.0, 400.0]
+    """
 
     def __init__(
         self,
@@ -128,6 +149,11 @@ class Zones(Sequence[Zone]):
         self._line = line
         self._history = history
         self._units: UnitSamples | None = None
+
+    @property
+    def time_s(self) -> float:
+        """:attr:`time_us` in s."""
+        return self.time_us / 1e6
 
     @property
     def arrived_s(self) -> float | None:
@@ -255,6 +281,15 @@ class Zones(Sequence[Zone]):
                 row[name] = math.nan if value is None else value
         array.flags.writeable = False
         return array
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each zone: :attr:`time_us`, :attr:`sequence`, and the fields of :attr:`array`. ``point_mm`` and
+        ``normal`` are three columns each (``point_x_mm``). Needs pandas: raises :class:`MissingExtra`."""
+        return tables.to_pandas(self.array, time_us=self.time_us, sequence=self.sequence)
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The same as a table of pyarrow, with null where a zone has None. Raises :class:`MissingExtra`."""
+        return tables.to_arrow(self.array, time_us=self.time_us, sequence=self.sequence)
 
     @functools.cached_property
     def _zones(self) -> tuple[Zone, ...]:

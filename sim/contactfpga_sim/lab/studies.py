@@ -367,7 +367,7 @@ _ALL = (
         "view",
         title="Delay and load of the view in a browser",
         page="view.md",
-        minutes=2,
+        minutes=4,
         sections={
             "view_load": Section("tables:loads_table"),
             "view_clicks": Section("tables:clicks_table"),

@@ -5,7 +5,7 @@ study of failures. SI units; capacitances in pF and times in us where a name say
 """
 
 from contactfpga.design.circuit.static import Problem, check, load_checked, problems
-from contactfpga.design.circuit.times import Needs, check_times, needed, recommended_us
+from contactfpga.design.circuit.times import Needs, check_times, needed, needed_by, recommended_us
 from contactfpga.design.circuit.values import DIODES, SCHOTTKY, SILICON, Circuit, CircuitError, Diode, load_circuit
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "load_checked",
     "load_circuit",
     "needed",
+    "needed_by",
     "problems",
     "recommended_us",
 ]

@@ -148,11 +148,11 @@ def _rounded(ohms: float) -> float:
     return float(-(-ohms // digits) * digits)
 
 
-def check(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", projects: bool = False) -> None:
-    """Raise :class:`CircuitError` for a sheet that cannot work."""
-    if diodes == "none":
+def check(circuit: Circuit, skin: Skin) -> None:
+    """Raise :class:`CircuitError` where a Skin's sheet, with its guard lines, cannot work."""
+    if skin.diodes == "none":
         raise CircuitError("diodes is 'none'; [circuit] describes sheets with a diode per switch, leave the table out")
-    found: Sequence[Problem] = problems(circuit, rows, columns, diodes, projects)
+    found: Sequence[Problem] = problems(circuit, skin.row_lines, skin.column_lines, skin.diodes, skin.reads_rows)
     if found:
         raise CircuitError(str(found[0]))
 
@@ -163,7 +163,7 @@ def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
     circuit = load_circuit(path)
     if circuit is not None:
         try:
-            check(circuit, skin.rows, skin.columns, skin.diodes, skin.reads_rows)
+            check(circuit, skin)
         except CircuitError as error:
             raise CircuitError(f"{path}: {error}; `contactfpga settle --skin {path}` shows all") from None
     return circuit

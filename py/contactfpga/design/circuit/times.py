@@ -64,7 +64,7 @@ class Needs:
 
 @functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
-    """Times, levels and currents of a sheet. Takes some 3 seconds at 64x64."""
+    """Times, levels and currents of a sheet of so many lines. Takes some 3 seconds at 64x64."""
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
@@ -98,6 +98,11 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
     )
 
 
+def needed_by(skin: Skin, circuit: Circuit) -> Needs:
+    """What a Skin's sheet needs: its guard lines are lines, too."""
+    return needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
+
+
 def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str, float | None]:
     """For each time of the Skin that its circuit limits, what is recommended in us; None where no time is enough."""
     found = {"settle_us": needs.settle.us(margin)}
@@ -113,7 +118,7 @@ def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str
 def check_times(circuit: Circuit, skin: Skin) -> None:
     """Raise :class:`CircuitError` where a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`.
     Takes some 3 seconds at 64x64."""
-    wanted = recommended_us(skin, needed(circuit, skin.rows, skin.columns, skin.diodes))
+    wanted = recommended_us(skin, needed_by(skin, circuit))
     short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
     if not short:
         return

@@ -65,6 +65,11 @@ class Cells:
         self.thresholds_n = self.drawn(seed)
         """(rows, columns) closing force of each switch in N, its preload taken off."""
 
+    @property
+    def parts(self) -> int:
+        """Steps per pitch of the grid on which pressure is resolved, along the columns."""
+        return self._axes[1].parts
+
     def drawn(self, seed: int) -> Floats:
         """(rows, columns) closing force in N of each switch of a sheet whose switches are drawn with this seed, its
         preload taken off."""
@@ -170,10 +175,10 @@ class _Axis:
         self.count, self.pitch_m = count, pitch_m
         width = cover.width_m(pitch_m)
         finest = [pitch_m if width == pitch_m else width / 6, pitch_m if cover.cut else cover.thickness_m / 2]
-        self._parts = min(MOST_PARTS, max(LEAST_PARTS, math.ceil(pitch_m / min(finest))))
-        self.step_m = pitch_m / self._parts
+        self.parts = min(MOST_PARTS, max(LEAST_PARTS, math.ceil(pitch_m / min(finest))))
+        self.step_m = pitch_m / self.parts
         beyond = 1 if cover.cut else 1 + math.ceil(BEYOND * cover.thickness_m / pitch_m)
-        self.places_m = (np.arange((count + 2 * beyond) * self._parts) + 0.5) * self.step_m - (beyond + 0.5) * pitch_m
+        self.places_m = (np.arange((count + 2 * beyond) * self.parts) + 0.5) * self.step_m - (beyond + 0.5) * pitch_m
         self.taken = self._taken(cover.width_m(pitch_m))
 
     def near(self, middle_m: float, reach_m: float) -> slice:

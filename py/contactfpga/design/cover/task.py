@@ -20,7 +20,7 @@ from contactfpga.design.cover.medium import MEDIA
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import CONTACTS, TOLERANCE, Model
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import is_finite, shown
+from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.skin import Skin
 
 
@@ -273,7 +273,7 @@ def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
     known = [*_KEYS, "foam"]
     for name in given:
         if name not in _KEYS:
-            raise CoverError(f"{path}: unknown part {shown(name)}; known are {', '.join(known)}")
+            raise CoverError(f"{path}: unknown part {shown(name)}; {suggestion(name, known)}")
     part = {}
     for name, keys in _KEYS.items():
         values = given.get(name, {})
@@ -281,7 +281,7 @@ def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
             raise CoverError(f"{path}: {name} is {shown(values)}; it must be a part, [{name}]")
         for key in values:
             if key not in keys:
-                raise CoverError(f"{path}: unknown key {shown(key)} in [{name}]; known are {', '.join(keys)}")
+                raise CoverError(f"{path}: unknown key {shown(key)} in [{name}]; {suggestion(key, keys)}")
         part[name] = {key: values.get(key, default) for key, default in keys.items()}
         for key, value in part[name].items():
             if value is _NEEDED:
@@ -321,7 +321,7 @@ def _foam(path: str | Path, values: dict[str, Any]) -> Foam:
     known = [field.name for field in dataclasses.fields(Foam)]
     for key in values:
         if key not in known:
-            raise CoverError(f"{path}: unknown key {shown(key)} in [[foam]]; known are {', '.join(known)}")
+            raise CoverError(f"{path}: unknown key {shown(key)} in [[foam]]; {suggestion(key, known)}")
     for key in ("name", "modulus_pa", "source"):
         if key not in values:
             raise CoverError(f"{path}: {key} is missing in [[foam]]")

@@ -35,7 +35,7 @@ def findings(board: Path) -> list[str]:
     """What KiCad finds in a .kicad_pcb file: rules that are broken, pads that are not connected. Raises
     :class:`MissingTool` where KiCad is absent and :class:`SheetError` where it cannot read the file."""
     if not there():
-        raise MissingTool("--check", "KiCad 6 (its module pcbnew)", "apt install --no-install-recommends kicad")
+        raise MissingTool("--kicad", "KiCad 6 (its module pcbnew)", "apt install --no-install-recommends kicad")
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.txt"
         done = subprocess.run(

@@ -130,9 +130,9 @@ class _Matrix:
         each = min(most, -(-skin.row_lines // max(gaps, 1)))
         if skin.closed and gaps * most < skin.row_lines:
             raise SheetError(
-                f"rows is {skin.rows}: {skin.row_lines} row lines, and {gaps * most} find a place between "
-                f"{skin.columns} columns at {self.px:.4g} mm around a closed cylinder; take fewer rows, or more or "
-                "wider columns"
+                f"rows is {skin.rows}; around a closed cylinder a sheet of {skin.columns} columns at {self.px:.4g} mm "
+                f"has place for at most {gaps * most - skin.guard} rows, {most} between two columns; take more "
+                "columns, or a larger radius_mm"
             )
         between = [(gap + 0.5) * self.px + (k - (each - 1) / 2) * PLACE_MM for gap in range(gaps) for k in range(each)]
         beside = max(self.px / 2, PLACE_MM, self.switch.half_width + VIA_MM)

@@ -19,7 +19,7 @@ from contactfpga.driver.mcap import MAX_LINKS
 from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import shown, suggestion
 from contactfpga.robot.body import plan
 from contactfpga.robot.body import urdf as urdf_file
 from contactfpga.robot.body.joints import Joints
@@ -59,7 +59,7 @@ class Body:
         """What such a file says; paths in it count from ``folder``. Raises :class:`BodyError`, OSError."""
         for key in values:
             if key not in KEYS:
-                raise BodyError(f"unknown key {shown(key)}; known are {', '.join(KEYS)}")
+                raise BodyError(f"unknown key {shown(key)}; {suggestion(key, KEYS)}")
         tables = values.get("links")
         if not isinstance(tables, list) or not tables:
             raise BodyError("there is no link; give a table [[links]] with name, skin and port for each")

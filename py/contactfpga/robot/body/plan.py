@@ -17,7 +17,7 @@ from contactfpga.driver.address import SheetOf, Sim
 from contactfpga.driver.events import longest_pause_s
 from contactfpga.driver.mcap import MAX_NAME
 from contactfpga.errors import ContactFPGAError
-from contactfpga.inputs.values import is_finite, shown
+from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.robot.body.folds import Folds
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.state import BodyError
@@ -109,7 +109,7 @@ def read(values: Any, folder: Path) -> Plan:
 def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
     for key in values:
         if key not in KEYS:
-            raise BodyError(f"unknown key {shown(key)}; known are {', '.join(KEYS)}")
+            raise BodyError(f"unknown key {shown(key)}; {suggestion(key, KEYS)}")
     skin_path = folder / text(values, "skin")
     skin = Skin.load(skin_path)
     late_s = _number(values, "late_s", longest_pause_s(skin, skin) + MARGIN_S)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga.errors import pip_install
 from contactfpga.inputs import xmlfile
 from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import number_in, shown
@@ -35,7 +36,7 @@ def located(urdf: str, folder: Path) -> Path:
     if found is None or not found.submodule_search_locations:
         raise BodyError(
             f"urdf is {shown(urdf)}; no Python package {shown(name)} is installed: install it, for the example with "
-            "pip install '.[body]'"
+            f"{pip_install('body')}"
         )
     if ".." in Path(inside).parts or Path(inside).is_absolute():
         raise BodyError(f"urdf is {shown(urdf)}; it must name a file inside the package")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import shown, suggestion
 from contactfpga.robot.haptics.values import HapticsError, direction, matrix, number, positive, skew, vector
 from contactfpga.robot.haptics.wrench import SURFACES, Bumper, Motion, Noise, Surface, Wrench, read_surface
 from contactfpga.surfaces.shapes import Floats, Vector
@@ -342,7 +342,7 @@ def _known(values: Any, keys: tuple[str, ...], name: str) -> None:
         raise HapticsError(f"{name} is {shown(values)}; it must be a table with {', '.join(keys)}")
     for key in values:
         if key not in keys:
-            raise HapticsError(f"unknown key {shown(key)} in {name}; known are {', '.join(keys)}")
+            raise HapticsError(f"unknown key {shown(key)} in {name}; {suggestion(key, keys)}")
 
 
 def write(cells: LoadCells) -> str:

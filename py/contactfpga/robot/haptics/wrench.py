@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import shown, suggestion
 from contactfpga.robot.haptics.values import HapticsError, number, positive
 from contactfpga.surfaces import shapes
 from contactfpga.surfaces.shapes import Floats, Vector
@@ -281,7 +281,7 @@ def read_surface(values: Any, name: str = "surface") -> Surface:
     made, length = SURFACES[values["kind"]]
     for key in values:
         if key not in ("kind", length):
-            raise HapticsError(f"unknown key {shown(key)} in {name}; known are kind, {length}")
+            raise HapticsError(f"unknown key {shown(key)} in {name}; {suggestion(key, ('kind', length))}")
     if length not in values:
         raise HapticsError(f"{length} is missing in {name}; a {values['kind']} has one")
     return made(values[length])

@@ -16,7 +16,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.design(parser, "Skin of the board (default: the reference Skin).")
     parser.add_argument("--scene", metavar="NAME", help="What touches the sheet: a scene's name or a .npy file.")
-    parser.add_argument("--link", metavar="PATH", help="Create this symbolic link to the pseudo-terminal.")
+    parser.add_argument("--symlink", metavar="PATH", help="Create this symbolic link to the pseudo-terminal.")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -27,4 +27,4 @@ def run(args: argparse.Namespace) -> int:
     cover, circuit = None, None
     if args.skin and isinstance(design, Skin):
         cover, circuit = load_cover(args.skin), load_checked(args.skin, design)
-    return PtyBoard(design, args.scene, link=args.link, cover=cover, circuit=circuit).serve()
+    return PtyBoard(design, args.scene, link=args.symlink, cover=cover, circuit=circuit).serve()

@@ -120,7 +120,8 @@ def _list(args: argparse.Namespace) -> int:
         for one in heard:
             terminal.say(f"{'ok' if one.hello else 'note':5} {one}", hang=6)
         if not boards:
-            terminal.say("fault no board said hello; is one plugged in, and its bitstream loaded?", hang=6)
+            named = f"ports without USB ids, as of `contactfpga board`, are listened to where {finding.MORE} names them"
+            terminal.say(f"fault no board said hello; is one plugged in, and its bitstream loaded? {named}", hang=6)
     return 0 if boards else 1
 
 

@@ -44,8 +44,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     count, usual = numbers.whole(2, 1_000_000), "Number of scenes to choose with (default: the file's, or 500)."
     parser.add_argument("--placements", type=count, metavar="N", help=usual)
     above = "Count cells of recordings above this as pressed; needed for numbers."
-    parser.add_argument("--threshold", type=numbers.CELL, help=above)
-    parser.add_argument("--seed", type=numbers.SEED, help="Seed of the places (default: the file's, or 0).")
+    parser.add_argument("--threshold", type=numbers.CELL, metavar="X", help=above)
+    parser.add_argument(
+        "--seed", type=numbers.SEED, metavar="N", help="Seed of the places (default: the file's, or 0)."
+    )
     parser.add_argument(
         "--quick", action="store_true", help="Do not check which of the refused Skins with as many wires are cheaper."
     )
@@ -97,7 +99,7 @@ def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
     scans = "Try only this scan; can be repeated (default: all that the Skin's columns can have)."
     tried.add_argument("--scan", action="append", metavar="NAME", help=scans)
     baud = "Try this baud rate; can be repeated (default: the Skin's)."
-    tried.add_argument("--baud", type=numbers.BAUD, action="append", help=baud)
+    tried.add_argument("--baud", type=numbers.BAUD, action="append", metavar="N", help=baud)
     host = "Accept bitmaps too: the host finds their zones in this time."
     tried.add_argument("--host-us", type=numbers.number(0, 1e9, "us"), metavar="US", help=host)
 

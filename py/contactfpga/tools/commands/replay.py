@@ -19,9 +19,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     joined = "Neighbors of a cell: 8 with corners, 4 without (default: 8)."
     parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help=joined)
     above = "Count cells above this as pressed; needed for numbers."
-    parser.add_argument("--threshold", type=numbers.CELL, help=above)
+    parser.add_argument("--threshold", type=numbers.CELL, metavar="X", help=above)
     pitch = "Distance between rows and between columns in mm (default: 10)."
-    parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, help=pitch)
+    parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, metavar="MM", help=pitch)
     bits = numbers.whole(0, limits.MAX_BARYCENTER_BITS)
     divided = "Divide barycenters on the board, to 1/2^K cell."
     parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)

@@ -22,18 +22,20 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", metavar="NAME", default="", help=frame)
     parent = "Publish where the link's frame lies in this one, on /tf_static."
     parser.add_argument("--parent", metavar="NAME", default="", help=parent)
-    place = "Where the link's frame lies there, in m (default: 0 0 0)."
+    place = "Origin of the link's frame there, in m (default: 0 0 0)."
     parser.add_argument(
-        "--place",
+        "--origin-m",
         nargs=3,
         type=numbers.number(-100, 100, "m"),
         metavar=("X", "Y", "Z"),
         default=(0.0, 0.0, 0.0),
         help=place,
     )
-    turn = "How it is turned, in rad, about the fixed x, y and z axes in turn (default: 0 0 0)."
+    turn = (
+        "Its roll, pitch and yaw in rad: turns about the fixed x, y and z axes, one after the other (default: 0 0 0)."
+    )
     parser.add_argument(
-        "--turn", nargs=3, type=numbers.TURN, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn
+        "--rpy", nargs=3, type=numbers.TURN, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn
     )
     rate = "Publish zones, tracks and contacts at most at this rate (default: 1000)."
     parser.add_argument(
@@ -55,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
     flags.check_forces(args)
     settings = Settings(
-        frame=args.frame, parent=args.parent, place_m=args.place, turn_rad=args.turn, zones_hz=args.zones_hz
+        frame=args.frame, parent=args.parent, place_m=args.origin_m, turn_rad=args.rpy, zones_hz=args.zones_hz
     )
     with Publisher(args.namespace, args.domain, args.network) as publisher, flags.opened(args) as board:
         forces = Forces.of(board, args.units, args.friction)

@@ -85,10 +85,12 @@ def run(args: argparse.Namespace) -> int:
     rows, columns = args.rows or skin.rows, args.columns or skin.columns
     diodes = args.diodes or skin.diodes
     values = _changed(given, args)
-    needs = sheet.needed(values, rows, columns, diodes)
+    lines = rows + skin.guard, columns + skin.guard
+    needs = sheet.needed(values, *lines, diodes)
     projects = skin.reads_rows if args.skin else True
-    problems = sheet.problems(values, rows, columns, diodes, projects)
-    answer = _answer(values, needs, problems, args.margin) | {"rows": rows, "columns": columns, "diodes": diodes}
+    problems = sheet.problems(values, *lines, diodes, projects)
+    asked = {"rows": rows, "columns": columns, "guard": skin.guard, "diodes": diodes}
+    answer = _answer(values, needs, problems, args.margin) | asked
     if args.skin:
         answer["skin"] = _given(skin, sheet.recommended_us(skin, needs, args.margin))
     if args.json:
@@ -162,7 +164,8 @@ TITLES = {
 
 
 def _show(answer: dict[str, Any], needs: Needs, margin: float) -> None:
-    sheet_of = f"{answer['rows']}x{answer['columns']}, {answer['diodes']}"
+    guard = " and guard lines" if answer["guard"] else ""
+    sheet_of = f"{answer['rows']}x{answer['columns']}{guard}, {answer['diodes']}"
     terminal.say(f"{sheet_of}; times with a margin of {margin:g}")
     lines = []
     for name, title in TITLES.items():

@@ -35,12 +35,12 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--part", choices=tuple(SWITCHES), default="dome", help=part)
     margin = f"Board beyond the parts, in mm (default: {MARGIN_MM:g})."
     parser.add_argument(
-        "--margin", type=numbers.number(MARGIN_MM, 100, "mm"), default=MARGIN_MM, metavar="MM", help=margin
+        "--edge-mm", type=numbers.number(MARGIN_MM, 100, "mm"), default=MARGIN_MM, metavar="MM", help=margin
     )
     cable = "Length of the ribbon cables, in m (default: 0.3)."
     parser.add_argument("--cable", type=numbers.number(0, 10, "m"), default=0.3, metavar="M", help=cable)
     parser.add_argument(
-        "--check", action="store_true", help="Have KiCad 6 check the board; status 1 if it finds anything."
+        "--kicad", action="store_true", help="Have KiCad 6 check the board; status 1 if it finds anything."
     )
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
 
@@ -56,12 +56,12 @@ def run(args: argparse.Namespace) -> int:
         raise ContactFPGAError(f"name a Skin's file, or a kit: --kit {' or --kit '.join(kits.names())}")
     skin = Skin.load(file)
     cover, circuit = load_cover(file), load_checked(file, skin)
-    layout = lay_out(skin, circuit, args.part, args.margin)
+    layout = lay_out(skin, circuit, args.part, args.edge_mm)
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
     layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
     text = files.completed(Path(file).read_text(encoding="utf-8"), found.circuit)
     names = files.write(folder, layout, layer, text)
-    problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.check else None
+    problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline
     answer: dict[str, Any] = {
         "folder": str(folder),

@@ -22,6 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     skin = "Skin of the virtual sheet; of a board: require one that was built from it, and use its baud rate."
     flags.connection(parser, WHAT, skin)
+    parser.add_argument("--flat", action="store_true", help="A flat virtual sheet instead of one around a forearm.")
     parser.add_argument(
         "--link",
         metavar="NAME",
@@ -44,7 +45,9 @@ def run(args: argparse.Namespace) -> int:
 
     with contextlib.ExitStack() as stack:
         with terminal.reading(args.port or "") as tell:
-            named = opening.ViewRequest(args.port, args.skin, args.baud, args.timeout, args.link, args.units, tell)
+            named = opening.ViewRequest(
+                args.port, args.skin, args.baud, args.timeout, args.link, args.units, args.flat, tell
+            )
             shown = stack.enter_context(opening.opened(named, args.host, args.http_port))
         stack.enter_context(interrupt.usual_end())
         terminal.say(f"Open {shown.url}")

@@ -18,6 +18,7 @@ from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import told
 from contactfpga.inputs.values import shortened, visible_lines
+from contactfpga.shipped import with_pages
 from contactfpga.tools.console import signals
 from contactfpga.tools.console.signals import SIGNALS
 
@@ -104,7 +105,7 @@ def failed(reason: object) -> int:
         return _cut_short()
     silence_amaranth()
     # Names from files and devices are part of it.
-    terminal.say(f"contactfpga: {visible_lines(shortened(str(reason)))}", sys.stderr, hang=2)
+    terminal.say(f"contactfpga: {visible_lines(shortened(with_pages(str(reason))))}", sys.stderr, hang=2)
     return 1
 
 

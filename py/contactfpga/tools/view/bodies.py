@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,7 +24,8 @@ from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import open_board
 from contactfpga.robot.body.snapshot import on_link
 from contactfpga.surfaces import SurfaceError, mesh_file
-from contactfpga.tools.view import picture
+from contactfpga.tools.view import contacts, controls, page, picture
+from contactfpga.tools.view.cameras import Cameras, Side
 from contactfpga.tools.view.fingers import Hand, Touchable
 from contactfpga.tools.view.panel import TimelineControls, as_markdown, shortened
 from contactfpga.tools.view.picture import rgb
@@ -46,6 +48,18 @@ if TYPE_CHECKING:
 STEP_S = 0.04
 TOLD_S = 0.25
 TURN_RAD = 3.15
+
+
+ROBOT_SIDES = {
+    name: Side(np.array(toward), np.array([0.0, 0.0, 1.0]))
+    for name, toward in {
+        "overview": (0.85, 0.35, 0.35),
+        "front": (1.0, 0.0, 0.1),
+        "side": (0.0, 1.0, 0.1),
+        "back": (-1.0, 0.0, 0.1),
+    }.items()
+}
+"""A robot faces x, with z up."""
 
 
 class RobotSource(Protocol):
@@ -98,15 +112,16 @@ class BodyView:
         self.stage = RobotStage(server, source.body)
         self._moved = dict(source.angles)
         self.stage.move(source.angles)
-        self.stage.look(source.angles)
+        page.dress(server)
+        cameras = Cameras(server, ROBOT_SIDES, self.stage.points_m)
         self._trackers = {name: Tracker(gate_mm=40.0, hold_ms=100.0) for name in source.body.links}
         self.hands: dict[str, Hand] = {}
         self._stepped_s = self._told_s = 0.0
-        gui = server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False)
-        gui.set_panel_label("contactfpga")
-        self._facts = gui.add_markdown("")
+        self._rows: list[contacts.Row] = []
+        self._table = server.gui.add_html(contacts.table(()))
         self._timeline = TimelineControls(server, source) if isinstance(source, Playback) else None
+        controls.add(server, cameras, lambda: (f"contactfpga: {shortened(source.title)}", self._rows))
+        self._facts = server.gui.add_markdown("")
         self._felt: dict[str, LinkState] = {}
         self._add_sliders(server)
 
@@ -129,31 +144,39 @@ class BodyView:
             self._moved = dict(source.angles)
             self.stage.move(self._moved)
         states = source.states()
-        for name, state in states.items():
-            stage, virtual = self.stage.stages[name], source.virtual.get(name)
-            if virtual is not None and name not in self.hands:
-                self.hands[name] = Hand.on(virtual, source.body.links[name].skin.sheet)
-                stage.press_with(self.hands[name])
-            if state.zones is None:
-                stage.draw_no_data()
-            else:
-                truth = None if virtual is None else virtual.pressed
-                tracks = self._trackers[name].update(state.zones)
-                stage.draw(Moment(state.zones, tracks, truth, arrows=self._arrows(source.body.links[name], state)))
+        self._rows = [row for name, state in states.items() for row in self._show(name, state)]
         if self._stepped_s - self._told_s > TOLD_S:
             self._told_s = self._stepped_s
+            self._table.content = contacts.table(self._rows)
             self._facts.content = as_markdown(facts(source, states, self.stage.unread))
             if self._timeline is not None:
                 self._timeline.write()
 
-    def _arrows(self, plan: Plan, newest: LinkState) -> np.ndarray | None:
-        """Forces of the newest frame, or of the one before, where its readings have not come yet."""
+    def _show(self, name: str, state: LinkState) -> list[contacts.Row]:
+        """Draw a link's newest frame, and return its contacts."""
+        stage, virtual, plan = self.stage.stages[name], self._source.virtual.get(name), self._source.body.links[name]
+        if virtual is not None and name not in self.hands:
+            self.hands[name] = Hand.on(virtual, plan.skin.sheet)
+            stage.press_with(self.hands[name])
+        if state.zones is None:
+            stage.draw_no_data()
+            return []
+        truth = None if virtual is None else virtual.pressed
+        felt = self._measured(plan, state)
+        pushed = [(one.zone, one.normal_n) for one in felt or () if one.zone.x_mm is not None]
+        arrows = None if felt is None else pushes(plan, felt)
+        moment = Moment(state.zones, self._trackers[name].update(state.zones), truth, pushes=pushed, arrows=arrows)
+        stage.draw(moment)
+        return contacts.rows(moment, name)
+
+    def _measured(self, plan: Plan, newest: LinkState) -> list[LinkContact] | None:
+        """The contacts of the newest frame, or of the one before, where its readings have not come yet."""
         before, self._felt[plan.name] = self._felt.get(plan.name), newest
         if plan.units is None:
             return None
         for state in (newest, before):
             if state is not None and state.zones is not None and state.zones.units is not None:
-                return pushes(plan, on_link(plan, state))
+                return on_link(plan, state)
         return None
 
 
@@ -296,6 +319,9 @@ class RobotStage:
         self.unread: set[str] = set()
         """Kinds of mesh files that could not be read."""
         self._meshes = self._mesh_bytes = self._triangles = 0
+        self._corners: list[tuple[str, np.ndarray]] = []
+        """Links with the corners of a box around a mesh, (8, 3) in m in the link's frame."""
+        self._poses: Mapping[str, Pose] = {}
         scene = server.scene
         light(server, (1.0, -0.5, 1.0))
         names = [plan.frame for plan in body.links.values()]
@@ -324,6 +350,8 @@ class RobotStage:
             self.unread.add(REST if str(error) == REST else visual.path.suffix)
             return
         mesh.merge_vertices()
+        box = np.array(list(itertools.product(*np.transpose(mesh.bounds)))) * visual.scale
+        self._corners.append((visual.link, visual.pose.apply(box)))
         count = len(self._frames)
         self._frames[f"{visual.link}#{count}"] = self._server.scene.add_mesh_simple(
             f"{ROOT}/{visual.link}/mesh{count}",
@@ -341,14 +369,14 @@ class RobotStage:
         node = f"{ROOT}/{plan.frame}/{plan.name}"
         wxyz = quaternions(plan.pose.rotation[None])[0]
         self._server.scene.add_frame(node, show_axes=False, wxyz=wxyz, position=plan.pose.point_m)
-        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node)
+        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node, carried=False)
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Draw all links at these angles."""
         kinematics = self._body.kinematics
         if kinematics is None:
             return
-        poses = kinematics.poses(angles)
+        self._poses = poses = kinematics.poses(angles)
         orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
         for name, plan in self._body.links.items():
             mine = poses[plan.frame] @ plan.pose
@@ -365,18 +393,8 @@ class RobotStage:
             )
         self._bones.points = bones.astype(np.float32)
 
-    def look(self, angles: Mapping[str, float]) -> None:
-        """Set the camera so that all sheets are in view, from the side that the robot faces."""
-        points = np.concatenate([self._sheet_points(plan, angles) for plan in self._body.links.values()])
-        low, high = points.min(0), points.max(0)
-        middle, far = (low + high) / 2, 1.6 * float(np.linalg.norm(high - low)) + 0.2
-        camera = self._server.initial_camera
-        camera.look_at = tuple(middle)
-        camera.position = tuple(middle + far * np.array([0.85, 0.35, 0.35]))
-        camera.near = 0.01 * far
-
-    def _sheet_points(self, plan: Plan, angles: Mapping[str, float]) -> np.ndarray:
-        points = plan.pose.apply(self.stages[plan.name].tiles.points_mm * MM)
-        if self._body.kinematics is not None:
-            points = self._body.kinematics.pose(plan.frame, angles).apply(points)
-        return np.asarray(points)
+    def points_m(self) -> np.ndarray:
+        """(n, 3) around all that is drawn, where the joints put it."""
+        sheets = [stage.tiles.points_mm * MM @ stage.rotation.T + stage.point_m for stage in self.stages.values()]
+        meshes = [self._poses[link].apply(corners) for link, corners in self._corners]
+        return np.concatenate([*sheets, *meshes])

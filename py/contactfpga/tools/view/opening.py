@@ -21,8 +21,9 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
-from contactfpga.tools.view import server
+from contactfpga.tools.view import page, server
 from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, holds_robot
+from contactfpga.tools.view.cameras import Cameras, sides_of
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
@@ -44,13 +45,14 @@ class View:
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
         self._source = source
+        page.dress(server)
         self.stage = Stage(server, Tiles(source.sheet), source.cells)
-        self.panel = Panel(server, source, hand)
+        self.cameras = Cameras(server, sides_of(self.stage.tiles), lambda: self.stage.points_m)
+        self.panel = Panel(server, source, hand, self.cameras)
         self._told_s = 0.0
         self._moment: Moment | None = None
         self.drawn = 0
         """Moments drawn."""
-        self.stage.look()
         if hand is not None:
             self.stage.press_with(hand)
 
@@ -66,8 +68,14 @@ class View:
             self.panel.write(self._moment)
 
 
-SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
-"""Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
+FOREARM = Skin(rows=16, columns=16, closed=True, surface="cylinder", radius_mm=45.0)
+"""As in examples/forearm.toml."""
+
+
+def own_skin(flat: bool = False) -> Skin:
+    """Of the virtual sheet that is shown where nothing is named: at a third of the usual clock, to keep up with real
+    time."""
+    return (Skin() if flat else FOREARM).replace(clock_hz=4_000_000, baud=2_000_000, send="on_change")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,6 +106,8 @@ class ViewRequest:
     """Of a recording of several boards."""
     units: str | Path | None = None
     """File of the pressure units; by default what ``sim://`` names."""
+    flat: bool = False
+    """With nothing named: a flat sheet in place of the one around a forearm."""
     reading: Reading = silent
     """Told how far a recording is read that has no index."""
 
@@ -141,6 +151,8 @@ def _check(named: ViewRequest) -> None:
         if getattr(named, name) is not None and (is_body or recorded):
             other = "sets it for each link" if is_body else "is a recording"
             raise ContactFPGAError(f"--{name} is for a board; {port} {other}")
+    if named.flat and (port is not None or named.skin is not None):
+        raise ContactFPGAError("--flat is for the sheet that is shown where nothing is named")
     if named.link is not None and not recorded:
         raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
@@ -176,12 +188,12 @@ def _cells(named: ViewRequest) -> LoadCells | None:
 
 
 def _virtual(named: ViewRequest) -> Any:
-    """A virtual board; with nothing named an untouched one of the Skin, or of the reference Skin at a slower clock."""
+    """A virtual board; with nothing named an untouched one of the Skin, or a sheet around a forearm."""
     if named.port is not None:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
         return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")
-    return transport.virtual_board("sim://?scene=nothing", Skin().replace(**SLOW))
+    return transport.virtual_board("sim://?scene=nothing", own_skin(named.flat))
 
 
 def browse(url: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -10,22 +9,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.tools.view import picture
+from contactfpga.tools.view import chart, contacts, controls, picture
+from contactfpga.tools.view.cameras import Cameras
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.playback import SPEEDS, Playback
-from contactfpga.tools.view.sources import Moment, Source
+from contactfpga.tools.view.sources import Moment, Source, paced
 
 if TYPE_CHECKING:
     import viser
 
 MOUSE = (
-    "Click a cell to put a finger down; click the finger to lift it. Drag across the sheet to press while you hold the "
-    "button; drag a finger to move it. Beside the sheet the mouse turns the view."
+    "Click a cell to put a finger down, click the finger to lift it. Drag across the sheet to press while you hold the "
+    "button. Beside the sheet the mouse turns the view, the wheel zooms."
 )
 
 _MARK = '<span style="color:{color}">{mark}</span>'
 
-ZONES = ("orange", picture_style.VERMILLION, "◯", "a zone: its barycenter, and a circle of its area, not its shape")
+ZONES = ("orange", picture_style.VERMILLION, "◯", "a contact: its barycenter, and a circle of its area, not its shape")
 WAY = ("green", picture_style.GREEN, "―", "where its contact was within the last second")
 REPORTED = ("blue", picture_style.BLUE, "■", "pressed cells, as the board reports them")
 GHOSTS = ("yellow", picture_style.ORANGE, "■", "cells that other pressed ones may have made")
@@ -33,7 +33,7 @@ TRUTH = (
     "sky",
     picture_style.SKY,
     "■",
-    "what is pressed on the virtual board: its truth, as it sends zones only",
+    "cells that are really pressed; the virtual board reports only zones",
 )
 """Of the legend: name and value of a color, its mark, what it means."""
 
@@ -41,94 +41,57 @@ FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {pictu
 TITLE = 36
 MOST_N = 30.0
 """Of the mouse's finger."""
-CAPTURE_S = 20.0
-WHOLE = (1, 2, 5, 10, 20, 50, 100, 200, 500)
-"""Steps of an axis that counts."""
 
 
 class Panel:
     """Writes what a source says besides its zones."""
 
-    def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None):
+    def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None, cameras: Cameras):
         self._source = source
+        self._moment: Moment | None = None
         gui = server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
-        gui.set_panel_label("contactfpga")
-        self._facts = gui.add_markdown("")
+        self._table = gui.add_html(contacts.table(()))
         self._timeline = TimelineControls(server, source) if isinstance(source, Playback) else None
-        self._chart = self._add_chart(server)
+        self._chart = gui.add_html("")
+        controls.add(server, cameras, self._caption)
         if hand is not None:
             self._add_mouse(server, hand)
-        gui.add_markdown(legend(source, hand is not None))
-        self._add_capture(server)
-
-    def _add_chart(self, server: viser.ViserServer) -> Any:
-        none = np.array([-1.0, 0.0])
-        return server.gui.add_uplot(
-            (none, none * 0, none * 0),
-            (
-                {"label": "s"},
-                {"label": "zones", "stroke": picture_style.VERMILLION, "width": 2, "scale": "y"},
-                {"label": "cm2", "stroke": picture_style.BLUE, "width": 2, "scale": "cm2"},
-            ),
-            scales=scales(none * 0, none * 0),
-            axes=(
-                {"label": "s"},
-                {"scale": "y", "label": "zones", "stroke": picture_style.VERMILLION, "incrs": WHOLE},
-                {"scale": "cm2", "label": "cm2", "side": 1, "stroke": picture_style.BLUE},
-            ),
-            aspect=1.8,
-            padding=(12, 0, 0, 0),  # the highest number is not cut
-        )
+        with gui.add_folder("Board"):
+            self._facts = gui.add_markdown("")
+        with gui.add_folder("Colors"):
+            gui.add_markdown(legend(source, hand is not None))
 
     def _add_mouse(self, server: viser.ViserServer, hand: Hand) -> None:
         sheet = self._source.sheet
         pitch_mm = max(sheet.pitch_x_mm, sheet.pitch_y_mm)
-        with server.gui.add_folder("Mouse"):
+        with server.gui.add_folder("Fingers"):
             server.gui.add_markdown(MOUSE)
-            low, high = round(0.75 * pitch_mm, 1), round(4 * pitch_mm, 1)
-            radius = server.gui.add_slider("finger mm", low, high, 0.1, min(max(hand.radius_mm, low), high))
+            low, high = round(0.5 * pitch_mm, 1), round(3 * pitch_mm, 1)
+            radius = server.gui.add_slider("radius, mm", low, high, 0.1, round(min(max(hand.radius_mm, low), high), 1))
             force = None
             if self._source.cells is not None or hand.board.by_force:
-                force = server.gui.add_slider("force N", 0.5, MOST_N, 0.1, hand.force_n)
-            lift = server.gui.add_button("Lift all")
+                force = server.gui.add_slider("force, N", 0.5, MOST_N, 0.1, hand.force_n)
+            lift = server.gui.add_button("Lift all (L)")
         radius.on_update(lambda _: hand.resize(radius_mm=radius.value))
         if force is not None:
             force.on_update(lambda _: hand.resize(force_n=force.value))
         lift.on_click(lambda _: hand.lift())
+        server.gui.add_command("Lift all fingers", hotkey="L").on_trigger(lambda _: hand.lift())
 
-    def _add_capture(self, server: viser.ViserServer) -> None:
-        button = server.gui.add_button("Screenshot")
-
-        @button.on_click
-        def _(event: Any) -> None:
-            camera = event.client.camera
-            size = (camera.image_height, camera.image_width)
-            image = event.client.get_render(*size, transport_format="png", timeout=CAPTURE_S)
-            event.client.send_file_download("contactfpga.png", png(image), save_immediately=True)
+    def _caption(self) -> tuple[str, list[contacts.Row]]:
+        title = f"contactfpga: {shortened(self._source.title)}"
+        if self._moment is None:
+            return title, []
+        return f"{title}, {self._moment.zones.time_us / 1e6:.6f} s since power-up", contacts.rows(self._moment)
 
     def write(self, moment: Moment | None) -> None:
         """What is known now."""
+        self._moment = moment
+        self._table.content = contacts.table(() if moment is None else contacts.rows(moment))
         self._facts.content = as_markdown(facts(self._source, moment))
-        strip = self._source.meter.strip
-        if len(strip.seconds) > 1:
-            self._chart.data = (strip.seconds, strip.zones, strip.area_mm2 / 100)
-            if (wanted := scales(strip.zones, strip.area_mm2 / 100)) != self._chart.scales:
-                self._chart.scales = wanted
+        self._chart.content = f'<div class="chart">{chart.chart(self._source.meter.strip)}</div>'
         if self._timeline is not None:
             self._timeline.write()
-
-
-def scales(zones: np.ndarray, area_cm2: np.ndarray) -> dict[str, Any]:
-    """Of the chart's axes: from 0 to a round number, so that they change seldom."""
-    return {"x": {"time": False}, "y": {"range": (0, _top(zones, 2))}, "cm2": {"range": (0, _top(area_cm2, 10))}}
-
-
-def _top(values: np.ndarray, least: int) -> int:
-    """1, 2 or 5 times a power of ten."""
-    wanted = max(least, math.ceil(values.max()))
-    power = int(10 ** (len(str(wanted)) - 1))
-    return next(times * power for times in (1, 2, 5, 10) if times * power >= wanted)
 
 
 class TimelineControls:
@@ -159,19 +122,10 @@ class TimelineControls:
 
 def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
     """Names and values, as the panel shows them."""
-    meter = source.meter
-    rows = [("source", shortened(source.title)), ("frames", f"{meter.frames_per_s:,.0f} per second")]
+    rows = [("source", shortened(source.title)), ("sends", paced(source.meter.frames_per_s))]
     if moment is not None:
-        zones = moment.zones
-        rows.append(("zones", f"{zones.total_zones}, {zones.pressed} cells pressed"))
-        if moment.felt is not None and moment.felt[0]:
-            rows.append(
-                (
-                    "forces",
-                    ", ".join("?" if one.normal_n is None else f"{one.normal_n:.2f} N" for one in moment.felt[0]),
-                )
-            )
-        flags = sorted(zones.flags | set(zones.faults))
+        rows.append(("pressed", f"{moment.zones.pressed} cells"))
+        flags = sorted(moment.zones.flags | set(moment.zones.faults))
         rows += [("flags", ", ".join(flags))] if flags else []
     return rows + source.told()
 
@@ -201,11 +155,3 @@ def legend(source: Source, virtual: bool) -> str:
     rows += [FORCE] if source.cells is not None else []
     rows += [TRUTH] if virtual and not cells else []
     return "\n".join(f"{_MARK.format(color=color, mark=mark)} {what}  " for _, color, mark, what in rows)
-
-
-def png(image: np.ndarray) -> bytes:
-    """The bytes of a file."""
-    import imageio.v3
-
-    written: bytes = imageio.v3.imwrite("<bytes>", image, extension=".png")
-    return written

@@ -29,7 +29,7 @@ def rgb(color: str) -> tuple[int, int, int]:
 OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
     rgb(color)
     for color in (
-        picture_style.SHEET,
+        "#76818e",
         picture_style.SKY,
         picture_style.BLUE,
         picture_style.ORANGE,
@@ -39,7 +39,9 @@ OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
 """Cells: open; closed on a virtual board that sends zones only, which is its own truth; closed, as the board reports;
 perhaps made by other closed ones; of a link without data."""
 
-CIRCLE, TRAIL, PUSH = (rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE))
+CIRCLE, TRAIL, PUSH, AXIS = (
+    rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE, picture_style.GRAY)
+)
 
 
 def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:
@@ -55,6 +57,12 @@ def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:
         if ghosts is not None:
             colors[ghosts & zones.cells] = GHOST
     return colors.reshape(-1, 3)
+
+
+def lit(colors: np.ndarray) -> np.ndarray:
+    """(n,) bool: the cells that are closed, or may be, by their colors."""
+    found: np.ndarray = (colors != np.array(OPEN, np.uint8)).any(-1) & (colors != np.array(UNKNOWN, np.uint8)).any(-1)
+    return found
 
 
 @dataclasses.dataclass(frozen=True)

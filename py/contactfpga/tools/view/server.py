@@ -18,7 +18,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from contactfpga.errors import ContactFPGAError, MissingExtra, PortNotFound
+from contactfpga.errors import ContactFPGAError, MissingExtra, pip_install
 
 if TYPE_CHECKING:
     import viser
@@ -108,11 +108,15 @@ class Guard:
         """Lead the browser to the same page without the token, so that it stays out of the address line. The page does
         it by itself: after a redirect a browser that came by a link of another site would keep its cookie back."""
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-        page = f"<!doctype html><title>contactfpga</title><script>location.replace({_PAGE!r})</script>\n"
+        dark = "matchMedia('(prefers-color-scheme: dark)').matches"
+        page = (
+            "<!doctype html><title>contactfpga</title>"
+            f"<script>location.replace({dark} ? {_DARK!r} : {_PAGE!r})</script>\n"
+        )
         return Response(200, page, {**_HEADERS, "Content-Type": "text/html; charset=utf-8", "Set-Cookie": cookie})
 
 
-_PAGE = "/"
+_PAGE, _DARK = "/", "/?darkMode"
 _HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY"}
 _NO_TOKEN = Response(403, "The token is missing or is another one; open the whole address that the server printed.\n")
 
@@ -147,7 +151,7 @@ PORTS_TRIED = 20
 def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None) -> tuple[viser.ViserServer, Guard]:
     """Start a server that nobody gets past without the guard's leave; returns both. ``port``: 0 is any free one.
 
-    Raises :class:`~contactfpga.PortNotFound` where it cannot listen there, :class:`~contactfpga.MissingExtra`.
+    Raises :class:`~contactfpga.ContactFPGAError` where it cannot listen there, :class:`~contactfpga.MissingExtra`.
     """
     try:
         import viser
@@ -160,7 +164,7 @@ def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None
         server = viser.ViserServer(host=host, port=port, label="contactfpga", verbose=False)
     if not is_guarded():
         server.stop()
-        right = "install the right version with pip install '.[view]'"
+        right = f"install the right version with {pip_install('view')}"
         raise ContactFPGAError(f"viser {viser.__version__} lets no guard in; {right}")
     _forget_tunnel(server)
     return server, guard
@@ -180,7 +184,7 @@ def _free_port(host: str, port: int | None) -> int:
         except (OSError, UnicodeError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
     where = f"port {port}" if port is not None else f"any port from {PORT} to {PORT + PORTS_TRIED - 1}"
-    raise PortNotFound(f"cannot listen on {host}, {where}: {reason}; give another --host or --http-port")
+    raise ContactFPGAError(f"cannot listen on {host}, {where}: {reason}; give another --host or --http-port")
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ import collections
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -20,7 +20,7 @@ from contactfpga.tools.view.fingers import Touchable
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.batch import Batch
-from contactfpga.zones.zone import Zones
+from contactfpga.zones.zone import Zone, Zones
 
 MAX_LAG_S = 0.1
 """A board that is later than this does not catch up any more: its time has slipped."""
@@ -101,6 +101,8 @@ class Moment:
     felt: tuple[Contacts, Zones] | None = None
     """The newest forces that are known, with their frame, which is some milliseconds older than :attr:`zones`: the
     readings after it have to come first."""
+    pushes: Sequence[tuple[Zone, float | None]] = ()
+    """Zones of the measured frame that lie somewhere, each with the push in N where it is known."""
     arrows: np.ndarray | None = None
     """(n, 2, 3) in m, in the sheet's frame: the same of a link of a robot, whose units count in the link's frame."""
 
@@ -154,7 +156,8 @@ class BoardSource:
             return None
         zones = self._board.latest()
         truth = None if self._virtual is None else self._virtual.pressed
-        return Moment(zones, self._tracker.update(zones), truth, self._felt(zones))
+        felt = self._felt(zones)
+        return Moment(zones, self._tracker.update(zones), truth, felt, () if felt is None else pushes(*felt))
 
     def _felt(self, newest: Zones) -> tuple[Contacts, Zones] | None:
         """Of the frame that was the newest a moment before."""
@@ -191,25 +194,38 @@ class BoardSource:
         stats = self.meter.stats
         silent_s = self._board.silence.seconds
         rows = [("no data", f"for {silent_s:.1f} s; what is drawn is older")] if silent_s > SILENT_S else []
-        rows += [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
+        damaged = sum(stats.damaged.values())
+        rows += [("lost", f"{stats.lost} frames, {damaged} packets damaged" if stats.lost or damaged else "nothing")]
         if self.meter.dropped:
             rows.append(("not shown", f"{self.meter.dropped} frames, which came faster than they were read"))
         late = self.meter.late_s
         if late is not None:
             rows.append(("latency", f"{late * 1e6:,.0f} us from the sample of the first row to the last byte"))
-        if self._pace is not None:
-            rows.append(("board time", paced(self._pace)))
+        if self._pace is not None and self._pace.share <= KEEPS_UP:
+            rows.append(("simulated", f"at {self._pace.share:.0%} of real time; all times here are the board's own"))
         return rows
 
     def close(self) -> None:
         self._board.close()
 
 
-def paced(pace: SimulatedPace) -> str:
-    """How the virtual board's time goes."""
-    if pace.share > KEEPS_UP:
-        return "real time"
-    return f"{pace.share:.0%} of real time, as fast as this machine simulates it; {pace.slip_s:.1f} s slipped"
+def pushes(contacts: Contacts, zones: Zones) -> list[tuple[Zone, float | None]]:
+    """Each zone that lies somewhere, with its push."""
+    placed = [zone for zone in zones if zone.x_mm is not None]
+    return [(zone, contact.normal_n) for zone, contact in zip(placed, contacts)]
+
+
+AT_REST = 15.0
+"""Frames per second of a board that sends what changes, and a keep-alive where nothing does: one each 0.1 s at most."""
+
+
+def paced(frames_per_s: float) -> str:
+    """How often frames come."""
+    if not frames_per_s:
+        return "nothing yet"
+    if frames_per_s > AT_REST:
+        return f"{frames_per_s:,.0f} frames per second"
+    return f"at rest, a keep-alive every {1 / frames_per_s:.1f} s"
 
 
 CHART_S = 10.0

@@ -7,24 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga.robot.haptics import LoadCells
-from contactfpga.tools.view import picture
+from contactfpga.tools.view import contacts, glow, picture, ruler
 from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.limb import FOAM_MM, Limb, add_plate
 from contactfpga.tools.view.sources import Moment
 from contactfpga.tools.view.tiles import MM, Tiles
-from contactfpga.tracking.tracks import Tracks
 
 if TYPE_CHECKING:
     import viser
 
 NODE = "/sheet"
-FILLED = 0.9
+FILLED = 0.86
 """Share of the pitch that a tile takes."""
 THICK = 0.08
 """Its height, of the pitch."""
-AMBIENT, SIDE = 1.2, 0.7
-"""Lights: mostly from all sides, so that a color means the same everywhere."""
-FAR, PANEL = 0.9, 0.14
-"""How far the camera is from the sheet, of its diagonal, and how far it looks past it, of that."""
 LABELS = 24
 """Contacts that have their number written beside them."""
 
@@ -38,7 +34,15 @@ FACES = np.array(
 class Stage:
     """Draws moments of one sheet."""
 
-    def __init__(self, server: viser.ViserServer, tiles: Tiles, load_cells: LoadCells | None = None, node: str = NODE):
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        tiles: Tiles,
+        load_cells: LoadCells | None = None,
+        node: str = NODE,
+        carried: bool = True,
+    ):
+        """``carried``: drawn on a limb or a plate, with its rows and columns numbered."""
         self._load_cells = load_cells
         self._arrows: Any = None
         self.rotation, self.point_m = np.eye(3), np.zeros(3)
@@ -46,7 +50,9 @@ class Stage:
         self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
-        self._lift_mm = 0.06 * self._pitch_mm
+        self.limb = Limb(server, tiles, node) if carried and sheet.closed else None
+        under_mm = 0.0 if self.limb is None else FOAM_MM
+        self._lift_mm = under_mm + 0.06 * self._pitch_mm
         scene = server.scene
         size = np.array([sheet.pitch_x_mm * FILLED, sheet.pitch_y_mm * FILLED, self._pitch_mm * THICK])
         self.cells = scene.add_batched_meshes_simple(
@@ -63,21 +69,30 @@ class Stage:
         self._lines: dict[str, Any] = {}
         self._points: Any = None
         self._labels: list[Any] = []
-        self._trails = picture.Trails(tiles.surface, 1.5 * self._lift_mm)
+        self._glow = glow.Glow(server, f"{node}/glow", tiles, under_mm) if carried else None
+        self._trails = picture.Trails(tiles.surface, self._lift_mm + 0.03 * self._pitch_mm)
         self._colors: np.ndarray | None = None
+        if carried:
+            self._carry(under_mm)
 
-    def look(self) -> None:
-        """Set light and camera of those who come so that the sheet is in view and its colors are as chosen."""
-        scene = self._server.scene
+    def _carry(self, under_mm: float) -> None:
+        """Draw what the sheet is on, its rows, columns and origin."""
+        if self.limb is None:
+            add_plate(self._server, self.tiles, self._node)
+        ruler.add(self._server, self._node, self.tiles, under_mm + 0.2 * self._pitch_mm)
         light(self._server, (0.3, -0.5, 1.0))
-        tiles, camera = self.tiles, self._server.initial_camera
-        normal, away, aside = (mean(each) for each in (tiles.normals, tiles.along_y, tiles.along_x))
-        far = FAR * tiles.size_mm * MM
-        middle = tiles.middle_mm * MM + PANEL * far * aside  # beside the panel, not under it
-        camera.look_at = tuple(middle)
-        camera.position = tuple(middle + far * (0.9 * normal - 0.45 * away))
-        camera.near = 0.02 * far
-        scene.set_up_direction(tuple(away) if abs(normal[2]) < 0.5 else (0.0, 0.0, 1.0))
+
+    @property
+    def points_m(self) -> np.ndarray:
+        """(n, 3) of all that is to be in view."""
+        tiles = self.tiles
+        if self.limb is not None:
+            return self.limb.points_mm * MM
+        sheet = tiles.sheet
+        x = np.array([-1.4, sheet.columns + 0.4])[:, None] * sheet.pitch_x_mm
+        y = np.array([-1.4, sheet.rows + 0.4]) * sheet.pitch_y_mm
+        points, _ = tiles.surface.place(*(each.ravel() for each in np.broadcast_arrays(x, y)))
+        return np.concatenate([points, tiles.points_mm]) * MM
 
     def draw(self, moment: Moment) -> None:
         """Show it. Only what differs is sent."""
@@ -88,7 +103,7 @@ class Stage:
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
-        self._draw_labels(moment.tracks)
+        self._draw_labels(moment)
         self._draw_arrows(self._forces(moment))
 
     def draw_no_data(self) -> None:
@@ -101,6 +116,10 @@ class Stage:
     def _color(self, colors: np.ndarray) -> None:
         if self._colors is None or not np.array_equal(colors, self._colors):
             self.cells.batched_colors = self._colors = colors
+            if self._glow is not None:
+                self._glow.show(colors)
+            if self.limb is not None:
+                self.limb.press(picture.lit(colors))
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -151,19 +170,17 @@ class Stage:
             precision="float32",
         )
 
-    def _draw_labels(self, tracks: Tracks) -> None:
-        shown = [track for track in tracks.active if track.zone.x_mm is not None][:LABELS]
+    def _draw_labels(self, moment: Moment) -> None:
+        shown = [row for row in contacts.rows(moment) if row.id is not None and row.x_mm is not None][:LABELS]
         while len(self._labels) < len(shown):
             path = f"{self._node}/contact{len(self._labels)}"
-            self._labels.append(self._server.scene.add_label(path, "", anchor="bottom-left"))
-        for label, track in zip(self._labels, shown):
-            x_mm, y_mm = track.zone.x_mm, track.zone.y_mm
-            assert x_mm is not None
-            assert y_mm is not None
-            point, normal = self.tiles.surface.place(x_mm, y_mm)
-            label.position = (np.array(point) + 0.4 * self._pitch_mm * np.array(normal)) * MM
-            area = track.zone.area_cells
-            label.text = f"#{track.id}: {area} cell{'' if area == 1 else 's'}"
+            self._labels.append(self._server.scene.add_label(path, "", anchor="bottom-left", font_screen_scale=0.8))
+        for number, (label, row) in enumerate(zip(self._labels, shown)):
+            assert row.x_mm is not None
+            assert row.y_mm is not None
+            point, normal = self.tiles.surface.place(row.x_mm, row.y_mm)
+            label.position = (np.array(point) + (self._lift_mm + 0.9 * self._pitch_mm) * np.array(normal)) * MM
+            label.text = "\n".join(row.lines) if number < contacts.MOST else row.name
             label.visible = True
         for label in self._labels[len(shown) :]:
             label.visible = False
@@ -194,18 +211,15 @@ class Stage:
                 hand.drag(event.client_id, *place)
 
 
+EVERYWHERE, KEY, RIM = 0.9, 2.0, 0.8
+"""How strong the lights are."""
+
+
 def light(server: viser.ViserServer, side: tuple[float, float, float]) -> None:
-    """From all sides, and a little from this one."""
+    """From all sides, from this one and less from the opposite one, so that forms show."""
     scene = server.scene
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.configure_environment_map(None)
-    scene.add_light_ambient("/light/all", intensity=AMBIENT)
-    scene.add_light_directional("/light/side", intensity=SIDE, position=side)
-
-
-def mean(directions: np.ndarray) -> np.ndarray:
-    """The direction between them, or the first one where they turn all around."""
-    found = directions.mean(0)
-    length = float(np.linalg.norm(found))
-    unit: np.ndarray = found / length if length > 0.1 else directions[0]
-    return unit
+    scene.add_light_ambient("/light/all", intensity=EVERYWHERE)
+    scene.add_light_directional("/light/key", intensity=KEY, position=side)
+    scene.add_light_directional("/light/rim", intensity=RIM, position=(-side[0], -side[1], -0.2 * side[2]))

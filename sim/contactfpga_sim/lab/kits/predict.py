@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed
+from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed_by
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force, Sheet, feel
@@ -31,13 +31,17 @@ from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga.driver import health
 from contactfpga.inputs.files import write_text
+from contactfpga.skin import Skin
 from contactfpga_sim.lab.finger import stages
 from contactfpga_sim.lab.spread import Times
 from contactfpga_sim.lab.usb import BridgeSettings, delivered
+from contactfpga_sim.model.board.compiled import CompiledBoard
 
 DRAWS = 200
 TOUCHES = 100
-"""That a builder makes to measure a median or a worst time."""
+"""That a builder makes to measure a median or a worst time; likewise breaks."""
+AWAKE_US, LONGEST_US = 700, 2000
+"""When a board checks its lines after power-up, and after which a break must be reported."""
 CRYSTAL = 1e-4
 """By which a board's clock may be off."""
 PRESSED_N = 2.0
@@ -58,7 +62,7 @@ def _made(name: str, what: str, unit: str, values: Sequence[float], model: str, 
     low, high = np.quantile(values[1:] or values, [0.025, 0.975])
     value, low, high = (float(f"{one:.5g}") for one in (values[0], min(low, values[0]), max(high, values[0])))
     today = datetime.date.today()
-    return Prediction(name, what, unit, value, low, high, model, f"contactfpga {command}", today, _commit())
+    return Prediction(name, what, unit, value, low, high, model, command, today, _commit())
 
 
 def _commit() -> str:
@@ -68,32 +72,66 @@ def _commit() -> str:
 
 def _times(kit: Kit) -> Iterator[Prediction]:
     """Of the board and its bridge: what a builder finds who makes :data:`TOUCHES` touches."""
-    command = f"latency --kit {kit.name} --exact"
+    command = f"contactfpga latency --kit {kit.name} --exact"
     bridge = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
     found = stages.measure(kit.skin, bridge, host_touches=0)
     board, us = found.board, kit.skin.clock_hz / 1e6
     usb = Times.mixed(delivered(bridge, kit.skin.clock_hz, one.stream, one.byte) for one in board.recorded)
+    pin, last = (Times.of([getattr(one, name) / us for one in board.recorded]) for name in ("pin", "last"))
+    broken, here = reported(kit.skin), f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
     each = {
-        "contact": ("the pin `contact`", "gateware", Times.of([one.pin / us for one in board.recorded])),
-        "last_byte": ("the last byte on the wire", "gateware", Times.of([one.last / us for one in board.recorded])),
-        "host": ("the host's USB controller", "bridge", usb),
+        "contact": ("touch to the pin `contact`", "touches", "gateware", pin, command),
+        "last_byte": ("touch to the last byte on the wire", "touches", "gateware", last, command),
+        "host": ("touch to the host's USB controller", "touches", "bridge", usb, command),
+        "break": ("a line that breaks at the board to the pin `contact`", "breaks", "gateware", broken, here),
     }
     rng = np.random.default_rng(0)
-    for name, (where, model, times) in each.items():
+    for name, (what, tries, model, times, by) in each.items():
         for statistic, share in (("median", 0.5), ("worst", 1.0)):
             tried = rng.random((DRAWS, TOUCHES))
             shares = np.quantile(tried, share, axis=1)
             values = [times.quantile(share), *(times.quantile(one) for one in shares)]
             near = [values[0] * (1 - CRYSTAL), values[0] * (1 + CRYSTAL)]
-            said = f"touch to {where}, {statistic} of {TOUCHES} touches"
-            yield _made(f"{name}_{statistic}_us", said, "us", values + near, model, command)
+            said = f"{what}, {statistic} of {TOUCHES} {tries}"
+            yield _made(f"{name}_{statistic}_us", said, "us", values + near, model, by)
     rate = board.frames_per_s
     yield _made(
         "frames_per_s", "frames while a contact moves", "1/s", [rate, 0.99 * rate, 1.01 * rate], "gateware", command
     )
     yield _made("frame_bytes", "bytes of a frame with one contact", "bytes", [board.bytes], "gateware", command)
     edges = [1.0, 1 - CRYSTAL, 1 + CRYSTAL]
-    yield _made("alive_ms", "time between two edges of `alive`", "ms", edges, "gateware", f"build --kit {kit.name}")
+    yield _made(
+        "alive_ms", "time between two edges of `alive`", "ms", edges, "gateware", f"contactfpga build --kit {kit.name}"
+    )
+
+
+def reported(skin: Skin) -> Times:
+    """From a row or column of an untouched sheet that breaks at the board until `contact` tells it, as `fail_safe`
+    does: the first of each, at any instant between two checks."""
+    with CompiledBoard(skin, ["contact"]) as board:
+        return Times.mixed([_between_checks(board, {0: 0}, {}), _between_checks(board, {}, {0: 0})])
+
+
+def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[int, int]) -> Times:
+    """From the latest break that a check still finds to the earliest that it misses, to the clock."""
+
+    def told(start: int) -> int:
+        board.cut({}, {})
+        board.restart()
+        board.run(start)
+        board.take("contact")
+        board.cut(rows, columns)
+        board.run(LONGEST_US * clocks)
+        return int(board.take("contact")["cycle"][0])
+
+    clocks = board.skin.clock_hz // 10**6
+    found = AWAKE_US * clocks
+    check = missed = told(found)
+    while missed - found > 1:
+        middle = (found + missed) // 2
+        found, missed = (middle, missed) if told(middle) == check else (found, middle)
+    us = np.array([check - found, told(missed) - missed]) / clocks
+    return Times(us[:1], us[1:], np.ones(1))
 
 
 def _near(rng: np.random.Generator, share: float) -> float:
@@ -131,7 +169,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
     nominal = extracted(lay_out(skin, stated)).circuit
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
-    needs = [needed(one, skin.row_lines, skin.column_lines, skin.diodes) for one in drawn]
+    needs = [needed_by(skin, one) for one in drawn]
     values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
         "settle_us": (
             "a row selected until the slowest column reads right",
@@ -156,7 +194,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
             "touched_v": ("a touched row while one column feeds all rows", "V", lambda one: one.touched.level_v),
             "feeding_ma": ("the pin of a column that feeds all rows", "mA", lambda one: one.touched.pin_ma),
         }
-    command = f"settle --kit {kit.name} --margin 1"
+    command = f"contactfpga settle --kit {kit.name} --margin 1"
     for name, (what, unit, of) in values.items():
         yield _made(name, what, unit, [of(one) for one in needs], "circuit", command)
 
@@ -181,7 +219,7 @@ def _cover(kit: Kit) -> Iterator[Prediction]:
     rng = np.random.default_rng(2)
     covers = [nominal, *(drawn_cover(nominal, rng) for _ in range(DRAWS))]
     closing = np.array([closing_n(cover, pitch_m, seed) for seed, cover in enumerate(covers)])
-    command = f"cover felt --kit {kit.name}"
+    command = f"contactfpga cover felt --kit {kit.name}"
     for number, (x, y) in enumerate(PLACES):
         what = f"force of a fingertip whose middle is {x:g} and {y:g} pitches from a switch's when it is felt"
         yield _made(f"closing_{number}_n", what, "N", list(closing[:, number]), "cover", command)

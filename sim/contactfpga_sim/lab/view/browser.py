@@ -6,8 +6,7 @@ import contextlib
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,10 @@ WATCH = """
     const context = probe.getContext('2d', {willReadFrequently: true});
     const now = () => performance.timeOrigin + performance.now();
     document.addEventListener('pointerup', () => { window.clicked_ms = now(); }, true);
+    window.box = () => {
+        const box = canvas.getBoundingClientRect();
+        return [box.x, box.y, box.width, box.height];
+    };
     window.pixels = (x, y) => {
         context.clearRect(0, 0, 9, 9);
         context.drawImage(canvas, x * canvas.width - 4, y * canvas.height - 4, 9, 9, 0, 0, 9, 9);
@@ -93,6 +96,7 @@ class Visitor:
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
         """From the first to the last, which is held for a while; the button stays down."""
         self.page.mouse.move(*self._pixel(*places[0]))
+        self.page.wait_for_timeout(hold_ms)  # the page finds out what the mouse is over
         self.page.mouse.down()
         for place in places[1:]:
             self.page.mouse.move(*self._pixel(*place), steps=8)
@@ -110,8 +114,8 @@ class Visitor:
 
     def _pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
         x, y = self.place(x_mm, y_mm)
-        size = self.page.viewport_size
-        return x * size["width"], y * size["height"]
+        left, top, width, height = self.page.evaluate("window.box()")
+        return left + x * width, top + y * height
 
 
 def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -122,8 +126,8 @@ def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def visit(shown: ServedView, width: int = 1100, height: int = 680) -> Iterator[Visitor]:
-    """Open a view in a browser while a thread keeps it going."""
+def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = False) -> Iterator[Visitor]:
+    """Open a view in a browser while a thread keeps it going; ``dark``: whether its user likes dark pages."""
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError as error:
@@ -134,7 +138,9 @@ def visit(shown: ServedView, width: int = 1100, height: int = 680) -> Iterator[V
     with running(shown), sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(SOFTWARE))
         try:
-            yield Visitor(browser.new_page(viewport={"width": width, "height": height}), shown)
+            scheme: Any = "dark" if dark else "light"
+            page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+            yield Visitor(page, shown)
         finally:
             browser.close()
 
@@ -163,11 +169,8 @@ def running(shown: ServedView) -> Iterator[None]:
         raise failed[0]
 
 
-def screenshot(visitor: Visitor, path: Path, before: Callable[[], None] = lambda: None) -> Path:
-    """What the page shows, without the notice that it is drawn by the processor; ``before``: done just before it."""
+def tidy(visitor: Visitor) -> None:
+    """Close the notice that the page is drawn by the processor."""
     if visitor.page.locator("text=Software WebGL rendering detected").count():
         visitor.page.locator("button.mantine-Notification-closeButton").first.click()
         visitor.page.wait_for_timeout(500)
-    before()
-    visitor.page.screenshot(path=str(path))
-    return path

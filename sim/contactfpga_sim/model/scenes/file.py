@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import is_finite, shown
+from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, GrowingPatch, M, Shape, Track, Value, approaching
@@ -163,7 +163,7 @@ def _kind(where: str, given: Any) -> Kind:
 def _keys(what: str, values: dict[str, Any], known: Any) -> None:
     for key in values:
         if key not in known:
-            raise SceneFileError(f"{what} has the key {shown(key)}; known are {', '.join(known)}")
+            raise SceneFileError(f"{what} has the key {shown(key)}; {suggestion(key, known)}")
 
 
 def _size(where: str, name: str, value: Any) -> Range:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga.design.cover import Cover, Load, cells_of
+from contactfpga.inputs.values import suggestion
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import cells, contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Round, Swing
@@ -226,7 +227,7 @@ def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> Cell
         shape = SHAPES[name](skin.rows, skin.columns)
         return lambda seconds: shape
     if not name.endswith((".npy", ".npz")):
-        raise ValueError(f"scene {name!r} is not known; take a .npy or .npz file or one of {', '.join(NAMES)}")
+        raise ValueError(f"scene {name!r} is not known, and no .npy or .npz file; {suggestion(name, NAMES)}")
     return Recording.load(name).on(skin)
 
 

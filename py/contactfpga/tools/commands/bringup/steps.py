@@ -136,19 +136,23 @@ def switches(bench: Bench) -> Step:
 
 
 class _Alike:
-    """Lines that never read otherwise than another one."""
+    """Lines that never read otherwise than another one, in frames that are as the one before: a switch that moves
+    between two rows of a scan shows in one of them first."""
 
     def __init__(self) -> None:
         self._last: np.ndarray | None = None
+        self._rests = False
         self._differ: list[np.ndarray] | None = None
         self._seen: list[np.ndarray] | None = None
 
     def take(self, zones: Zones) -> None:
         """One more frame."""
         assert zones.cells is not None
-        if self._last is not None and (zones.cells == self._last).all():
-            return
+        before, rested = self._last, self._rests
         self._last = zones.cells
+        self._rests = before is not None and bool((zones.cells == before).all())
+        if rested or not self._rests:
+            return
         ways = (zones.cells, zones.cells.T)
         differ = [np.asarray((lines[:, None] != lines[None]).any(axis=2)) for lines in ways]
         seen = [np.asarray(lines.any(axis=1)) for lines in ways]

@@ -15,7 +15,7 @@ EXTRA = "sim"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
-    parser.add_argument("--design", metavar="FILE.toml", help="Case to draw (default: the paper's).")
+    parser.add_argument("--case", metavar="CASE", help="Case to draw: a .toml file (default: the paper's).")
     data = "Forces in N and deformations in m; draw their line too."
     parser.add_argument("--data", metavar="FILE.csv", help=data)
     flags.output(parser, "build/cover")
@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
     folder = outputs.folder(args.output)
     from contactfpga.design.cover import drawing  # matplotlib, which only drawing needs
 
-    task = Task.load(args.design) if args.design else FIRST_DESIGN
+    task = Task.load(args.case) if args.case else FIRST_DESIGN
     data = line.read(args.data) if args.data else None
     files = drawing.draw(folder, args.format, task, data)
     known: dict[str, Any] = {"files": [str(file) for file in files]}

@@ -47,7 +47,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     strength = "Yield strength; refuse an impact from which the foam does not spring back."
     foam.add_argument("--yield-strength", type=cover.PASCAL, metavar="PA", help=strength)
     method = "How the equation of motion is solved (default: auto)."
-    parser.add_argument("--method", choices=METHODS, default="auto", help=method)
+    parser.add_argument("--solver", choices=METHODS, default="auto", help=method)
     cover.json_flag(parser)
 
 
@@ -105,12 +105,12 @@ def _struck(args: argparse.Namespace, arm: Arm) -> Impact | NoSolution:
             arm,
             args.speed,
             elastic.stiffness(ball),
-            method=args.method,
+            method=args.solver,
             thickness_m=args.thickness,
             yield_m=_yield(args, ball),
         )
-    if args.method not in ("auto", "quadrature"):
-        raise CoverError(f"method is {args.method!r}; the modulus for a time is found by 'auto' only")
+    if args.solver not in ("auto", "quadrature"):
+        raise CoverError(f"solver is {args.solver!r}; the modulus for a time is found by 'auto' only")
     answer = impact.stiffness_for(arm, args.speed, args.time, thickness_m=args.thickness)
     if isinstance(answer, NoSolution):
         return answer

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.inputs.files import read_small, told
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import shown, suggestion
 from contactfpga.robot.haptics.contact import Touch
 from contactfpga.robot.haptics.units import LoadCells, Unit
 from contactfpga.robot.haptics.values import HapticsError, direction, matrix, number, positive, vector
@@ -97,5 +97,5 @@ def _table(name: str, values: Any, keys: tuple[str, ...]) -> dict[str, Any]:
         raise HapticsError(f"{name} is {shown(values)}; it must be an object with {', '.join(keys)}")
     for key in values:
         if key not in keys:
-            raise HapticsError(f"unknown key {shown(key)} in {name}; known are {', '.join(keys)}")
+            raise HapticsError(f"unknown key {shown(key)} in {name}; {suggestion(key, keys)}")
     return values

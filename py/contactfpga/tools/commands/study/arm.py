@@ -28,9 +28,9 @@ PLACES = 60
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
     case = "Case to run: paper, paper-offset, push or a .toml file (default: paper)."
-    parser.add_argument("--case", default="paper", metavar="NAME", help=case)
-    late, usual = numbers.number(0, 10_000, "ms"), "Latency from the switch to the controller (default: the paper's 6)."
-    parser.add_argument("--latency", type=late, default=6.0, metavar="MS", help=usual)
+    parser.add_argument("--case", default="paper", metavar="CASE", help=case)
+    late, usual = numbers.number(0, 1e7, "us"), "Latency from the switch to the controller (default: the paper's 6000)."
+    parser.add_argument("--latency-us", type=late, default=6000.0, metavar="US", help=usual)
     many, places = (
         numbers.whole(0, 10_000),
         "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place).",
@@ -40,8 +40,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
     charts = "Draw force, safe speed and thickness against latency instead."
     parser.add_argument("--charts", action="store_true", help=charts)
-    units = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
-    parser.add_argument("--units", action="store_true", help=units)
+    force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
+    parser.add_argument("--force-threshold", action="store_true", help=force)
     flags.workers(parser)
     flags.output(parser, "build/arm")
 
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     case = Case.load(args.case)
     if args.charts:
         return _charts(args, case)
-    if args.units:
+    if args.force_threshold:
         return _units(args, case)
     return _pushes(args, case) if case.control.behavior == "comply" else _contact(args, case)
 
@@ -64,12 +64,12 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
 
     skin = Skin.load(args.skin) if args.skin else None
     folder = None if args.json else outputs.folder(args.output)
-    late = f"{args.latency:g} ms"
+    late = f"{1e-3 * args.latency_us:g} ms"
     count = args.places if args.places is not None else PLACES * (len(case.touch) == 1)
     touched = _anywhere(args, case, skin or Skin(), count) if count else None
     if folder is not None and touched is not None:
         tables.show(anywhere.lines(case, touched, late), title=f"Case {args.case}: touches anywhere on the sheet")
-    found = report.columns(case, args.case, 1e-3 * args.latency, skin)
+    found = report.columns(case, args.case, 1e-6 * args.latency_us, skin)
     if folder is None:
         known = report.as_json(found, args.case)
         if touched is not None:
@@ -90,7 +90,7 @@ def _anywhere(args: argparse.Namespace, case: Case, skin: Skin, count: int) -> a
     from contactfpga_sim.lab.pool import executor, progress
 
     places.check(case)
-    ways = anywhere.ways(case, skin, 1e-3 * args.latency)
+    ways = anywhere.ways(case, skin, 1e-6 * args.latency_us)
     with executor(args.jobs, args.dask) as workers, progress() as step:
         return anywhere.touched(places.batches(case, skin, ways, count), workers, step)
 
@@ -100,7 +100,8 @@ def _units(args: argparse.Namespace, case: Case) -> int:
     from contactfpga_sim.lab.arm import report
 
     if args.skin is not None or case.control.behavior == "comply":
-        raise ContactFPGAError("--units runs its own Skin, with a case that reverses; leave --skin and such a case out")
+        what = "--force-threshold runs its own Skin, with a case that reverses"
+        raise ContactFPGAError(f"{what}; leave --skin and such a case out")
     lines = report.defense_lines(case)
     if args.json:
         print(json.dumps([dict(zip(lines[0], line)) for line in lines[1:]], indent=2))

@@ -25,7 +25,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--family", action="append", metavar="NAME", help="Use only these scenes; can be repeated.")
     count, usual = numbers.whole(1, 1_000_000), "Number of scenes per point (default: 400)."
     parser.add_argument("--placements", type=count, default=400, metavar="N", help=usual)
-    parser.add_argument("--seed", type=numbers.SEED, default=0, help="Seed of the placements (default: 0).")
+    parser.add_argument(
+        "--seed", type=numbers.SEED, default=0, metavar="N", help="Seed of the placements (default: 0)."
+    )
     flags.workers(parser)
     parser.add_argument("--no-size", action="store_true", help="Leave out place and route.")
     flags.output(parser, "build/chart")

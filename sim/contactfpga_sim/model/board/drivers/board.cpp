@@ -457,15 +457,21 @@ EXPORT void board_slow(Board *board, const double *row_factor, const double *col
     for (unsigned column = 0; column < COLUMN_LINES; column++)
         matrix.column_factor[line_of_column[column]] = column_factor[column];
 }
-EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
+
+// Those that run return the fights so far, so that nobody has to ask for them.
+EXPORT uint64_t board_run(Board *board, uint64_t cycles) {
+    board->run(cycles);
+    return board->matrix.fights;
+}
 
 // Each of `frames` sheets is pressed for `cycles`.
-EXPORT void board_hold(Board *board, const uint64_t *cells, size_t frames, uint64_t cycles) {
+EXPORT uint64_t board_hold(Board *board, const uint64_t *cells, size_t frames, uint64_t cycles) {
     for (; frames--; cells += ROWS) {
         for (unsigned row = 0; row < ROWS; row++)
             board->matrix.press(row, cells[row]);
         board->run(cycles);
     }
+    return board->matrix.fights;
 }
 
 EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
@@ -474,10 +480,8 @@ EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
 
 EXPORT void board_pull_low(Board *board, uint64_t cycles) { board->sender.low = cycles; }
 
-EXPORT const Event *board_events(Board *board, unsigned boundary, size_t *count) {
-    *count = board->events[boundary].size();
-    return board->events[boundary].data();
-}
+EXPORT size_t board_count(Board *board, unsigned boundary) { return board->events[boundary].size(); }
+EXPORT const Event *board_events(Board *board, unsigned boundary) { return board->events[boundary].data(); }
 EXPORT void board_forget(Board *board, unsigned boundary) { board->events[boundary].clear(); }
 
 #ifdef STATE

@@ -132,8 +132,6 @@ EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
     board->sender.bytes.insert(board->sender.bytes.end(), bytes, bytes + count);
 }
-EXPORT const Event *board_events(Board *board, unsigned boundary, size_t *count) {
-    *count = board->events[boundary].size();
-    return board->events[boundary].data();
-}
+EXPORT size_t board_count(Board *board, unsigned boundary) { return board->events[boundary].size(); }
+EXPORT const Event *board_events(Board *board, unsigned boundary) { return board->events[boundary].data(); }
 EXPORT void board_forget(Board *board, unsigned boundary) { board->events[boundary].clear(); }

@@ -1,0 +1,161 @@
+"""What is known of a board, however its frames are waited for."""
+
+from __future__ import annotations
+
+import math
+from typing import NoReturn
+
+from contactfpga.driver.events import Silence, checked_deadline
+from contactfpga.driver.link import Link
+from contactfpga.driver.stats import Stats
+from contactfpga.driver.subscription import Events, Subscription
+from contactfpga.driver.transport import counters_of
+from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import Faults
+from contactfpga.wire.hello import Hello
+from contactfpga.zones.units import UnitHistory
+
+
+class BoardFacts:
+    """An open port, what its board said about itself, and queues of its frames."""
+
+    def __init__(self, link: Link, frames: Subscription, expected: Skin | None):
+        self._link, self._frames, self._expected = link, frames, expected
+
+    def __repr__(self) -> str:
+        try:
+            sheet = self.sheet
+        except ContactFPGAError as error:
+            return f"<Board {error}>"
+        return f"<Board {self.port}: {sheet.rows}x{sheet.columns} cells>"
+
+    def __reduce__(self) -> NoReturn:
+        """Not even a copy: the end of one would close the port of the other."""
+        raise TypeError(f"{self.port}: an open board cannot be copied or sent to another process; open its port there")
+
+    @property
+    def port(self) -> str:
+        """Name of the port."""
+        return self._link.transport.name
+
+    @property
+    def live(self) -> bool:
+        """Whether a board that answers requests is at the other end; False for a recording."""
+        return self._link.transport.live
+
+    @property
+    def hello(self) -> Hello:
+        """What the board last said about itself, which it does twice per second."""
+        self._link.check_open()
+        if self._link.conversation.hello is None:
+            raise ContactFPGAError(f"{self.port}: no hello has come yet")
+        return self._link.conversation.hello
+
+    @property
+    def sheet(self) -> Sheet:
+        """Lines, lengths and report of the board's sheet, from its hello."""
+        return self.hello.sheet
+
+    @property
+    def name(self) -> str:
+        """The name in the board's Skin; "" if it has none."""
+        return self.hello.name
+
+    @property
+    def fingerprint(self) -> bytes:
+        """Fingerprint of the Skin the board was built from."""
+        return self.hello.fingerprint
+
+    @property
+    def clock_hz(self) -> int:
+        """Clock of the board's gateware in Hz."""
+        return self.hello.clock_hz
+
+    @property
+    def baud(self) -> int:
+        """The board's baud rate."""
+        return self.hello.baud
+
+    @property
+    def skin(self) -> Skin:
+        """The board's whole Skin: the one given to :func:`open`, or the reference Skin if the board has its
+        fingerprint.
+
+        Raises :class:`ContactFPGAError` for any other board, whose hello describes only the :attr:`sheet`.
+        """
+        hello = self.hello
+        for skin in (self._expected, Skin()):
+            if skin is not None and skin.fingerprint == hello.fingerprint:
+                return skin
+        raise ContactFPGAError(
+            f"{self.port}: of this board's Skin only `board.sheet` is known (fingerprint {hello.fingerprint.hex()}); "
+            "give its file: open(port, skin='my.toml')"
+        )
+
+    @property
+    def faults(self) -> Faults | None:
+        """Faults of its lines, as the board last reported them. It does so within 1 ms of a change and after each
+        hello, even when it sends no frame. None if it reported none yet, or its Skin has neither ``guard`` nor
+        ``self_test``."""
+        self._link.check_open()
+        return self._link.conversation.lines.told
+
+    @property
+    def unit_history(self) -> UnitHistory | None:
+        """The last readings of its pressure units, which are in :attr:`Zones.units`, too; None if it has no units."""
+        self._link.check_open()
+        return self._link.conversation.units.history
+
+    @property
+    def silence(self) -> Silence:
+        """How long no frame has come, since the last frame or since the port was opened, and which frame came last."""
+        self._link.check_open()
+        with self._link.changed:
+            return self._link.silence(-math.inf)
+
+    @property
+    def stats(self) -> Stats:
+        """Counters since the port was opened."""
+        stats = self._link.conversation.stats
+        stats.dropped = self._frames.dropped
+        stats.net = counters_of(self._link.transport)
+        return stats
+
+    def clock(self) -> float:
+        """Seconds on the clock that timeouts use: ``time.monotonic``, or simulated time for ``sim://``."""
+        return self._link.clock()
+
+    # ---- queues
+
+    def subscribe(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Subscription:
+        """A separate queue for every frame from now on; see :class:`Subscription`.
+
+        With ``deadline_s`` it raises :class:`NoData` when no frame comes for longer than that. The deadline must be at
+        least as long as a working board may need: a scan and a frame on the wire, or with ``send = "on_change"`` its
+        keep-alive and a frame. It has no effect in a recording, which has no times of arrival.
+        """
+        self._link.check_open()
+        deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
+        return Subscription(self._link, maxsize, self, deadline_s)
+
+    def events(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Events:
+        """The same for everything that comes: frames, changes of faults, silence; see :class:`Events`. ``deadline_s``
+        as for :meth:`subscribe`, but silence is an event like the others."""
+        self._link.check_open()
+        deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
+        return Events(self._link, maxsize, self, deadline_s)
+
+    def _checked(self, name: str, deadline_s: float) -> float:
+        try:
+            skin: Skin | None = self.skin
+        except ContactFPGAError:
+            skin = None
+        return checked_deadline(name, deadline_s, self.hello, skin)
+
+    # ---- its end
+
+    def close(self) -> None:
+        """Give the port back; may be called twice. Calls that wait in other threads raise :class:`BoardClosed`."""
+        self._link.close()

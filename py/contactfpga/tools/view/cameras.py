@@ -1,0 +1,136 @@
+"""Cameras that hold what is shown in full, however large the window is, and the sides it can be looked at from."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactfpga.tools.view.tiles import Tiles
+
+if TYPE_CHECKING:
+    import viser
+
+FOV_RAD = math.radians(32)
+"""Vertical field of view."""
+ROOM = 1.04
+"""What is fitted may fill the window but for this much."""
+FIRST = 1.6
+"""Width over height of a window that has not told its size yet."""
+NEAR = 0.02
+"""The nearest that is drawn, of the distance."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Side:
+    """Where a camera looks from."""
+
+    toward: np.ndarray
+    """(3,) from what is shown toward the camera."""
+    up: np.ndarray
+    """(3,) what is up in its picture, not parallel to the other one."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Placed:
+    """A camera, in m."""
+
+    position: np.ndarray
+    look_at: np.ndarray
+    """In the middle of its picture, as deep as the middle of what is fitted."""
+
+
+def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_RAD) -> Placed:
+    """The nearest camera on this side whose picture holds all (n, 3) points, in the middle; ``aspect``: its width over
+    its height.
+
+    A camera at c sees a point p where ``|(p - c) . right| <= t (p - c) . ahead``, and the same upward. Along each of
+    both, the two outermost points bound how far ahead c may be, and then c lies midway between them.
+    """
+    ahead = -side.toward / np.linalg.norm(side.toward)
+    right = np.cross(ahead, side.up)
+    if np.linalg.norm(right) < 1e-6:  # straight from above: any way is up
+        right = np.cross(ahead, np.eye(3)[np.abs(ahead).argmin()])
+    right /= np.linalg.norm(right)
+    upward = np.cross(right, ahead)
+    depths = points @ ahead
+    rise = math.tan(fov_rad / 2) / ROOM
+    spans = []
+    for axis, slope in ((right, rise * aspect), (upward, rise)):
+        low, high = (float((sign * (points @ axis) - slope * depths).max()) for sign in (-1, 1))
+        spans.append(((high - low) / 2, -(low + high) / (2 * slope)))
+    (across, far_x), (up, far_y) = spans
+    depth = min(far_x, far_y)
+    position = across * right + up * upward + depth * ahead
+    middle = (float(depths.min()) + float(depths.max())) / 2
+    return Placed(position, position + (middle - depth) * ahead)
+
+
+def sides_of(tiles: Tiles) -> dict[str, Side]:
+    """Of a sheet: obliquely, straight at it, along it, and from behind. One around a limb lies, with row 0 on the
+    left."""
+    if tiles.sheet.radius_mm is None:
+        normal, away, aside = (each.mean(0) for each in (tiles.normals, tiles.along_y, tiles.along_x))
+        return {
+            "overview": Side(0.8 * normal - 0.55 * away - 0.12 * aside, normal),
+            "front": Side(normal, away),
+            "side": Side(aside + 0.35 * normal, normal),
+            "back": Side(0.6 * away + 0.8 * normal, normal),
+        }
+    column = tiles.sheet.columns // (8 if tiles.sheet.closed else 2)
+    front, along = tiles.normals[column], tiles.along_y[column]
+    up = np.cross(front, along)
+    return {
+        "overview": Side(front + 0.45 * up + 0.5 * along, up),
+        "front": Side(front, up),
+        "side": Side(along + 0.8 * front + 0.3 * up, up),
+        "back": Side(-front, up),
+    }
+
+
+class Cameras:
+    """Sets the camera of each browser: first, when its window changes its size, and to a side that is asked for."""
+
+    def __init__(self, server: viser.ViserServer, sides: Mapping[str, Side], points: Callable[[], np.ndarray]):
+        self.sides, self._points = sides, points
+        self._sizes: dict[int, tuple[int, int]] = {}
+        self._first = next(iter(sides))
+        begins = server.initial_camera
+        placed = fitted(points(), sides[self._first], FIRST)
+        begins.fov = FOV_RAD
+        begins.position, begins.look_at = tuple(placed.position), tuple(placed.look_at)
+        begins.near = NEAR * float(np.linalg.norm(placed.position - placed.look_at))
+        server.scene.set_up_direction(tuple(sides[self._first].up))
+        server.on_client_connect(self._follow)
+        server.on_client_disconnect(lambda client: self._sizes.pop(client.client_id, None))
+
+    def show(self, client: Any, name: str) -> None:
+        """Turn this browser's camera to a side."""
+        self.look(client.camera, self.sides[name])
+
+    def look(self, camera: Any, side: Side) -> None:
+        """Have this camera hold all that is shown, from there."""
+        placed = fitted(self._points(), side, camera.aspect, camera.fov)
+        with camera.client.atomic():
+            camera.up_direction = side.up
+            camera.position = placed.position
+            camera.look_at = placed.look_at
+
+    def _follow(self, client: Any) -> None:
+        self._sizes[client.client_id] = _size(client.camera)
+        self.show(client, self._first)
+        client.camera.on_update(self._resized)
+
+    def _resized(self, camera: Any) -> None:
+        """Fit again from where it looks, where the window's size is another one."""
+        size = _size(camera)
+        if self._sizes.get(camera.client.client_id) != size:
+            self._sizes[camera.client.client_id] = size
+            self.look(camera, Side(camera.position - camera.look_at, camera.up_direction))
+
+
+def _size(camera: Any) -> tuple[int, int]:
+    return camera.image_width, camera.image_height

@@ -1,0 +1,104 @@
+"""What is known of each contact, in words: beside it on the sheet, and in the panel's table."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import math
+from collections.abc import Iterable, Sequence
+
+from contactfpga.tools.view.sources import Moment
+from contactfpga.tracking.tracks import Track
+from contactfpga.zones.zone import Zone
+
+MOST = 8
+"""Contacts that have all that is known written beside them; where there are more, the others have their ids alone."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One contact, or a zone that no contact is followed in."""
+
+    id: int | None
+    x_mm: float | None
+    """None: it goes all the way round."""
+    y_mm: float | None
+    area_mm2: float
+    area_cells: int
+    age_s: float | None
+    force_n: float | None = None
+    """None: nobody measures it."""
+    link: str = ""
+
+    @property
+    def place(self) -> str:
+        """In mm."""
+        if self.y_mm is None or math.isnan(self.y_mm):
+            return "nowhere"
+        return f"{'all round' if self.x_mm is None else f'{self.x_mm:.1f}'}, {self.y_mm:.1f}"
+
+    @property
+    def name(self) -> str:
+        """Its link, where there are several, and its id."""
+        return f"{self.link} {'' if self.id is None else f'#{self.id}'}".strip()
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """Name and place; what else is known."""
+        parts = [f"{self.area_mm2:,.0f} mm²"]
+        parts += [] if self.age_s is None else [f"{self.age_s:.1f} s"]
+        parts += [] if self.force_n is None else [f"{self.force_n:.1f} N"]
+        return f"{self.name}   {self.place} mm".strip(), "   ".join(parts)
+
+
+def rows(moment: Moment, link: str = "") -> list[Row]:
+    """Of a moment's contacts in order of their ids, then of the zones without one."""
+    found = [_row(track.zone, link, track, moment) for track in moment.tracks.active]
+    return found + [_row(zone, link) for zone in moment.tracks.unsure]
+
+
+def _row(zone: Zone, link: str, track: Track | None = None, moment: Moment | None = None) -> Row:
+    number = age_s = force_n = None
+    if track is not None and moment is not None:
+        number, age_s = track.id, max(0.0, (moment.tracks.time_us - track.since_us) / 1e6)
+        force_n = force_at(zone, moment.pushes)
+    return Row(number, zone.x_mm, zone.y_mm, zone.area_mm2, zone.area_cells, age_s, force_n, link)
+
+
+def force_at(zone: Zone, pushes: Sequence[tuple[Zone, float | None]]) -> float | None:
+    """The push of the measured zone that is nearest, and no further off than this zone is wide: what was measured is
+    some milliseconds older."""
+    if zone.x_mm is None or zone.y_mm is None:
+        return None
+    away = [(math.hypot((o.x_mm or 0.0) - zone.x_mm, (o.y_mm or 0.0) - zone.y_mm), n) for o, n in pushes]
+    nearest, push = min(away, key=lambda each: each[0], default=(math.inf, None))
+    return push if nearest <= 2 * math.sqrt(zone.area_mm2 / math.pi) else None
+
+
+def table(found: Sequence[Row], no_data: bool = False) -> str:
+    """HTML. Names of links come from strangers and are escaped."""
+    if no_data:
+        return _framed("No data", "")
+    count = len(found)
+    head = "Nothing touches" if not count else f"{count} contact{'' if count == 1 else 's'}"
+    if not count:
+        return _framed(head, "")
+    forced = any(row.force_n is not None for row in found)
+    names = ["", "x, y in mm", "mm²", "age, s", *(["N"] if forced else [])]
+    lines = [_line("th", names)]
+    body = [_line("td", _cells(row, forced)) for row in found]
+    return _framed(head, f'<table class="contacts"><thead>{lines[0]}</thead><tbody>{"".join(body)}</tbody></table>')
+
+
+def _cells(row: Row, forced: bool) -> list[str]:
+    age = "" if row.age_s is None else f"{row.age_s:.1f}"
+    force = "" if row.force_n is None else f"{row.force_n:.1f}"
+    return [row.name, row.place, f"{row.area_mm2:,.0f}", age, *([force] if forced else [])]
+
+
+def _line(tag: str, texts: Iterable[str]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{html.escape(text)}</{tag}>' for text in texts)}</tr>"
+
+
+def _framed(head: str, inner: str) -> str:
+    return f'<div class="contact-list"><b>{head}</b>{inner}</div>'

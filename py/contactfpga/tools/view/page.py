@@ -1,0 +1,91 @@
+"""How viser's page looks here: its panel under the sheet on a phone, and none of its own marks over the sheet;
+and a picture of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import viser
+
+PANEL_PX = 330
+"""Width of the panel beside the sheet."""
+
+STYLE = """
+@media (max-width: 36em) {
+  :has(> .mantine-Paper-root[style*="bottom: 0"]) { flex-direction: column; }
+  :has(+ .mantine-Paper-root[style*="bottom: 0"]) { height: auto !important; min-height: 0; }
+  .mantine-Paper-root[style*="bottom: 0"] {
+    position: relative !important; width: 100% !important; max-height: 46% !important; flex-shrink: 0;
+  }
+  .mantine-Paper-root[style*="bottom: 0"] div[style*="width: 20em"] { width: auto !important; }
+}
+.contacts { width: 100%; border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabular-nums; }
+.contacts th { font-weight: 500; opacity: 0.65; text-align: right; padding: 0.1rem 0.3rem; }
+.contacts td { text-align: right; padding: 0.1rem 0.3rem; white-space: nowrap; }
+.contacts th:first-child, .contacts td:first-child { text-align: left; }
+.contacts tbody tr { border-top: 1px solid var(--mantine-color-default-border); }
+.contact-list { padding: 0.4rem 0.6rem; min-height: 8.2rem; }
+.chart { padding: 0 0.6rem; }
+.contact-list b { font-size: 0.95rem; }
+"""
+
+SCRIPT = """
+(() => {
+  const style = document.createElement("style");
+  style.textContent = STYLE;
+  document.head.append(style);
+  addEventListener("pointerdown", () => {
+    window.__viserTestpoints?.devSettings.set({enableOrbitCrosshair: false});
+    for (const one of window.__viserMutable?.scene?.children ?? [])
+      if (one.line && one.cone) one.line.visible = one.cone.visible = false;
+  }, true);
+  window.contactfpgaPicture = (lines) => {
+    const seen = window.__viserMutable.canvas, card = document.createElement("canvas");
+    const size = 14 * seen.width / seen.clientWidth, step = 1.6 * size;
+    card.width = seen.width;
+    card.height = seen.height + step * (lines.length + 1);
+    const pen = card.getContext("2d"), colors = getComputedStyle(document.body);
+    pen.fillStyle = colors.backgroundColor;
+    pen.fillRect(0, 0, card.width, card.height);
+    pen.drawImage(seen, 0, 0);
+    pen.fillStyle = colors.color;
+    lines.forEach((line, number) => {
+      pen.font = `${number ? "" : "bold "}${size}px sans-serif`;
+      pen.fillText(line, size, seen.height + step * (number + 1));
+    });
+    card.toBlob((file) => {
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(file);
+      link.download = "contactfpga.png";
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
+  };
+})();
+"""
+"""Before a drag: without viser's arrow from its beginning to the mouse, and without the cross it turns around. And a
+picture of what is seen, in the page's colors, with lines of text under it."""
+
+
+def dress(server: viser.ViserServer) -> None:
+    """For all who come. viser has no setting for any of this, but sends a script to the page where a part of it asks
+    for one."""
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    server.gui.set_panel_label("contactfpga")
+    server.gui.main_panel.dock_right()
+    server.gui.main_panel.set_width(PANEL_PX)
+    _run(server._websock_server, SCRIPT.replace("STYLE", json.dumps(STYLE)))
+
+
+def picture(client: Any, lines: Sequence[str]) -> None:
+    """Have this browser save what it shows as `contactfpga.png`, with these lines under it."""
+    _run(client._websock_connection, f"window.contactfpgaPicture({json.dumps(list(lines))})")
+
+
+def _run(to: Any, source: str) -> None:
+    from viser import _messages
+
+    to.queue_message(_messages.RunJavascriptMessage(source))

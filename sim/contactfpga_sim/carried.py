@@ -1,0 +1,81 @@
+"""What the package carries as WebAssembly: boards, and the C header for a page in a browser.
+
+    python -m contactfpga_sim.carried
+
+builds those that are not of these sources, in a clone and with the extra ``release``, which is not needed where the
+gateware is what it was and only its text is another one.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from contactfpga import terminal
+from contactfpga.shipped import examples
+from contactfpga.skin import Skin
+from contactfpga.tools.view import opening
+from contactfpga_sim import demo
+from contactfpga_sim.model.board import compiled, webassembly
+
+DECODER = "decoder"
+_DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
+
+
+def skins() -> dict[str, Skin]:
+    """By name: what ``sim://`` and ``view`` show by themselves, what ``make sim`` runs, and the kits."""
+    kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
+    shown = {"reference": Skin(), "view": opening.own_skin(), "view-flat": opening.own_skin(flat=True)}
+    return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
+
+
+def keys() -> dict[str, str]:
+    """By name the key that each file has to have."""
+    boards = {name: compiled.carried_key(skin) for name, skin in skins().items()}
+    return boards | {DECODER: webassembly.c_key(_DECODER_C)}
+
+
+def stale() -> list[str]:
+    """Names of files that are missing, damaged, or not built from these sources."""
+    return [name for name, key in keys().items() if webassembly.file(key) is None]
+
+
+def check() -> None:
+    """End the program where the package would be released with one of them."""
+    if names := stale():
+        sys.exit(f"{', '.join(names)}: not built from these sources; run python -m contactfpga_sim.carried")
+
+
+def build(name: str) -> bytes:
+    """What a file holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        if name == DECODER:
+            return webassembly.build_c(_DECODER_C, Path(folder))
+        return webassembly.build_board(compiled.model_of(skins()[name]), Path(folder))
+
+
+def main() -> int:
+    """Build what is of another design, and write the list."""
+    files, late = dict(webassembly.listed()["files"]), stale()
+    for name, key in keys().items():
+        if name in late:
+            files[name] = {"key": key, "design": _renewed(name, files.get(name, {}))}
+    webassembly.write_list({name: files[name] for name in keys()})
+    terminal.say(f"{webassembly.FOLDER} is built from these sources.")
+    return 0
+
+
+def _renewed(name: str, before: dict[str, str]) -> str:
+    """The key of a file's design; the file is built where it is not of that design."""
+    design = webassembly.c_key(_DECODER_C) if name == DECODER else compiled.design_key(skins()[name])
+    path = webassembly.path_of(name)
+    whole = path.is_file() and webassembly.sum_of(path.read_bytes()) == before.get("sha256")
+    if not whole or design != before.get("design"):
+        path.write_bytes(data := build(name))
+        terminal.say(f"{name}: built, {len(data) / 1e3:.1f} kB")
+    return design
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""The view's page in a real browser: it fills windows of any size and fits again, in light and dark, without the
+library's marks, and keeps a picture."""
+
+import struct
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser")
+pytest.importorskip("playwright")
+pytest.importorskip("amaranth")
+
+from contactfpga.tools.view import opening
+from contactfpga_sim.lab.view import browser
+
+pytestmark = [
+    pytest.mark.slow,  # about a minute and a half: the browser draws with the processor
+    pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed"),
+]
+
+
+@pytest.fixture(scope="module")
+def seen():
+    with opening.opened(http_port=0) as shown, browser.visit(shown, 1280, 800) as visitor:
+        browser.tidy(visitor)
+        yield shown, visitor
+
+
+def extent(shown, visitor):
+    """Shares of the canvas that the forearm takes, from its own points."""
+    points = shown.view.stage.points_m
+    camera = next(iter(shown.web.get_clients().values())).camera
+    x, y, z = np.array([browser.turned(camera.wxyz, point - camera.position) for point in points]).T
+    scale = 0.5 / np.tan(camera.fov / 2) / z
+    return (0.5 + x * scale / camera.aspect), (0.5 + y * scale)
+
+
+def resized(shown, visitor, width, height):
+    """The canvas' left, top, width and height once it has settled, and the server knows of it."""
+    visitor.page.set_viewport_size({"width": width, "height": height})
+    wanted = (width - 334, height) if width > 500 else (width, 0.54 * height)
+    for _ in range(150):
+        left, top, wide, high = visitor.page.evaluate("window.box()")
+        aspect = next(iter(shown.web.get_clients().values())).camera.aspect
+        if (wide, high) == pytest.approx(wanted, abs=12) and aspect == pytest.approx(wide / high, abs=0.02):
+            break
+        visitor.page.wait_for_timeout(200)
+    visitor.page.wait_for_timeout(1500)
+    return left, top, wide, high
+
+
+def arrow(page):
+    """Whether viser's arrow of a drag is there, and whether any of it is drawn."""
+    return page.evaluate(
+        """() => {
+            const found = window.__viserMutable.scene.children.find((one) => one.line && one.cone);
+            return [found.visible, found.line.visible || found.cone.visible];
+        }"""
+    )
+
+
+def test_a_drag_presses_and_no_arrow_covers_the_sheet(seen):
+    shown, visitor = seen
+    sheet = shown.view.stage.tiles.sheet
+    visitor.drag(*((1.5 * sheet.pitch_x_mm, row * sheet.pitch_y_mm) for row in (4, 7, 9)), hold_ms=1000)
+    for _ in range(100):
+        if shown.hand.fingers and abs(shown.hand.fingers[0].y_mm - 90) < 2:
+            break
+        visitor.page.wait_for_timeout(100)
+    (finger,) = shown.hand.fingers
+    assert (finger.x_mm, finger.y_mm) == pytest.approx((1.5 * sheet.pitch_x_mm, 90), abs=3)
+    assert arrow(visitor.page) == [True, False]
+    visitor.page.mouse.up()
+
+
+def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
+    """Its height tells the lines of text: 1.6 times 14 pixels each, and one more."""
+    shown, visitor = seen
+    shown.hand.click(30, 50)
+    shown.hand.click(30, 110)
+    visitor.page.wait_for_selector("text=2 contacts", timeout=30_000)
+    width, height, shown_wide = visitor.page.evaluate(
+        "[window.__viserMutable.canvas.width, window.__viserMutable.canvas.height, window.box()[2]]"
+    )
+    with visitor.page.expect_download(timeout=60_000) as kept:
+        visitor.page.keyboard.press("p")
+    kept.value.save_as(tmp_path / "kept.png")
+    assert kept.value.suggested_filename == "contactfpga.png"
+    wide, high = struct.unpack(">II", (tmp_path / "kept.png").read_bytes()[16:24])
+    assert wide == width
+    assert high == pytest.approx(height + 4 * 1.6 * 14 * width / shown_wide, abs=2)
+    visitor.page.keyboard.press("l")
+    visitor.page.wait_for_selector("text=Nothing touches", timeout=30_000)
+    assert shown.hand.fingers == []
+
+
+def test_keys_and_buttons_turn_the_view_and_it_is_fitted(seen):
+    shown, visitor = seen
+    places = []
+    for key in "234":
+        visitor.page.keyboard.press(key)
+        visitor.page.wait_for_timeout(1500)
+        places.append(next(iter(shown.web.get_clients().values())).camera.position)
+        x, y = extent(shown, visitor)
+        assert max(np.ptp(x), np.ptp(y)) == pytest.approx(1 / 1.04, abs=0.02)
+    visitor.page.locator("button:has-text('overview')").click()
+    visitor.page.wait_for_timeout(1500)
+    places.append(next(iter(shown.web.get_clients().values())).camera.position)
+    assert min(np.linalg.norm(a - b) for i, a in enumerate(places) for b in places[:i]) > 0.1
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_is_dark_for_who_likes_it(seen, scheme):
+    shown, visitor = seen
+    page = visitor.page.context.browser.new_page(viewport={"width": 400, "height": 300}, color_scheme=scheme)
+    try:
+        page.goto(shown.url)
+        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached", timeout=60_000)
+        red, green, blue = page.evaluate("getComputedStyle(document.body).backgroundColor.match(/[0-9]+/g).map(Number)")
+        assert (red + green + blue < 150) == (scheme == "dark")
+    finally:
+        page.close()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1920, 1080), (1280, 800), (800, 600), (390, 844)])
+def test_the_forearm_fills_the_window_beside_or_above_the_panel(seen, width, height):
+    shown, visitor = seen
+    left, top, wide, high = resized(shown, visitor, width, height)
+    panel = visitor.page.locator("text=contactfpga").first.bounding_box()
+    assert (left, top) == (0, 0)
+    if width > 500:
+        assert wide == pytest.approx(width - 334, abs=4)
+        assert high == height
+        assert panel["x"] >= wide
+    else:
+        assert wide == width
+        assert 0.5 * height < high < 0.6 * height
+        assert panel["y"] >= high
+    x, y = extent(shown, visitor)
+    assert min(x.min(), y.min()) >= 0
+    assert max(x.max(), y.max()) <= 1
+    assert max(np.ptp(x), np.ptp(y)) == pytest.approx(1 / 1.04, abs=0.02)
