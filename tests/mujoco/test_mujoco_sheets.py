@@ -50,10 +50,11 @@ def test_a_ball_closes_the_switch_below_it_and_the_driver_says_where(shape, tmp_
 
 @pytest.mark.parametrize("shape", ["plane", "closed"])
 def test_the_forces_on_all_switches_add_up_to_what_presses(shape, tmp_path):
-    """The oracle is the motor behind the ball: where nothing moves any more, the contact carries its force."""
+    """The oracle is the motor behind the ball: where nothing moves any more, the contact carries its force. On the
+    closed sheet the first one presses on the seam."""
     skin, link, _ = SHAPES[shape]
     toml = robot(tmp_path, skin, link)
-    touches = [("link", 42.0, 77.0, 3.0), ("link", 96.0, 51.0, 4.5)]
+    touches = [("link", 273.0 if shape == "closed" else 42.0, 77.0, 3.0), ("link", 96.0, 51.0, 4.5)]
     model, data = pressed(toml, touches)
     with Sheets(model, data, toml, golden=True, radius_m=0.01) as sheets:
         worn = settled(sheets, 0.2)
