@@ -73,7 +73,7 @@ class Link:
 
     def __init__(self, transport: Transport, skin: Skin | None):
         self.transport = transport
-        self.conversation = Conversation(transport.name, skin, transport.live)
+        self.conversation = Conversation(transport.name, skin, transport.live, getattr(transport, "rng", None))
         self.changed = threading.Condition()
         """To be held while any state is looked at."""
         self.listeners: weakref.WeakSet[Listener] = weakref.WeakSet()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import random
 import shlex
 import time
 import weakref
@@ -161,6 +162,8 @@ class SimTransport:
 
     def __init__(self, name: str, board: SimulatedPort):
         self.name = name
+        self.rng: random.Random | None = getattr(board, "rng", None)
+        """Of the numbers of requests, where the board brings its own: the same run then gives the same bytes."""
         self._board = board
         if _SIMULATED.setdefault(id(board), self) is not self:
             raise PortBusy(f"{name} is in use: this program opened it already; close that first")

@@ -14,15 +14,40 @@ from contactfpga_sim.model.scenes.contacts import Contact, at
 from contactfpga_sim.model.scenes.scene import Scene
 
 
-class UnitReadings:
-    """Readings of all units as a function of the time in s, with their noise, in whole steps of the converter.
+class LoadedUnits:
+    """What units read under a wrench, with their noise, in whole steps of the converter.
 
     Units share a load by least squares where there are more of them than the load needs; one that nothing presses any
     more reads what it reads without preload.
     """
 
+    def __init__(self, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
+        self._zeros = cells.zeros
+        self._full = (1 << converters.find(skin.converter).bits) - 1
+        self._steps = np.linalg.pinv(cells.matrix)
+        self._rng = np.random.default_rng(seed)
+        gains = np.abs([unit.gain_n for unit in cells.units])
+        self._sigma = np.array([unit.sigma_n for unit in cells.units]) / gains * noise
+        preloads = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in cells.units])
+        self._least = -preloads / gains
+
+    def exactly(self, wrench: Floats) -> Floats:
+        """(n,): readings without noise, rounding and ends, under a (6,) wrench on the link in N and Nm."""
+        return np.asarray(np.maximum(self._steps @ wrench, self._least) + self._zeros)
+
+    def under(self, wrench: Floats) -> Sequence[int]:
+        """What all units read."""
+        noisy = self.exactly(wrench) + self._sigma * self._rng.standard_normal(len(self._sigma))
+        found: list[int] = np.clip(np.rint(noisy), 0, self._full).astype(int).tolist()
+        return found
+
+
+class UnitReadings(LoadedUnits):
+    """The same as a function of the time in s, while a scene touches the bumper."""
+
     def __init__(self, scene: Scene, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
         """Raises ValueError where the cells have no surface."""
+        super().__init__(cells, skin, seed, noise)
         if cells.surface is None:
             raise ValueError("the units have no surface; give units.toml a table [surface] with the bumper's outside")
         self._scene, self._cells, self._surface = scene, cells, cells.surface
@@ -31,13 +56,6 @@ class UnitReadings:
         outside = cells.surface.radius_m if isinstance(cells.surface, Cylinder) else None
         # A sheet around a cylinder lies under the foam, on whose outside things push.
         self._wider = 1e3 * outside / skin.radius_mm if outside and skin.radius_mm else 1.0
-        self._full = (1 << converters.find(skin.converter).bits) - 1
-        self._steps = np.linalg.pinv(cells.matrix)
-        self._rng = np.random.default_rng(seed)
-        gains = np.abs([unit.gain_n for unit in cells.units])
-        self._sigma = np.array([unit.sigma_n for unit in cells.units]) / gains * noise
-        preloads = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in cells.units])
-        self._least = -preloads / gains
 
     def wrench(self, seconds: float) -> Floats:
         """(6,): what all contacts exert on the link."""
@@ -67,9 +85,7 @@ class UnitReadings:
 
     def exact(self, seconds: float) -> Floats:
         """(n,): readings without noise, rounding and ends."""
-        return np.asarray(np.maximum(self._steps @ self.wrench(seconds), self._least) + self._cells.zeros)
+        return self.exactly(self.wrench(seconds))
 
     def __call__(self, seconds: float) -> Sequence[int]:
-        noisy = self.exact(seconds) + self._sigma * self._rng.standard_normal(len(self._sigma))
-        found: list[int] = np.clip(np.rint(noisy), 0, self._full).astype(int).tolist()
-        return found
+        return self.under(self.wrench(seconds))

@@ -1,0 +1,8 @@
+"""A robot in MuJoCo that wears sheets: its contacts press switches, and the device's bytes come to the driver."""
+
+from contactfpga_sim.lab.mujoco.sheets import Sheets
+from contactfpga_sim.lab.mujoco.touch import SheetTouch
+from contactfpga_sim.lab.mujoco.wear import wear
+from contactfpga_sim.lab.mujoco.worn import WornSheet
+
+__all__ = ["SheetTouch", "Sheets", "WornSheet", "wear"]

@@ -1,0 +1,229 @@
+"""All sheets of a robot in lockstep with MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from contactfpga.boards import ICEBREAKER
+from contactfpga.design.cover import Cover, elastic, load_cover
+from contactfpga.driver import driver
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+from contactfpga.robot.body import Body, BodyError, JointHistory, Snapshot
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.reader import States
+from contactfpga.surfaces.shapes import Floats
+from contactfpga_sim.lab.mujoco.touch import SheetTouch, of_solver, on_sheet
+from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
+from contactfpga_sim.lab.usb import BridgeSettings
+
+LEAD_S = 0.01
+"""From the boards' power-up to MuJoCo's first step; in it they are opened."""
+LOOK_S = 2.5e-4
+"""Until then the boards go on by this."""
+
+COVER = Cover(model="hertz")
+"""Of a link whose Skin's file has no table ``[cover]``."""
+
+
+class Sheets(Mapping[str, WornSheet]):
+    """The sheets of ``robot.toml`` on the bodies of a MuJoCo model, by the links' names.
+
+    A link's ``frame`` names the body that wears it. The geom named like the link is what wears the sheet
+    (:func:`wear` makes one), or else every geom of that body. :meth:`step` takes the place of ``mj_step``. While one
+    waits for a board, as in ``sheets["arm"].board.next()``, the robot goes on as well.
+
+    Args:
+        model, data: of MuJoCo; ``data`` is stepped here alone.
+        robot: the file, whose ports play no part.
+        radius_m: R* in m of what touches, by which a contact's patch grows with its force (Hertz).
+        foam: the foam of the cover is the spring between the bodies, F = 4/3 E* sqrt(R*) d^1.5. MuJoCo's own contact
+            should begin below it, with ``margin`` = -thickness and ``gap`` = thickness on the geoms.
+        golden: zones by the golden model in the place of the gateware.
+        bridge: the board's USB chip and its settings; by default that of the iCEBreaker as the driver sets it.
+        seed: of the switches' closing forces and the units' noise.
+
+    Raises BodyError for a link that the model lacks, and OSError.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        data: Any,
+        robot: str | Path,
+        *,
+        radius_m: float = 0.02,
+        foam: bool = False,
+        golden: bool = False,
+        bridge: BridgeSettings | None = None,
+        seed: int = 0,
+    ):
+        self.model, self.data = model, data
+        self.body = Body.load(robot)
+        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            raise BodyError("integrator is RK4, which asks for forces four times a step; take implicitfast")
+        covers = _covers(Path(robot))
+        bridge = bridge or BridgeSettings(ICEBREAKER.bridge)
+        self._worn = {
+            name: WornSheet(plan, covers[name], radius_m, bridge, golden, seed + number)
+            for number, (name, plan) in enumerate(self.body.links.items())
+        }
+        self._bodies = [_body(model, plan) for plan in self.body.links.values()]
+        self._owner = _owners(model, self.body, self._bodies)
+        self._springs = [elastic.stiffness(worn.ball) for worn in self._worn.values()] if foam else []
+        self._pushed: Floats = np.zeros(model.nv)  # what the foam added to qfrc_applied
+        self._steps = 0
+        self._joints, self._history = _joints(model, self.body), JointHistory()
+        self._every = max(1, round(1e-3 / model.opt.timestep))
+        self._open(seed)
+
+    def _open(self, seed: int) -> None:
+        ports = {name: SteppedPort(worn, self.step, seed) for name, worn in self._worn.items()}
+        for name, port in ports.items():
+            self._worn[name].board = driver.open(port, self._worn[name].skin)
+        for name, port in ports.items():
+            while (worn := self._worn[name]).clock() < LEAD_S:  # frames go on coming
+                worn.run(min(LEAD_S, worn.clock() + LOOK_S))
+            port.still = False
+
+    # ---- time
+
+    def clock(self) -> float:
+        """Seconds since the boards' power-up: LEAD_S at MuJoCo's first step."""
+        return LEAD_S + self._steps * float(self.model.opt.timestep)
+
+    def step(self) -> None:
+        """MuJoCo's next step: its contacts press the sheets while it lasts."""
+        model, data = self.model, self.data
+        mujoco.mj_step1(model, data)
+        self._note_joints()
+        found = self._push() if self._springs else {}
+        mujoco.mj_step2(model, data)
+        self._press(found)
+        self._steps += 1
+        for worn in self._worn.values():
+            worn.run(self.clock())
+
+    def reset(self) -> None:
+        """Put MuJoCo's state back to its start. The boards go on, as those of a robot that is carried back."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._pushed[:] = 0.0
+
+    def _press(self, foam: Mapping[tuple[int, int], Floats]) -> None:
+        """Let what touches in this step press; ``foam``: by contact and link its force in N on the link."""
+        data, plans = self.data, list(self.body.links.values())
+        touches: list[list[SheetTouch]] = [[] for _ in plans]
+        for number, second, owner in self._contacts():
+            one = of_solver(self.model, data, number, second)
+            one = one._replace(force_n=one.force_n + foam.get((number, owner), 0.0))
+            if one.force_n @ one.inward > 0:
+                body = self._bodies[owner]
+                touches[owner].append(on_sheet(plans[owner], data.xpos[body], data.xmat[body].reshape(3, 3), one))
+        for worn, mine in zip(self._worn.values(), touches):
+            worn.press(mine)
+
+    def _contacts(self) -> Iterator[tuple[int, bool, int]]:
+        """(number of the contact, whether the link's geom is its second one, number of the link)."""
+        if self.data.ncon:
+            owners = self._owner[self.data.contact.geom]
+            for number, side in np.argwhere(owners >= 0).tolist():
+                yield number, side == 1, int(owners[number, side])
+
+    def _push(self) -> dict[tuple[int, int], Floats]:
+        """Have the foam push bodies apart; its force in N on the link, by contact and link."""
+        model, data, pushed = self.model, self.data, np.zeros(self.model.nv)
+        found: dict[tuple[int, int], Floats] = {}
+        for number, second, owner in self._contacts():
+            contact = data.contact[number]
+            outward = (-1.0 if second else 1.0) * contact.frame[:3]
+            force = -self._springs[owner] * max(0.0, -contact.dist) ** 1.5 * outward
+            found[number, owner] = force
+            mine, other = contact.geom[int(second)], contact.geom[int(not second)]
+            for geom, sign in ((mine, 1.0), (other, -1.0)):
+                mujoco.mj_applyFT(
+                    model, data, sign * force, np.zeros(3), contact.pos, int(model.geom_bodyid[geom]), pushed
+                )
+        data.qfrc_applied += pushed - self._pushed
+        self._pushed = pushed
+        return found
+
+    def _note_joints(self) -> None:
+        """Remember where the joints are, each ms."""
+        if self._joints and self._steps % self._every == 0:
+            angles = {name: float(self.data.qpos[address]) for name, address in self._joints.items()}
+            self._history.add(self.clock(), angles)
+
+    # ---- what the host knows
+
+    def snapshot(self) -> Snapshot:
+        """All links as a program knows them now, as from :meth:`contactfpga.body.OpenBody.latest`: what was touched
+        when the newest frames were scanned that have come."""
+        observed = {name: worn.observe() for name, worn in self._worn.items()}
+        states = States(self.body.links, observed, self.clock())
+        return Snapshot(self.body, self.clock(), states, self._history if self._joints else None)
+
+    def __getitem__(self, name: str) -> WornSheet:
+        return self._worn[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._worn)
+
+    def __len__(self) -> int:
+        return len(self._worn)
+
+    # ---- its end
+
+    def __enter__(self) -> Sheets:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close every board; may be called twice."""
+        for worn in self._worn.values():
+            worn.board.close()
+
+
+def _covers(path: Path) -> dict[str, Cover]:
+    """By link the cover in its Skin's file."""
+    links = tomlfile.load(path, BodyError)["links"]
+    return {one["name"]: load_cover(path.parent / one["skin"]) or COVER for one in links}
+
+
+def _body(model: Any, plan: Plan) -> int:
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, plan.frame)
+    if number < 0:
+        raise BodyError(f"link {shown(plan.name)}: frame is {shown(plan.frame)}; the model has no such body")
+    return int(number)
+
+
+def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
+    """By geom the number of the link whose sheet it wears, -1 for none; the last one is for contacts without a geom."""
+    owner = np.full(model.ngeom + 1, -1)
+    for number, (name, of) in enumerate(zip(body.links, bodies)):
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+        wearing = [geom] if geom >= 0 else np.flatnonzero(model.geom_bodyid == of)
+        if not len(wearing):
+            raise BodyError(f"link {shown(name)}: its body has no geom; wear(spec, body) makes one")
+        owner[wearing] = number
+    return owner
+
+
+def _joints(model: Any, body: Body) -> dict[str, int]:
+    """By joint of the URDF its place in ``qpos``; empty without a URDF."""
+    found: dict[str, int] = {}
+    for name in body.kinematics.joint_names if body.kinematics else ():
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+        if number < 0:
+            raise BodyError(f"the URDF's joint {shown(name)} is not in the model")
+        found[name] = int(model.jnt_qposadr[number])
+    return found

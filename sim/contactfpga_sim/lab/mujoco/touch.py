@@ -1,0 +1,79 @@
+"""MuJoCo's contacts as touches of a sheet: where on the sheet laid flat, and how hard."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from contactfpga.robot.body.plan import Plan
+from contactfpga.surfaces.shapes import Floats, Vector, vector
+
+SLANT = 0.5
+"""Cosine of the angle between the contact's and the sheet's normals, below which the cover is not pressed: a box is
+touched on another side."""
+
+
+class SheetTouch(NamedTuple):
+    """A contact point of MuJoCo on a link that wears a sheet."""
+
+    contact: int
+    """Its place in ``data.contact``."""
+    point_m: Vector
+    """In the link's frame."""
+    force_n: Vector
+    """On the link, in the link's frame; friction is part of it."""
+    push_n: float
+    """Along the contact's normal, 0 or above."""
+    x_mm: float | None
+    """On the sheet laid flat; None beside the sheet."""
+    y_mm: float | None
+
+
+class ContactForce(NamedTuple):
+    """What a contact of MuJoCo exerts on the link, in the world's frame."""
+
+    contact: int
+    point_m: Floats
+    inward: Floats
+    """Unit normal into the link."""
+    force_n: Floats
+
+
+def of_solver(model: Any, data: Any, number: int, second: bool) -> ContactForce:
+    """What the constraint solver has found; ``second``: on the contact's second geom."""
+    contact, wrench = data.contact[number], np.zeros(6)
+    mujoco.mj_contactForce(model, data, number, wrench)
+    frame, sign = contact.frame.reshape(3, 3), 1.0 if second else -1.0
+    return ContactForce(number, contact.pos.copy(), sign * frame[0], sign * (frame.T @ wrench[:3]))
+
+
+def on_sheet(plan: Plan, position_m: Floats, rotation: Floats, one: ContactForce) -> SheetTouch:
+    """The same on a link whose frame lies at ``position_m``, turned by (3, 3) ``rotation``."""
+    point, force = rotation.T @ (one.point_m - position_m), rotation.T @ one.force_n
+    push = float(one.force_n @ one.inward)
+    place = _place(plan, point, rotation.T @ one.inward)
+    return SheetTouch(one.contact, vector(point), vector(force), push, *(place or (None, None)))
+
+
+def _place(plan: Plan, point_m: Floats, inward: Floats) -> tuple[float, float] | None:
+    """In mm on the sheet laid flat; None beside it, or on another side of what wears it."""
+    skin, pose = plan.skin, plan.pose
+    x, y = plan.laid.flat(vector(1e3 * ((point_m - pose.point_m) @ pose.rotation)))
+    width, height = skin.columns * skin.pitch_x_mm, skin.rows * skin.pitch_y_mm
+    if around := _around_mm(plan):
+        x = (x + skin.pitch_x_mm / 2) % around - skin.pitch_x_mm / 2
+    if not (0 <= x + skin.pitch_x_mm / 2 <= width and 0 <= y + skin.pitch_y_mm / 2 <= height):
+        return None
+    _, normal = plan.place(x, y)
+    return (x, y) if -float(inward @ np.array(normal)) >= SLANT else None
+
+
+def _around_mm(plan: Plan) -> float:
+    """Once around a cylinder, where ``flat`` leaves open on which turn a place lies; 0 elsewhere."""
+    skin = plan.skin
+    if skin.closed:
+        return skin.columns * skin.pitch_x_mm
+    radius = getattr(plan.surface, "radius_mm", None)
+    return 2 * np.pi * radius if radius and not hasattr(plan.surface, "slope") else 0.0

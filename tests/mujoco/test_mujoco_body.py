@@ -1,0 +1,144 @@
+"""JVRC-1 in MuJoCo with sheets on its links: random touches against MuJoCo's own contacts."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+pytest.importorskip("jvrc_description")
+
+import mujoco
+from mujoco_rig import TILES, compiled
+
+import contactfpga
+from contactfpga.mujoco import Sheets, wear
+from contactfpga.robot.body import Body
+
+EXAMPLES = contactfpga.examples()
+SIDES = {"forearm.toml": 0.0098, "chest.toml": 0.0098}
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """examples/robot.toml, its sheets under tiles."""
+    for name, side in SIDES.items():
+        (tmp_path / name).write_text((EXAMPLES / name).read_text() + TILES.format(side=side))
+    (tmp_path / "robot.toml").write_text((EXAMPLES / "robot.toml").read_text())
+    return tmp_path / "robot.toml"
+
+
+def with_units(robot):
+    """Three pressure units under the chest, on a ring of 75 mm around its middle, and no other link."""
+    text = robot.read_text()
+    head, *links = text.split("[[links]]")
+    chest = next(link for link in links if '"chest"' in link)
+    robot.write_text(f'{head}[[links]]{chest}\nunits = "units.toml"\n')
+    skin = robot.parent / "chest.toml"
+    units = "units = 3\nunit_sums = [[1, 1, 1]]\nbaud = 6000000\n"
+    skin.write_text(units + skin.read_text())
+    (robot.parent / "units.toml").write_text("")
+    link = Body.load(_without_units(robot)).links["chest"]
+    tables = ['frame = "chest"\n']
+    for angle in np.radians([90, 210, 330]):
+        point, normal = link.place(75 + 75 * float(np.cos(angle)), 75 + 75 * float(np.sin(angle)))
+        tables.append(
+            f"[[unit]]\npoint_m = {list(point)}\naxis = {list(normal)}\n"
+            "gain_n = 0.02\nzero = 1000\nsigma_n = 0.05\nrange = [0, 4095]\n"
+        )
+    (robot.parent / "units.toml").write_text("".join(tables))
+    return robot
+
+
+def _without_units(robot):
+    bare = robot.parent / "bare.toml"
+    bare.write_text(robot.read_text().replace('units = "units.toml"\n', ""))
+    return bare
+
+
+def standing(robot, touches):
+    """JVRC-1 fixed in space, its joints turned by some angles and held, and balls that press."""
+    body = Body.load(robot)
+    tree = ET.parse(body.urdf).getroot()
+    for link in tree.iter("link"):
+        for part in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(part)
+    ET.SubElement(ET.SubElement(tree, "mujoco"), "compiler", fusestatic="false", discardvisual="true")
+    spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"))
+    spec.option.timestep, spec.option.gravity = 5e-4, [0, 0, 0]
+    wear(spec, robot)
+    bare = spec.compile()
+    data = mujoco.MjData(bare)
+    data.qpos[:] = np.random.default_rng(3).uniform(-0.3, 0.3, bare.nq)
+    mujoco.mj_kinematics(bare, data)
+
+    def pose(plan):
+        return data.body(plan.frame).xpos, data.body(plan.frame).xmat.reshape(3, 3)
+
+    model, found = compiled(spec, body.links, touches, pose=pose)
+    found.qpos[: bare.nq] = data.qpos
+    model.dof_damping[: bare.nv] = 1e4
+    return model, found
+
+
+def random_touches(rng, link, skin, count):
+    """Pushes of 2 to 8 N, at least 40 mm apart and a pitch from the edges."""
+    found = []
+    while len(found) < count:
+        x, y = rng.uniform(10, 140), rng.uniform(10, 140)
+        x *= skin.pitch_x_mm / 10
+        if all(np.hypot(x - other[1], y - other[2]) > 40 for other in found):
+            found.append((link, float(x), float(y), float(rng.uniform(2, 8))))
+    return found
+
+
+def heard(robot, touches, golden, seconds=0.06):
+    """The contacts of a snapshot in the base frame, and those of MuJoCo: point, normal out of the link, force in N."""
+    model, data = standing(robot, touches)
+    with Sheets(model, data, robot, golden=golden, radius_m=0.005) as sheets:
+        while data.time < seconds:
+            sheets.step()
+        contacts = sheets.snapshot().contacts()
+        true = []
+        for number in range(data.ncon):
+            force = np.zeros(6)
+            mujoco.mj_contactForce(model, data, number, force)
+            contact = data.contact[number]
+            ball_first = "ball" in model.body(model.geom_bodyid[contact.geom1]).name
+            true.append((contact.pos.copy(), contact.frame[:3] * (-1 if ball_first else 1), force[0]))
+        return contacts, true
+
+
+def paired(contacts, true):
+    """Each contact with MuJoCo's nearest."""
+    return [(one, min(true, key=lambda other: np.linalg.norm(other[0] - one.point_m))) for one in contacts]
+
+
+def test_each_touch_of_four_links_is_where_mujoco_has_it(robot):
+    """Two on each link, in the robot's base frame through its joints: as many contacts; the place as its covariance
+    states, and never beyond the corner of a cell; the normal."""
+    rng, links = np.random.default_rng(0), Body.load(robot).links
+    errors, stated, normals = [], [], []
+    for _ in range(2):
+        touches = [one for name, plan in links.items() for one in random_touches(rng, name, plan.skin, 2)]
+        contacts, true = heard(robot, touches, golden=True)
+        assert len(contacts) == len(true) == 8
+        pairs = paired(contacts, true)
+        assert len({id(other) for _, other in pairs}) == 8
+        errors += [1e3 * np.linalg.norm(other[0] - one.point_m) for one, other in pairs]
+        stated += [1e3 * np.sqrt(np.trace(one.covariance_m2)) for one in contacts]
+        normals += [float(np.dot(one.normal, other[1])) for one, other in pairs]
+    assert 0.5 < np.linalg.norm(errors) / np.linalg.norm(stated) < 1.1
+    assert max(errors) < np.hypot(10.0, 17.7) / 2
+    assert min(normals) > 0.98
+
+
+def test_the_forces_of_units_are_mujocos(robot):
+    """One push, and two, on the chest: each within 10 %, by what the units' noise and the places leave open."""
+    rng, skin = np.random.default_rng(1), Body.load(with_units(robot)).links["chest"].skin
+    shares = []
+    for count in (1, 2):
+        contacts, true = heard(robot, random_touches(rng, "chest", skin, count), golden=False)
+        assert len(contacts) == len(true) == count
+        shares += [one.normal_n / other[2] - 1 for one, other in paired(contacts, true)]
+    assert np.abs(shares).max() < 0.1
