@@ -133,6 +133,25 @@ def test_each_touch_of_four_links_is_where_mujoco_has_it(robot):
     assert min(normals) > 0.98
 
 
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_the_places_of_480_touches_are_as_the_page_says(robot):
+    """docs/mujoco.md: 60 poses with two touches on each of four links."""
+    rng, links = np.random.default_rng(100), Body.load(robot).links
+    errors, stated, normals = [], [], []
+    for _ in range(60):
+        touches = [one for name, plan in links.items() for one in random_touches(rng, name, plan.skin, 2)]
+        contacts, true = heard(robot, touches, golden=True)
+        assert len(contacts) == len(true) == 8
+        for one, other in paired(contacts, true):
+            errors.append(1e3 * np.linalg.norm(other[0] - one.point_m))
+            stated.append(1e3 * np.sqrt(np.trace(one.covariance_m2)))
+            normals.append(np.degrees(np.arccos(min(1.0, float(np.dot(one.normal, other[1]))))))
+    rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (errors, stated)]
+    found = [np.mean(errors), np.quantile(errors, 0.95), max(errors), *rms, max(normals)]
+    assert found == pytest.approx([3.6, 5.8, 6.8, 3.7, 5.1, 8.5], abs=0.051)
+
+
 def test_the_forces_of_units_are_mujocos(robot):
     """One push, and two, on the chest: each within 10 %, by what the units' noise and the places leave open."""
     rng, skin = np.random.default_rng(1), Body.load(with_units(robot)).links["chest"].skin
