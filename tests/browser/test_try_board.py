@@ -46,6 +46,7 @@ def random_frames(count: int, seed: int) -> np.ndarray:
     return rng.random((count, KIT.skin.rows, KIT.skin.columns)) < rng.choice([0.01, 0.05, 0.2, 0.5, 0.9], (count, 1, 1))
 
 
+@pytest.mark.slow
 def test_all_scenes_give_the_native_boards_bytes():
     cover = load_cover(KIT.skin_path)
     scenes = [scene(KIT.skin, name, cover) for name in NAMES]
@@ -58,6 +59,7 @@ def test_all_scenes_give_the_native_boards_bytes():
     assert len({frame["cells"] for frame in read["frames"]}) > 8
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("count", sample([3000, 1_000_000], quick=[3000]))
 def test_random_frames_give_the_native_boards_bytes(count, record_property):

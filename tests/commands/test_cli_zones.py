@@ -112,6 +112,7 @@ def test_reader_of_json_may_end_first(board):
         assert process.stderr.read() == ""
 
 
+@pytest.mark.slow
 def test_reader_of_tables_has_the_first_at_once_and_may_end_first(board):
     """`contactfpga zones | head -1`: nothing may wait for the end of what has none."""
     board.stream = board.frame

@@ -125,6 +125,7 @@ def exact():
     return stages.measure(Skin(), settings, touches=4, host_touches=0)
 
 
+@pytest.mark.slow
 def test_the_way_to_the_host_is_that_of_each_touch_in_each_phase(exact):
     """Against a chip stepped by hand through the bytes that the gateware sent."""
     mhz, period = Skin().clock_hz / 1e6, exact.settings.period_us
@@ -198,6 +199,7 @@ def test_all_rows_and_the_picture(run, tmp_path, monkeypatch):
     )
 
 
+@pytest.mark.slow
 def test_settings_of_the_bridge_are_told(run):
     status, out, _ = run(
         "--board", "icebreaker", "--touches", "1", "--exact", "--timer", "2", "--no-event-char", "--json"

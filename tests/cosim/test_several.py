@@ -152,6 +152,7 @@ def test_the_compiled_board_agrees_at_the_pins():
         assert talk.stats.damaged.total() == talk.stats.lost == 0
 
 
+@pytest.mark.slow
 def test_the_virtual_board_serves_both_sheets(tmp_path):
     port, skins = f"sim://?sheets={two_sheets(tmp_path)}&scene=full", SHEETS
     with contextlib.ExitStack() as stack:

@@ -69,6 +69,7 @@ def test_a_module_that_fails_is_refused_in_one_sentence(tmp_path, monkeypatch, t
         boards.find("failing:TOY")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("run", "scan"),
     [(bench_native.run, "raster"), (bench_amaranth.run, "adaptive"), (bench_amaranth.run, "reversal")],

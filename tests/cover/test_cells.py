@@ -42,6 +42,7 @@ def test_flush_faces_take_the_stress_on_them(thickness, side):
         assert sheet.forces_n(finger(x, y)) == pytest.approx(exact, abs=0.015)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 8.0, 9.0))])
 @pytest.mark.parametrize("stiffness", [math.inf, 4.0, 2.0])
 def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):

@@ -222,6 +222,7 @@ BARE = {
 10 mm apart when it knew neither covers nor forces."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", BARE)
 def test_the_bare_sheet_errs_as_it_did_before_there_were_covers(family):
     whole = Task("run, 10 mm, bare", *METHODS["run, 10 mm, bare"], family, 1000, 0, checked=0)
@@ -396,6 +397,7 @@ def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     """Pictures and tables of docs/chart.md and README.md come from docs/chart/chart.csv."""
     monkeypatch.chdir(ROOT)
