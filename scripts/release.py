@@ -106,7 +106,7 @@ def first_minute(dist: Path, offline: bool) -> None:
         alone = clean | {"PATH": str(folder / "bin"), "CONTACTFPGA_CACHE": str(folder / "cache")}
         started = time.monotonic()
         found = subprocess.run(
-            [scripts / "contactfpga", "zones", "sim://", "--seconds", "3"],
+            [scripts / "contactfpga", "zones", "sim://", "--seconds", "0.3"],
             cwd=folder, env=alone, text=True, capture_output=True, timeout=120,
         )  # fmt: skip
         print(found.stdout[-2000:], found.stderr[-2000:], sep="\n")
