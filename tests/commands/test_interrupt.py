@@ -118,9 +118,9 @@ def test_failures_keep_the_rows_that_are_finished(tmp_path):
 
 
 BUILDS = (
-    ("zones sim://", "elaborate"),
-    ("zones sim://", "compile"),
-    ("board", "yosys"),
+    ("zones sim://?skin=SKIN", "elaborate"),
+    ("zones sim://?skin=SKIN", "compile"),
+    ("board --skin SKIN", "yosys"),
     ("replay FRAMES", "elaborate"),
 )
 
@@ -134,9 +134,13 @@ BUILDS = (
     ),
 )
 def test_the_gateware_being_built_is_no_more_than_that(words, step, keys, tmp_path):
+    """SKIN is none of those whose boards the package carries."""
     np.save(tmp_path / "frames.npy", np.zeros((4, 8, 8), bool))
-    arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in words.split()]
-    assert_well_ended(*interrupted(arguments, lambda terminal: f": {step}" in terminal.said, keys, tmp_path / "cache"))
+    (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 8\n")
+    words = words.replace("FRAMES", str(tmp_path / "frames.npy")).replace("SKIN", str(tmp_path / "skin.toml"))
+    assert_well_ended(
+        *interrupted(words.split(), lambda terminal: f": {step}" in terminal.said, keys, tmp_path / "cache")
+    )
 
 
 @pytest.mark.campaign  # which has the tools for it

@@ -181,7 +181,7 @@ def test_commands_pass_where_that_was_asked_for(endpoint):
         with publish(source.path, "--listen", endpoint, "--allow-commands") as one:
             with contactfpga.open(one.line, timeout=LONG) as board:
                 board.sample_at(0, LONG)
-    assert source.commanded == [(2, 0)]
+    assert {*source.commanded} == {(2, 0)}  # asked again where the answer is late, as on a busy machine
 
 
 def test_a_command_that_is_denied_says_so(endpoint):

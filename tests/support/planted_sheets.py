@@ -89,7 +89,7 @@ class PlantedBoard(VirtualBoard):
         if faults.columns_stuck:
             self._board.stick(np.isin(np.arange(skin.columns), faults.columns_stuck))
         if faults.shorts is not None:
-            self._board._check_pins = lambda: None  # pins drive against each other on such a sheet
+            self._board._check_pins = lambda fights: None  # pins drive against each other on such a sheet
             self._board.join(faults.shorts)
         self._lost, self._rng = faults.lost, rng
 

@@ -197,14 +197,14 @@ class CompiledBoard(CompiledModel):
 
     def run(self, cycles: int) -> None:
         """As :meth:`CompiledModel.run`; raises :class:`Contention` where a column was driven against a row."""
-        _check_pins(self._call("run", ctypes.c_uint64(cycles)))
+        self._check_pins(self._call("run", ctypes.c_uint64(cycles)))
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
         """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
         if frames.shape[1:] != (self.skin.rows, self.skin.columns):
             raise ValueError(f"cells of {frames.shape[1:]}; the sheet is {self.skin.rows}x{self.skin.columns}")
         each = ctypes.c_uint64(self.skin.derived.frame_clocks if cycles is None else cycles)
-        _check_pins(self._call("hold", to_words(frames).tobytes(), ctypes.c_size_t(len(frames)), each))
+        self._check_pins(self._call("hold", to_words(frames).tobytes(), ctypes.c_size_t(len(frames)), each))
 
     @property
     def fights(self) -> int:
@@ -215,10 +215,9 @@ class CompiledBoard(CompiledModel):
         """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
         self._call("pull_low", ctypes.c_uint64(cycles))
 
-
-def _check_pins(fights: int) -> None:
-    if fights:
-        raise Contention(f"in {fights} clocks a column was driven against a row")
+    def _check_pins(self, fights: int) -> None:
+        if fights:
+            raise Contention(f"in {fights} clocks a column was driven against a row")
 
 
 def library_of(skin: Skin) -> Library:
