@@ -173,10 +173,14 @@ def test_200_planted_sheets_are_found_out():
         assert all(any(begin in one for one in said) for begin in expected), (seed, name, said)
         known = [*expected, *["leaves too little room"] * name.startswith("slow")]
         assert all(any(begin in one for begin in known) for one in said), (seed, name, said)
+        if bench.fitted is None:
+            assert name == "lossy link", (seed, name)
+            continue
         values = bench.fitted.values
         assert len(values) == 2, (seed, name)
-        covered.append(all(one.low <= getattr(circuit, one.name) <= one.high for one in values))
-    assert 0.92 <= sum(covered) / SHEETS <= 0.98, "two standard deviations of the share about 95 %"
+        covered += [one.low <= getattr(circuit, one.name) <= one.high for one in values]
+    assert len(covered) >= 2 * 0.99 * SHEETS
+    assert 0.93 <= np.mean(covered) <= 0.97
 
 
 # ---- the command
