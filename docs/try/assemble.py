@@ -90,7 +90,7 @@ def read(name: str) -> str:
 
 
 def digest(text: str) -> str:
-    """Of an inline script or style, for the page's policy."""
+    """The hash by which the page's policy allows an inline script or style."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 

@@ -15,7 +15,7 @@ AXIS = np.array([0.0, 0.0, 1.0])
 
 
 def felt(snapshot):
-    """The contacts on the link, in its frame; raises NoLinkData where nobody knows."""
+    """Return the contacts on the link, in its frame. Raise NoLinkData where the newest frame is old or has a fault."""
     state = snapshot.links[LINK]
     if state.status != "ok" or state.age_s > SILENCE_S or "fault" in state.zones.flags:
         raise NoLinkData({LINK: state})

@@ -124,7 +124,7 @@ def lifted(page):
 
 
 def same(page, count, dead=np.s_[:0]):
-    """The page shows the zones of its closed switches without those that are ``dead``, and these are so many."""
+    """The page shows the zones of its closed switches, without ``dead`` ones; there are ``count`` zones."""
     expect(page.locator("#zones tbody tr")).to_have_count(count)
     page.wait_for_timeout(300)
     closed = closed_on(page)

@@ -23,6 +23,7 @@ SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "do
 """Their examples compile boards of their own."""
 
 
+@pytest.mark.usefixtures("_closed_ports")
 @pytest.mark.parametrize("page", sample(PAGES, quick={*PAGES} - SLOW, slow=SLOW))
 def test_examples_print_what_they_say(page):
     results = doctest.testfile(str(ROOT / page), module_relative=False)

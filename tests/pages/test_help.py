@@ -12,6 +12,8 @@ import pytest
 
 import contactfpga
 
+pytestmark = pytest.mark.usefixtures("_closed_ports")  # examples read zones, which keeps their ports open
+
 CLASSES = [name for name in contactfpga.__all__ if isinstance(getattr(contactfpga, name), type)]
 FUNCTIONS = [name for name in contactfpga.__all__ if inspect.isfunction(getattr(contactfpga, name))]
 ERRORS = [name for name in CLASSES if issubclass(getattr(contactfpga, name), Exception)]

@@ -208,22 +208,22 @@ class AsyncBoard(BoardFacts):
     def __init__(self, board: Board, link: Link, frames: Subscription, expected: Skin | None):
         super().__init__(link, frames, expected)
         self.board = board
-        """The same board, whose methods wait."""
+        """The board that this one wraps. Its methods block."""
 
     async def read(self, timeout: float = 1.0) -> Zones:
-        """As :meth:`Board.read`."""
+        """Await the first frame that is scanned after the call; errors as of :meth:`Board.read`."""
         return await _in_thread(self.board.read, timeout)
 
     async def next(self, timeout: float = 1.0) -> Zones:
-        """As :meth:`Board.next`. A task that is canceled takes no frame."""
+        """Await the next frame in order; errors as of :meth:`Board.next`. A task that is canceled takes no frame."""
         return await self._frames.awaited(timeout)
 
     async def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
-        """As :meth:`Board.latest`."""
+        """Await the newest frame; errors as of :meth:`Board.latest`."""
         return await _in_thread(lambda timeout: self.board.latest(timeout, max_age_s=max_age_s), timeout)
 
     async def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
-        """As :meth:`Board.batch`."""
+        """Await all frames that have come, as arrays; errors as of :meth:`Board.batch`."""
         return await _in_thread(lambda timeout: self.board.batch(max_s, timeout), timeout)
 
     async def __aiter__(self) -> AsyncIterator[Zones]:

@@ -18,7 +18,7 @@ class LineFinding(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class SelfTest:
-    """A whole self-test, of so many rows and columns: each line was driven alone, and what rose with it was read.
+    """A whole self-test of ``rows`` and ``columns``: each line was driven alone, and lines that rose were read.
 
     ``board.self_test()`` makes one. Here row 1 rises where row 0 is driven, and the other way round:
 

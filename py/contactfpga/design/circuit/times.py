@@ -64,7 +64,7 @@ class Needs:
 
 @functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
-    """Times, levels and currents of a sheet of so many lines. Takes some 3 seconds at 64x64."""
+    """Compute times, levels and currents of a sheet with these lines. A sheet of 64x64 takes some 3 s."""
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
@@ -99,7 +99,7 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
 
 
 def needed_by(skin: Skin, circuit: Circuit) -> Needs:
-    """What a Skin's sheet needs: its guard lines are lines, too."""
+    """Compute what the sheet of a Skin needs; guard lines count as lines."""
     return needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
 
 

@@ -27,11 +27,7 @@ def chart(strip: Strip) -> str:
         *_text(WIDTH - RIGHT, 12, f"<tspan fill='{AREA}'>●</tspan> area, cm²", "end"),
         *_axis(most, LEFT - 4, "end"),
         *_axis(most_cm2, WIDTH - RIGHT + 4, "start"),
-        *(
-            part
-            for second in SECONDS
-            for part in _text(_x(second), BOTTOM + 13, f"{second:g}".replace("-", "−"), "middle")
-        ),
+        *(part for second in SECONDS for part in _text(_x(second), BOTTOM + 13, _signed(second), "middle")),
         *_text((LEFT + WIDTH - RIGHT) / 2, BOTTOM + 27, "seconds of board time, now at 0", "middle"),
         _line(strip.seconds, area_cm2 / most_cm2, AREA),
         _line(strip.seconds, strip.zones / most, picture_style.VERMILLION),
@@ -50,6 +46,7 @@ def top(values: np.ndarray, least: int) -> int:
 
 
 def _signed(number: float) -> str:
+    """Write a number with the minus sign of typography."""
     return f"{number:g}".replace("-", "−")
 
 

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import viser
 
 BEYOND = 1.1
-"""From the outermost cells to the numbers, in pitches."""
+"""Distance from the outermost cells to the numbers, in pitches."""
 MARKS = 4
-"""Numbers along an edge, about."""
+"""How many numbers an edge has, about."""
 AXIS = 2.5
 """Length of an axis, in pitches."""
 
@@ -68,7 +68,7 @@ def add(server: viser.ViserServer, node: str, tiles: Tiles, lift_mm: float) -> N
 
 
 def numbers(count: int) -> range:
-    """Of some lines among so many, evenly spaced from the first."""
+    """Return the numbers of about MARKS of ``count`` lines, evenly spaced from the first."""
     return range(0, count, max(1, round(count / MARKS)))
 
 

@@ -26,10 +26,10 @@ from contactfpga_sim.lab.usb import BridgeSettings
 LEAD_S = 0.01
 """From the boards' power-up to MuJoCo's first step; in it they are opened."""
 LOOK_S = 2.5e-4
-"""Until then the boards go on by this."""
+"""Step in s by which the boards advance before MuJoCo's first step."""
 
 COVER = Cover(model="hertz")
-"""Of a link whose Skin's file has no table ``[cover]``."""
+"""The cover of a link whose Skin file has no table ``[cover]``."""
 
 
 class Sheets(Mapping[str, WornSheet]):
