@@ -25,8 +25,14 @@ def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
 
     monkeypatch.setattr(Board, "read", same)
     monkeypatch.setattr(soak, "SKIN", SLOW)
-    assert soak.main(["--seconds", "1"]) == 1
+    assert soak.main(["--seconds", "20"]) == 1  # ends with the period of 1 s in which it is seen
     assert "asked for a new frame" in capsys.readouterr().err
+
+
+def test_a_soak_without_a_frame_has_failed(capsys, monkeypatch):
+    monkeypatch.setattr(soak, "SKIN", SLOW)
+    assert soak.main(["--seconds", "0.000001"]) == 1
+    assert "no frame came" in capsys.readouterr().err
 
 
 @pytest.mark.campaign

@@ -2,8 +2,8 @@
 
 The virtual board runs behind a pseudo-terminal; three threads read it, one asks, and a new subscription comes and goes.
 Now and then the port is closed and opened again. Each line is a minute: frames, losses, memory and open descriptors of
-this process. The status is 1 if a frame came twice or out of order, if a count does not add up, or if memory or
-descriptors grew.
+this process. The status is 1 if a frame came twice or out of order, if a count does not add up, if memory or
+descriptors grew, or if no frame came. The first period with a wrong frame or count is the last one.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def main(arguments: list[str] | None = None) -> int:
         started = time.monotonic()
         soak = Soak(board.port)
         print(f"{'minutes':>8} {'frames':>10} {'reads':>8} {'opened':>7} {'MB':>7} {'files':>6} {'slip s':>7}  faults")
-        while (passed := time.monotonic() - started) < seconds:
+        while not soak.faults and (passed := time.monotonic() - started) < seconds:
             soak.run(min(REOPENED_S, seconds / 20, seconds - passed))
             memory, files = _megabytes(), _descriptors()
             print(
@@ -116,6 +116,8 @@ def main(arguments: list[str] | None = None) -> int:
             soak.faults.append(f"memory grew from {early[0]:.1f} to {memory:.1f} MB")
         if files > early[1]:
             soak.faults.append(f"open descriptors grew from {early[1]} to {files}")
+    if soak.frames == 0:
+        soak.faults.append("no frame came")
     for fault in soak.faults[:20]:
         print(fault, file=sys.stderr)
     print(f"{soak.frames:,} frames in {(time.monotonic() - started) / 60:.1f} minutes, {len(soak.faults)} faults")
