@@ -88,7 +88,7 @@ def _crossed(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
             return spots
 
 
-SETTLED_SCANS = 12
+SETTLED_SCANS = 6
 """For which a sheet is held, so that a frame of it comes through whatever waits on the line."""
 
 
