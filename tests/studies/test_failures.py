@@ -265,7 +265,7 @@ def two_discs(gap, pitch, structure, rng):
 
 def shown_rate(text):
     """Right draws and all of them, from the share and the interval that are shown."""
-    share, low, high = map(float, re.fullmatch(r"([\d.]+) % \(([\d.]+) to ([\d.]+)\)", text).groups())
+    share = float(re.match(r"[\d.]+", text)[0])
     for of in rated.LOOKS:
         right = round(share * of / 100)
         if str(rated.Rate(right, of)) == text:

@@ -28,6 +28,7 @@ COMMANDS = {
     "build": "Build a bitstream for a board; print its wiring.",
     "flash": "Write a bitstream to a board.",
     "latency": "Measure the time from a touch to the last byte, through USB and to your code, on simulated gateware.",
+    "wave": "Simulate a touch clock by clock and write the waveform of every signal (VCD).",
     "record": "Record a board, or all boards of a robot, into an MCAP file; repair one that was not closed.",
     "replay": "Send recorded frames through the compiled gateware.",
     "plot": "Draw a recording: where, when and how large it was touched.",
