@@ -117,7 +117,7 @@ def test_a_frame_of_another_size_or_of_nothing_is_refused(run, tmp_path):
     for shape, said in (((1, 4, 4), "4x4 cells, 0 of them pressed; the sheet has 4x5"), ((1, 4, 5), "0 of them")):
         np.save(tmp_path / "frames.npy", np.zeros(shape, bool))
         status, out, error = run(
-            *("wave", "--skin", tmp_path / "skin.toml", "--frame", tmp_path / "frames.npy", "-o", tmp_path / "x.vcd")
+            *("wave", "--skin", tmp_path / "skin.toml", "--pressed", tmp_path / "frames.npy", "-o", tmp_path / "x.vcd")
         )
         assert (status, out) == (1, "")
         assert said in error

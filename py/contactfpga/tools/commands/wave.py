@@ -16,8 +16,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.sheet(parser, "Skin of the board (default: the reference Skin).")
     pressed = "Press the first frame of this array of (frames, rows, columns) (default: 2x2 cells in the middle)."
-    parser.add_argument("--frame", metavar="FRAMES.npy", help=pressed)
-    parser.add_argument("-o", "--output", metavar="FILE.vcd", default="touch.vcd", help="Default: %(default)s.")
+    parser.add_argument("--pressed", metavar="FRAMES.npy", help=pressed)
+    parser.add_argument("-o", "--output", metavar="FILE", default="touch.vcd", help="Default: %(default)s.")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
 
     file = flags.sheet_file(args)
     skin = Skin.load(file) if file else Skin()
-    cells = Recording.load(args.frame, None).pressed[0] if args.frame else wave.finger(skin)
+    cells = Recording.load(args.pressed, None).pressed[0] if args.pressed else wave.finger(skin)
     vcd = outputs.file(args.output)
     started = time.monotonic()
     touch = wave.simulate(skin, cells, vcd)

@@ -14,7 +14,14 @@ from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga_sim.verify import wave
 
-LANES = ("row that is driven", "a row is handed on", "a zone, or a frame's end", "a byte is handed on", "line", "contact")
+LANES = (
+    "row that is driven",
+    "a row is handed on",
+    "a zone, or a frame's end",
+    "a byte is handed on",
+    "line",
+    "contact",
+)
 
 
 def draw(folder: Path) -> list[Path]:
