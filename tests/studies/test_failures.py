@@ -284,7 +284,7 @@ def test_closed_forms_lie_where_the_page_says():
             ("bounce", "`asym_eager_defer_pk`"): 96,
             ("baud", "host faster, frames"): 50 / 9.5,
             ("baud", "host slower, frames"): 50 / 9.5,
-            ("noise", "half a bit to two bits long"): -math.log(0.95) * 3e6 / (17 * 10 + 1.25),
+            ("noise", "half a bit to two bits long"): -math.log(0.95) / 96e-6,
             ("host", "every frame of `contactfpga.open()`"): 4095 / 21 * 0.096,
         },
         rel=0.003,
@@ -434,7 +434,7 @@ def test_of_many_draws_the_wrong_one_that_is_not_told_is_shown():
     assert (of().right, of().told, of().what, of().rate) == (True, ("motion",), "right", "100 % (95.0 to 100.0)")
     assert of(*[told] * 20).told == ("row N open",)
     assert (of(*[told] * 20, silent).verdict, of(*[told] * 20, silent).what) == ("silent", "silent")
-    assert of(told).right  # in far more than 95 % of the draws that then are made
+    assert (of(told).right, of(told).what) == (True, "right")  # in far more than 95 % of the draws that then are made
 
 
 def outcomes(*verdicts):

@@ -19,6 +19,7 @@ from contactfpga_sim.lab.failures.rig import (
     REVERSAL_GUARDED,
     Rig,
     faults,
+    held_clocks,
     hello_clocks,
     moments,
     places,
@@ -76,7 +77,7 @@ def _slow(skin: Skin, circuit: Circuit, rng: np.random.Generator, count: int) ->
             spots = _crossed(rng, skin)
             cells = finger(skin, *spots)
             rig.frames()
-            rig.board.hold(cells[None], SETTLED_SCANS * rig.scan)
+            rig.board.hold(cells[None], held_clocks(skin))
             found.append(judged(rig.frames()[-1], cells, [finger(skin, spot) for spot in spots]))
     return found
 
@@ -86,10 +87,6 @@ def _crossed(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
         (y, x), (v, u) = spots = _apart(rng, skin, 2)
         if min(abs(y - v), abs(x - u)) > 2:
             return spots
-
-
-SETTLED_SCANS = 6
-"""For which a sheet is held, so that a frame of it comes through whatever waits on the line."""
 
 
 def _capacitance(skin: Skin, circuit: Circuit, picofarad: float, rng: np.random.Generator, count: int) -> list[Outcome]:

@@ -137,6 +137,7 @@ def _sent(zones: Zones) -> dict[str, object]:
 
 
 SKIN = REFERENCE
+SCAN_MS = 1000 * SKIN.derived.frame_clocks / SKIN.clock_hz
 ZONE_BYTES = 13 + 4
 """Of a frame with one zone on the wire; each further zone takes 4."""
 FEW_FRAMES = 20
@@ -241,8 +242,9 @@ NOISE = Knob(
     values=(0, 100, 300, 500, 600, 700, 800, 900, 1_000, 2_000, 5_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": Rated(_noise)},
     helps="a shorter cable, a slower `baud`",
-    closed={"half a bit to two bits long": float(round(-math.log(0.95) * SKIN.baud / (10 * ZONE_BYTES + 1.25)))},
-    closed_form="pulses come at random, and any of them in one of the 17 bytes of a frame with a zone spoils it",
+    closed={"half a bit to two bits long": float(round(-math.log(0.95) * 1000 / SCAN_MS))},
+    closed_form="pulses come at random, and each spoils a frame: the one that it meets, or the next one, to which the "
+    "byte that it makes is added; a frame comes every 96 us",
 )
 
 
@@ -274,7 +276,6 @@ CLOCK = Knob(
 
 # ---- a host that is slow
 
-SCAN_MS = 1000 * SKIN.derived.frame_clocks / SKIN.clock_hz
 
 TTY_BYTES = 4095
 """What Linux keeps of a serial port that nobody reads; what comes then is dropped."""

@@ -55,7 +55,8 @@ class Rated:
     most: int = LOOKS[-1]
 
     def __call__(self, value: float) -> Outcome:
-        """The rate at a value. Its words and its sheet are those of the first draw that is wrong, if there is one."""
+        """The rate at a value. Its words and its sheet are those of a right draw where the value holds, else of a wrong
+        one, that is not told if there is such a one."""
         rng = np.random.default_rng(self.seed)
         found: list[Outcome] = []
         for look in LOOKS:
@@ -76,7 +77,8 @@ def _together(found: Sequence[Outcome], rate: Rate) -> Outcome:
     told = set() if not all(each) and not holds else set().union(*each)
     if holds:
         told = {word for word in told if 2 * sum(word in words for words in each) >= len(each)}
-    shown = next((one for one in wrong if not one.told), (wrong or found)[0])
+    right = (one for one in found if one.right)
+    shown = next(right) if holds else next((one for one in wrong if not one.told), wrong[0])
     return dataclasses.replace(
         shown, right=holds, told=tuple(sorted(told)), amount=rate.right / rate.of, rate=str(rate)
     )

@@ -57,6 +57,12 @@ def hello_clocks(skin: Skin) -> int:
     return scan * (math.ceil(HELLO_BYTES * 10 * skin.derived.bit_clocks / scan) + 2)
 
 
+def held_clocks(skin: Skin) -> int:
+    """For which a frame is held: whole scans, or the last frame would be torn, and some frames' time on the line."""
+    scan = skin.derived.frame_clocks
+    return HELD_SCANS * scan * math.ceil(10 * FRAME_BYTES * skin.derived.bit_clocks / scan)
+
+
 def still(skin: Skin, cells: np.ndarray, cuts: LineCuts | None = None) -> Zones:
     """The frame of a sheet that is pressed so, with its lines cut."""
     return seen(skin, cells[None], cuts)[0]
@@ -69,8 +75,7 @@ def seen(skin: Skin, frames: np.ndarray, cuts: LineCuts | None = None) -> list[Z
         if cuts is not None:
             rig.board.cut(cuts.rows, cuts.columns)
         start = hello_clocks(skin)
-        # Whole scans, or the last frame would be torn.
-        held = HELD_SCANS * rig.scan * math.ceil(10 * FRAME_BYTES * skin.derived.bit_clocks / rig.scan)
+        held = held_clocks(skin)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), start)
         rig.board.hold(frames, held)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), held)
