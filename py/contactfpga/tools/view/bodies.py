@@ -153,6 +153,8 @@ class BodyView:
         force.on_update(resize)
         reflex.on_update(start)
         again.on_click(start)
+        # Whoever comes first sees it from its start.
+        server.on_client_connect(lambda _: source.restart() if len(server.get_clients()) == 1 else None)
 
     def _add_sliders(self, server: viser.ViserServer) -> None:
         body, angles = self._source.body, self._source.angles
