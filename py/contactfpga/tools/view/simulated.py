@@ -24,6 +24,8 @@ from contactfpga.tools.view.sources import SimulatedPace
 
 REFLEX_S = 1e-3
 """A reflex is asked this often."""
+REST_S = 0.05
+"""After a start no reflex is asked for so long: what touched before it may still be on its way to the host."""
 NO_REFLEX = "none"
 UNDER = 0.96
 """Size of the geom that wears a sheet, so that the cells are seen on it."""
@@ -77,7 +79,7 @@ class SimulatedSource:
         self.most_n = dict.fromkeys(self.sheets, 0.0)
         made = self.reflexes.get(self.reflex)
         self._acts = None if made is None else made(float(data.ctrl[0]))
-        self._asked = -1
+        self._asked = round(REST_S / REFLEX_S)
 
     def states(self) -> dict[str, LinkState]:
         """Of all links, after the next moment."""
@@ -95,7 +97,7 @@ class SimulatedSource:
 
     def _step(self) -> None:
         data = self.sheets.data
-        if self._acts is not None and (tick := int(data.time / REFLEX_S + 1e-6)) != self._asked:
+        if self._acts is not None and (tick := int(data.time / REFLEX_S + 1e-6)) > self._asked:
             self._asked = tick
             data.ctrl[0] = self._acts(self.sheets.snapshot(), self._angle())
         self.sheets.step()
