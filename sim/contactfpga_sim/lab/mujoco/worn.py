@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -68,6 +68,13 @@ class WornSheet:
         self._coming: collections.deque[tuple[float, bytes]] = collections.deque()
         self._tracker, self._known = Tracker(), LinkMemory(opened=True, open_s=0.0)
         self._load()
+
+    def cut(self, rows: Mapping[int, int] | None = None, columns: Mapping[int, int] | None = None) -> None:
+        """From now on these lines of the sheet are cut, as by
+        :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises ContactFPGAError for golden zones."""
+        if isinstance(self._device, GoldenBoard):
+            raise ContactFPGAError("golden zones come from cells and know no lines: take the gateware")
+        self._device.cut(rows or {}, columns or {})
 
     # ---- fingers, as the view presses a :class:`contactfpga.tools.view.fingers.Touchable`
 
