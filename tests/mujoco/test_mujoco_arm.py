@@ -43,7 +43,17 @@ class Run:
     """A reflex at 1 kHz; ``course`` is (time in s, angle, speed, force in N) each ms. ``fault``, at ``at_s``, is a
     function of the sheet."""
 
-    def __init__(self, reflex, seconds=0.12, damping=FIXED, push_n=0.0, fault=None, at_s=0.0, golden=True, robot=HERE / "robot.toml"):
+    def __init__(
+        self,
+        reflex,
+        seconds=0.12,
+        damping=FIXED,
+        push_n=0.0,
+        fault=None,
+        at_s=0.0,
+        golden=True,
+        robot=HERE / "robot.toml",
+    ):
         model = mujoco.MjModel.from_xml_string(ARM.format(damping=damping))
         data = mujoco.MjData(model)
         data.ctrl[1] = -push_n

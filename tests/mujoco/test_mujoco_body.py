@@ -82,8 +82,7 @@ def standing(robot, touches):
 
 
 def test_frames_are_those_of_pinocchio(robot):
-    """Each link of JVRC-1 that MuJoCo has, at five random postures, by three programs: MuJoCo, Pinocchio, and this
-    project's kinematics."""
+    """Each link of JVRC-1 that MuJoCo has, at five random postures."""
     pinocchio = pytest.importorskip("pinocchio")
     body = Body.load(robot)
     other = pinocchio.buildModelFromUrdf(str(body.urdf))

@@ -58,12 +58,12 @@ def test_follow_gives_way(monkeypatch):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (dict(mujoco="absent.xml"), "absent.xml is no file"),
-        (dict(port=None), "--mujoco needs ROBOT.toml"),
-        (dict(mujoco=ROBOT), "MuJoCo says"),
-        (dict(reflex="absent.py"), "absent.py', no file"),
-        (dict(reflex=str(HERE / "arm.py")), "has no class with __call__"),
-        (dict(mujoco=None), "--reflex is for a robot of --mujoco"),
+        ({"mujoco": "absent.xml"}, "absent.xml is no file"),
+        ({"port": None}, "--mujoco needs ROBOT.toml"),
+        ({"mujoco": ROBOT}, "MuJoCo says"),
+        ({"reflex": "absent.py"}, "absent.py', no file"),
+        ({"reflex": str(HERE / "arm.py")}, "has no class with __call__"),
+        ({"mujoco": None}, "--reflex is for a robot of --mujoco"),
     ],
 )
 def test_bad_words_get_one_line(words, said):

@@ -169,7 +169,7 @@ def _reflexes(path: str | None) -> dict[str, Callable[[float], Reflex]]:
     if not Path(path).is_file():
         raise ContactFPGAError(f"--reflex is {shown(path)}, no file; name one as examples/arm/reflexes.py")
     names = runpy.run_path(path, run_name="reflex")
-    found = {
+    found: dict[str, Any] = {
         name: one
         for name, one in names.items()
         if inspect.isclass(one) and one.__module__ == "reflex" and "__call__" in vars(one)

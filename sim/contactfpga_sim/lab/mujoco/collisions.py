@@ -205,8 +205,9 @@ def by_sheet(arm: Arm, case: Collision) -> Heard:
 
         def says(_: Any) -> tuple[bool, float | None, float]:
             found = [one for one in sheets.snapshot().contacts("link") if one.point_m is not None]
+            along_m = [one.point_m[0] for one in found if one.point_m is not None]
             area = sum(one.zone.area_cells for one in found)
-            return bool(found), float(np.mean([one.point_m[0] for one in found])) if found else None, float(area)
+            return bool(found), float(np.mean(along_m)) if found else None, float(area)
 
         return collide(arm, case, data, sheets.step, says)
 
