@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra
+from contactfpga.robot.haptics import confidence
 from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution, Touch
 from contactfpga.robot.haptics.values import HapticsError, skew
 from contactfpga.robot.haptics.wrench import ALARM, Wrench
@@ -102,10 +103,11 @@ class System:
             covariance = np.array(self.noise.covariance)
             covariance[3:, 3:] += more
             self.weight = np.asarray(np.linalg.inv(covariance), float)
+            self.root = np.linalg.cholesky(self.weight).T
         else:
             self.noise = self.noise.widened(more)
             self.weight = self.noise.information
-        self.__dict__.pop("root", None)
+            self.root = self.noise.root
         return True
 
     def chi2(self, rest: Floats) -> float | None:
@@ -147,7 +149,16 @@ def by_least_squares(system: System) -> Solution:
         forces = _along_normals(system)
     if _suffice(system, forces):
         return _solution(system, forces, PURE_FORCE_WITH_KNOWN_DIRECTION)
-    return _solution(system, _along_edges(system), PURE_FORCE)
+    forces = _along_edges(system)
+    return _solution(system, forces, PURE_FORCE, beyond=_beyond(system, forces))
+
+
+def _beyond(system: System, forces: Sequence[Vector]) -> bool:
+    """Whether these forces, the best within friction's cones, exert the wrench worse than any forces at these places."""
+    matrix = system.root @ system.matrix()
+    rest = system.root @ system.wrench - matrix @ np.ravel(forces)
+    more = matrix @ np.linalg.lstsq(matrix, rest, rcond=confidence.KNOWN)[0]
+    return float(more @ more) > SMALL * float(system.wrench @ system.weight @ system.wrench)
 
 
 def within_cones(system: System) -> Solution:
@@ -156,7 +167,8 @@ def within_cones(system: System) -> Solution:
     forces = _nearest(system)
     if system.places_widen(forces):
         forces = _nearest(system)
-    return _solution(system, [vector(force) for force in forces.reshape(-1, 3)], PURE_FORCE)
+    found = [vector(force) for force in forces.reshape(-1, 3)]
+    return _solution(system, found, PURE_FORCE, beyond=_beyond(system, found))
 
 
 def _along_normals(system: System) -> list[Vector]:
@@ -228,13 +240,15 @@ def _least_squares(matrix: Floats, wanted: Floats) -> Floats:
     return np.asarray(nnls(matrix, wanted)[0])
 
 
-def _solution(system: System, forces: list[Vector], model: str, frictionless: bool = False) -> Solution:
+def _solution(
+    system: System, forces: list[Vector], model: str, frictionless: bool = False, beyond: bool = False
+) -> Solution:
     known = model == PURE_FORCE_WITH_KNOWN_DIRECTION
     matrix = system.pushes() if known else system.matrix()
     rank, null = _spaces(system, matrix)
 
     def intervals() -> list[Interval]:
-        return _intervals(system, forces, frictionless)
+        return intervals_of(system, forces, frictionless, beyond)
 
     def covariance() -> Floats | None:
         if system.noise is None:
@@ -249,7 +263,8 @@ def _solution(system: System, forces: list[Vector], model: str, frictionless: bo
 
     chi2, freedom = system.chi2(system.wrench - system.matrix() @ np.ravel(forces)), system.freedom(rank)
     null_space = null.T.tolist()
-    return Solution(model, forces, intervals, rank, null_space, chi2, freedom, system.touches, system.given, covariance)
+    given = (system.touches, system.given, covariance, beyond)
+    return Solution(model, forces, intervals, rank, null_space, chi2, freedom, *given)
 
 
 def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:
@@ -283,7 +298,31 @@ def _frame(normal: Vector) -> Floats:
     return np.stack([inward, first, np.cross(inward, first)], axis=1)
 
 
-def _intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
+def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, beyond: bool) -> list[Interval]:
+    """The least and largest push in N of each contact, which also hold the pushes of ``forces``: with noise 95 % of it
+    (:mod:`contactfpga.robot.haptics.confidence`), without it all that exert exactly the same wrench.
+
+    Args:
+        frictionless: all forces lie along the normals.
+        beyond: ``forces`` do not exert the wrench. With noise friction then bounds nothing.
+    """
+    if system.noise is None:
+        return _exact(system, forces, frictionless)
+    basis, firsts = _basis(system.touches, frictionless)
+    matrix, wanted = system.root @ system.matrix() @ basis, system.root @ system.wrench
+    pushes = [max(0.0, float(one)) for one in (basis.T @ np.ravel(forces))[firsts]]
+    size = max(pushes)
+    if beyond and not frictionless:
+        found = confidence.of_pushes(matrix[:, firsts], wanted, np.delete(matrix, firsts, axis=1), size)
+    else:
+        frictions = [0.0 if frictionless else touch.friction for touch in system.touches]
+        found = confidence.Fit(matrix, wanted, firsts, frictions, size).intervals()
+    return [
+        (min(push, low), None if high is None else max(push, high)) for push, (low, high) in zip(pushes, found)
+    ]
+
+
+def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
     """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
     ``forces``, which lie in them, and so in the interval. None: no largest one."""
     basis, firsts = _basis(system.touches, frictionless)
