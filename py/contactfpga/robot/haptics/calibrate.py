@@ -19,12 +19,16 @@ NOISE = 5.0
 """Times its noise that a combination of readings must have varied to count as loaded."""
 
 
+PER_UNIT = 10
+"""Loads for each unit from which on their readings tell the covariance of the units' noise."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Calibration:
     """What known loads say of the units."""
 
     cells: LoadCells
-    """With the matrix and the zeros found."""
+    """With the matrix and the zeros found, and the covariance of noise if there were :data:`PER_UNIT` loads a unit."""
     rank: int
     """Independent loads; 6 are all."""
     missing: tuple[str, ...]
@@ -68,7 +72,16 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     rank, open_ones = rank_of(known, length)
     missing = tuple(" with ".join(_named(one)) for one in reduced(open_ones))
     off = _rms(after)
-    return Calibration(cells.changed(zeros, matrix), rank, missing, off, _advice(cells, rank, missing, off))
+    noise = _noise_n2(cells, deviations, known) if len(known) >= PER_UNIT * count else cells.noise_n2
+    return Calibration(cells.changed(zeros, matrix, noise), rank, missing, off, _advice(cells, rank, missing, off))
+
+
+def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
+    """(n, n): of what loads and zeros do not explain of the readings."""
+    explains = np.column_stack([loads, np.ones(len(loads))])
+    found, _, rank, _ = np.linalg.lstsq(explains, deviations, rcond=SEEN)
+    rest = (deviations - explains @ found) * np.array([unit.gain_n for unit in cells.units])
+    return np.asarray(rest.T @ rest / (len(loads) - rank))
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:

@@ -21,11 +21,14 @@ from contactfpga.surfaces.shapes import Floats
 CHI2_1 = 3.841458820694124
 """One degree of freedom stays below it in 95 of 100 cases."""
 
-LARGEST = 1e3
-"""Times the measured force: a push that may come near to this has no largest one."""
+LARGEST = 1e4
+"""Times the measured force: no push is looked for beyond."""
+
+UNBOUNDED = 500.0
+"""Times the measured force: a push that may be larger than this has no largest one."""
 
 GAP = 1e-4
-"""How near to its end a push is found, as a share of the measured force."""
+"""How near to its end a push is found, as a share of the measured force; the end that is stated lies as far outside."""
 
 LEAST = 1e-4
 """How near to the least misfit, in squares of noise."""
@@ -55,7 +58,8 @@ class Fit:
     def __init__(
         self, matrix: Floats, wanted: Floats, firsts: Sequence[int], frictions: Sequence[float], size_n: float
     ):
-        self._size = max(size_n, 1e-9)
+        sensitive = np.linalg.norm(matrix, axis=0)
+        self._size = max(size_n, 1 / float(sensitive[sensitive > 0].min()))  # at least a standard deviation
         self._matrix, self._wanted, self._firsts = matrix * self._size, wanted, list(firsts)
         self._square = self._matrix.T @ self._matrix
         self._cones = np.zeros((len(self._firsts), matrix.shape[1]))
@@ -77,7 +81,7 @@ class Fit:
         rest = [first for first, ends in found.items() if ends is None]
         ends = {first: ends for first, ends in found.items() if ends is not None} | self._ends(rest)
         scaled = [(self._size * ends[first][0], self._size * ends[first][1]) for first in self._firsts]
-        most = 0.5 * LARGEST * self._size
+        most = UNBOUNDED * self._size
         return [(max(0.0, low), None if high > most else max(0.0, high)) for low, high in scaled]
 
     def _alone(self, first: int) -> tuple[float, float] | None:
@@ -117,7 +121,10 @@ class Fit:
             goals[2 * at, first], goals[2 * at + 1, first] = 1.0, -1.0
         most = float(self.misfit(inner)[0]) + CHI2_1
         found = _descended(_Goal(self, goals, most), np.repeat(inner, len(goals), axis=0), GAP)
-        return {first: (float(found[2 * at, first]), float(found[2 * at + 1, first])) for at, first in enumerate(firsts)}
+        return {
+            first: (float(found[2 * at, first]) - GAP, float(found[2 * at + 1, first]) + GAP)
+            for at, first in enumerate(firsts)
+        }
 
     def misfit(self, x: Floats) -> Floats:
         """(m,): in squares of noise, of (m, n) rows."""
