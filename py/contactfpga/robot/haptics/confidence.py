@@ -10,7 +10,7 @@ each cone and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,27 +60,31 @@ class Fit:
     ):
         sensitive = np.linalg.norm(matrix, axis=0)
         self._size = max(size_n, 1 / float(sensitive[sensitive > 0].min()))  # at least a standard deviation
-        self._matrix, self._wanted, self._firsts = matrix * self._size, wanted, list(firsts)
-        self._square = self._matrix.T @ self._matrix
-        self._cones = np.zeros((len(self._firsts), matrix.shape[1]))
+        self.matrix, self.wanted, self.frictions, self.firsts = matrix * self._size, wanted, frictions, list(firsts)
+        self.square = self.matrix.T @ self.matrix
+        """(n, n): half the second derivative of the misfit."""
+        self._cones = np.zeros((len(self.firsts), matrix.shape[1]))
         """Times the squares of x, above 0 inside a cone: its push squared, less the rest squared over friction."""
-        for cone, first, friction in zip(self._cones, self._firsts, frictions):
+        for cone, first, friction in zip(self._cones, self.firsts, frictions):
             cone[first] = 1.0
             if friction:
                 cone[first + 1 : first + 3] = -1 / friction**2
-        left, values, right = np.linalg.svd(self._matrix)
+        left, values, right = np.linalg.svd(self.matrix)
         rank = int((values > KNOWN * values[0]).sum())
         self._null = right[rank:].T
         self._root = right[:rank].T / values[:rank]
         """(n, rank): times its transpose it is the covariance."""
         self._best = self._root @ (left[:, :rank].T @ wanted)
 
-    def intervals(self) -> list[Interval]:
-        """Least and largest of each push; None where there is no largest one."""
-        found = {first: self._alone(first) for first in self._firsts}
-        rest = [first for first, ends in found.items() if ends is None]
-        ends = {first: ends for first, ends in found.items() if ends is not None} | self._ends(rest)
-        scaled = [(self._size * ends[first][0], self._size * ends[first][1]) for first in self._firsts]
+    def intervals(self, ends_of: Ends | None = None) -> list[Interval]:
+        """Least and largest of each push; None where there is no largest one. ``ends_of`` finds those that the wrench
+        alone does not fix; by default :func:`ends_of_few`."""
+        found = {first: self._alone(first) for first in self.firsts}
+        rest = [first for first, both in found.items() if both is None]
+        ends = {first: both for first, both in found.items() if both is not None}
+        if rest:
+            ends |= (ends_of or ends_of_few)(self, rest)
+        scaled = [(self._size * ends[first][0], self._size * ends[first][1]) for first in self.firsts]
         most = UNBOUNDED * self._size
         return [(max(0.0, low), None if high > most else max(0.0, high)) for low, high in scaled]
 
@@ -105,50 +109,33 @@ class Fit:
 
     def _inside(self, x: Floats) -> NDArray[np.bool_]:
         """Of each (m, n) row: whether it lies in all cones."""
-        pushes = x[:, self._firsts]
+        pushes = x[:, self.firsts]
         within = (pushes > 0) & (pushes < LARGEST) & (x * x @ self._cones.T > 0)
         return np.asarray(within.all(axis=1))
 
-    def _ends(self, firsts: Sequence[int]) -> dict[int, tuple[float, float]]:
-        """The least and the largest of each of these pushes, all at once."""
-        if not firsts:
-            return {}
-        start = np.zeros((1, self._matrix.shape[1]))
-        start[:, self._firsts] = 1.0
-        inner = _descended(_Goal(self, None, None), start, LEAST)
-        goals = np.zeros((2 * len(firsts), inner.shape[1]))
-        for at, first in enumerate(firsts):
-            goals[2 * at, first], goals[2 * at + 1, first] = 1.0, -1.0
-        most = float(self.misfit(inner)[0]) + CHI2_1
-        found = _descended(_Goal(self, goals, most), np.repeat(inner, len(goals), axis=0), GAP)
-        return {
-            first: (float(found[2 * at, first]) - GAP, float(found[2 * at + 1, first]) + GAP)
-            for at, first in enumerate(firsts)
-        }
-
     def misfit(self, x: Floats) -> Floats:
         """(m,): in squares of noise, of (m, n) rows."""
-        rest = x @ self._matrix.T - self._wanted
+        rest = x @ self.matrix.T - self.wanted
         return np.asarray((rest * rest).sum(axis=1))
 
     def half_slope(self, x: Floats) -> Floats:
         """(m, n): half the derivative of the misfit; that of the derivative is the (n, n) ``square``."""
-        return np.asarray((x @ self._matrix.T - self._wanted) @ self._matrix)
+        return np.asarray((x @ self.matrix.T - self.wanted) @ self.matrix)
 
     @property
-    def square(self) -> Floats:
-        """(n, n): half the second derivative of the misfit."""
-        return self._square
+    def contacts(self) -> int:
+        """Of which a push is asked."""
+        return len(self.firsts)
 
     @property
     def walls(self) -> int:
         """Of the barrier, each as often as it counts."""
-        return 3 * len(self._firsts) + 1
+        return 3 * len(self.firsts) + 1
 
     def barrier(self, x: Floats) -> Floats:
         """(m,): infinite outside of the cones."""
         inside = self._inside(x)
-        rooms, left = x * x @ self._cones.T, LARGEST - x[:, self._firsts]
+        rooms, left = x * x @ self._cones.T, LARGEST - x[:, self.firsts]
         with np.errstate(invalid="ignore", divide="ignore"):
             value = -np.log(rooms).sum(axis=1) - np.log(left).sum(axis=1)
         return np.where(inside, value, np.inf)
@@ -158,13 +145,29 @@ class Fit:
         over = 1 / (x * x @ self._cones.T)
         ways = 2 * self._cones * x[:, None] * over[:, :, None]
         slope, curve = -ways.sum(axis=1), ways.transpose(0, 2, 1) @ ways
-        left = 1 / (LARGEST - x[:, self._firsts])
-        slope[:, self._firsts] += left
+        left = 1 / (LARGEST - x[:, self.firsts])
+        slope[:, self.firsts] += left
         diagonal = -2 * over @ self._cones
-        diagonal[:, self._firsts] += left * left
+        diagonal[:, self.firsts] += left * left
         at = np.arange(x.shape[1])
         curve[:, at, at] += diagonal
-        return slope, curve
+        return np.asarray(slope), np.asarray(curve)
+
+
+def ends_of_few(fit: Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float]]:
+    """The least and the largest of each of these pushes, all at once."""
+    start = np.zeros((1, fit.matrix.shape[1]))
+    start[:, fit.firsts] = 1.0
+    inner = _descended(_Goal(fit, None, None), start, LEAST)
+    goals = np.zeros((2 * len(firsts), inner.shape[1]))
+    for at, first in enumerate(firsts):
+        goals[2 * at, first], goals[2 * at + 1, first] = 1.0, -1.0
+    most = float(fit.misfit(inner)[0]) + CHI2_1
+    found = _descended(_Goal(fit, goals, most), np.repeat(inner, len(goals), axis=0), GAP)
+    return {
+        first: (float(found[2 * at, first]) - GAP, float(found[2 * at + 1, first]) + GAP)
+        for at, first in enumerate(firsts)
+    }
 
 
 class _Goal:
@@ -223,14 +226,16 @@ def _centered(goal: _Goal, x: Floats, weight: float) -> Floats:
     return x
 
 
-def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> list[Interval]:
-    """The intervals of pushes >= 0, by their columns in ``matrix``, whatever the forces along the surface are, of which
-    ``sides`` are the columns."""
+def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> Fit | None:
+    """Pushes by their columns in ``matrix``, whatever the forces along the surface are, of which ``sides`` are the
+    columns; None where those alone exert every wrench."""
     if sides.shape[1]:
         left, values, _ = np.linalg.svd(sides)
         rest = left[:, int((values > KNOWN * values[0]).sum()) :].T
         matrix, wanted = rest @ matrix, rest @ wanted
     count = matrix.shape[1]
-    if not matrix.any():
-        return [(0.0, None)] * count
-    return Fit(matrix, wanted, range(count), [0.0] * count, size_n).intervals()
+    return Fit(matrix, wanted, range(count), [0.0] * count, size_n) if matrix.any() else None
+
+
+Ends = Callable[[Fit, Sequence[int]], dict[int, tuple[float, float]]]
+"""The least and the largest of these pushes, over the size of the fit."""

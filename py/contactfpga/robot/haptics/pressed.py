@@ -33,7 +33,9 @@ class Pressed:
     def __init__(self, cover: Cover, pitch_x_m: float, pitch_y_m: float):
         self._cells = Cells(cover, LINES, LINES, pitch_x_m, pitch_y_m)
         self._pitches_m = pitch_x_m, pitch_y_m
-        self._balls = [Ball(radius, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson)) for radius in RADII_M]
+        self._balls = [
+            Ball(radius, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson)) for radius in RADII_M
+        ]
         self._tables: dict[int, dict[int, float]] = {}
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:

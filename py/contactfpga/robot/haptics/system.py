@@ -103,7 +103,7 @@ class System:
             covariance = np.array(self.noise.covariance)
             covariance[3:, 3:] += more
             self.weight = np.asarray(np.linalg.inv(covariance), float)
-            self.root = np.linalg.cholesky(self.weight).T
+            self.root = np.asarray(np.linalg.cholesky(self.weight).T, float)
         else:
             self.noise = self.noise.widened(more)
             self.weight = self.noise.information
@@ -313,13 +313,34 @@ def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, b
     pushes = [max(0.0, float(one)) for one in (basis.T @ np.ravel(forces))[firsts]]
     size = max(pushes)
     if beyond and not frictionless:
-        found = confidence.of_pushes(matrix[:, firsts], wanted, np.delete(matrix, firsts, axis=1), size)
+        fit = confidence.of_pushes(matrix[:, firsts], wanted, np.delete(matrix, firsts, axis=1), size)
+        found = _fitted(fit) if fit else [(0.0, None)] * len(firsts)
     else:
-        frictions = [0.0 if frictionless else touch.friction for touch in system.touches]
-        found = confidence.Fit(matrix, wanted, firsts, frictions, size).intervals()
-    return [
-        (min(push, low), None if high is None else max(push, high)) for push, (low, high) in zip(pushes, found)
-    ]
+        found = _fitted(confidence.Fit(matrix, wanted, firsts, _frictions(system.touches, frictionless), size))
+    return [(min(push, low), None if high is None else max(push, high)) for push, (low, high) in zip(pushes, found)]
+
+
+def _fitted(fit: confidence.Fit) -> list[Interval]:
+    """The solver of numpy's takes the more time the more contacts there are, and is for two at most."""
+    return fit.intervals() if fit.contacts <= 2 else fit.intervals(_ends_of_many)
+
+
+def _ends_of_many(fit: confidence.Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float]]:
+    nothing = np.zeros((0, fit.matrix.shape[1]))
+    solver = _Solver(fit.frictions, nothing, np.zeros(fit.matrix.shape[1]))
+    scale = max(1.0, float(np.abs(fit.square).max()))
+    best = solver.solve(fit.square / scale, -(fit.matrix.T @ fit.wanted) / scale)
+    most = math.sqrt(float(fit.misfit(best[None])[0]) + confidence.CHI2_1)
+    bounded = _Solver(fit.frictions, nothing, np.zeros(len(best)), (fit.matrix, fit.wanted, most))
+    found = {}
+    for first in firsts:
+        low, high = bounded.least(first, 1.0), bounded.least(first, -1.0)
+        found[first] = (0.0 if low is None else low, math.inf if high is None else -high)
+    return found
+
+
+def _frictions(touches: Sequence[Touch], frictionless: bool) -> list[float]:
+    return [0.0 if frictionless else touch.friction for touch in touches]
 
 
 def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
@@ -338,7 +359,7 @@ def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list
         if float(np.abs(free[first]).max(initial=0.0)) <= DETERMINED:
             found.append((push, push))
             continue
-        solver = solver or _Solver(system.touches, frictionless, fixed, start / size)
+        solver = solver or _Solver(_frictions(system.touches, frictionless), fixed, start / size)
         low, high = solver.least(first, 1.0), solver.least(first, -1.0)
         least = 0.0 if low is None else min(push, max(0.0, float(start[first]) + size * low))
         found.append((least, None if high is None else max(push, float(start[first]) - size * high)))
@@ -357,7 +378,7 @@ def _nearest(system: System) -> Floats:
     size = max(1e-12, float(np.abs(system.wrench[:3]).max()))
     wanted = matrix.T @ (system.root @ system.wrench) / size
     scale = float(np.abs(square).max())
-    solver = _Solver(system.touches, False, np.zeros((0, len(square))), np.zeros(len(square)))
+    solver = _Solver(_frictions(system.touches, False), np.zeros((0, len(square))), np.zeros(len(square)))
     return np.asarray(basis @ (size * solver.solve(square / scale, -wanted / scale)))
 
 
@@ -374,9 +395,20 @@ def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[i
 
 class _Solver:
     """start + y in all cones, where fixed y = 0. So few of its numbers are not 0 that 64 contacts take no longer each
-    than three do; with the null space of ``fixed`` in place of it they take 50 times as long."""
+    than three do; with the null space of ``fixed`` in place of it they take 50 times as long.
 
-    def __init__(self, touches: Sequence[Touch], frictionless: bool, fixed: Floats, start: Floats):
+    Args:
+        frictions: of each contact; 0: a push alone.
+        near: a matrix, what it times y should be, and by how much it may be off.
+    """
+
+    def __init__(
+        self,
+        frictions: Sequence[float],
+        fixed: Floats,
+        start: Floats,
+        near: tuple[Floats, Floats, float] | None = None,
+    ):
         try:
             import clarabel
             from scipy import sparse
@@ -385,12 +417,18 @@ class _Solver:
         self._clarabel, self._sparse = clarabel, sparse
         scales: list[float] = []
         self._cones: list[Any] = [clarabel.ZeroConeT(len(fixed))] if len(fixed) else []
-        for touch in touches:
-            flat = frictionless or not touch.friction
-            scales += [1.0] if flat else [touch.friction, 1.0, 1.0]
-            self._cones.append(clarabel.NonnegativeConeT(1) if flat else clarabel.SecondOrderConeT(3))
-        self._sides = sparse.vstack([sparse.csc_matrix(fixed), -sparse.diags(scales)], format="csc")
-        self._start = np.concatenate([np.zeros(len(fixed)), np.array(scales) * start])
+        for friction in frictions:
+            scales += [friction, 1.0, 1.0] if friction else [1.0]
+            self._cones.append(clarabel.SecondOrderConeT(3) if friction else clarabel.NonnegativeConeT(1))
+        sides = [sparse.csc_matrix(fixed), -sparse.diags(scales)]
+        starts = [np.zeros(len(fixed)), np.array(scales) * start]
+        if near is not None:
+            matrix, wanted, most = near
+            sides += [sparse.csc_matrix((1, matrix.shape[1])), sparse.csc_matrix(matrix)]
+            starts += [np.array([most]), wanted]
+            self._cones.append(clarabel.SecondOrderConeT(1 + len(wanted)))
+        self._sides = sparse.vstack(sides, format="csc")
+        self._start = np.concatenate(starts)
 
     def least(self, at: int, factor: float) -> float | None:
         """The least of ``factor`` times this one of y; None where there is none."""
