@@ -1,5 +1,5 @@
-"""Intervals of pushes with the units' noise: how often they hold the true push, by contacts, wrenches and noise that the
-test draws itself; the ends against a cone program of its own, and for one contact on one unit against the closed form.
+"""Intervals of pushes with the units' noise: how often they hold the true push, by contacts, wrenches and noise that
+the test draws itself; the ends against a cone program of its own, and for one contact on one unit against the closed form.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ Z = 1.959964
 
 
 def drawn(rng, count, drag, surface):
-    """Points, normals and forces: ``drag`` is the share of friction's cone that the forces use, 1 at the cone itself."""
+    """Points, normals and forces: ``drag`` is the share of friction's cone that they use, 1 at the cone itself."""
     points, normals = scattered(rng, count)
     if surface == "plane":
         while True:
@@ -153,12 +153,14 @@ def test_where_the_units_fix_a_push_its_interval_holds_it_in_95_of_100(count, dr
 @pytest.mark.parametrize("drag", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_intervals_hold_pushes_over_many_contacts(count, drag, surface):
-    """93 % at least, of 800 to 1,200 pushes each; 97 % at most where the units alone fix them. Some 60 s in all."""
-    share, beyond = share_inside(count, drag, surface, 1000 if count == 1 else 400, sigma_m=0.001, seed=7)
-    assert share >= 0.93
+    """95 % at least but for chance, and no more where the units alone fix them. Some 60 s in all."""
+    trials = 1000 if count == 1 else 200
+    share, beyond = share_inside(count, drag, surface, trials, sigma_m=0.001, seed=7)
+    room = 3 * math.sqrt(0.95 * 0.05 / trials)
+    assert share >= 0.95 - room
     assert drag < 1 or count == 3 or beyond > 0.1
     if (surface == "plane" and drag < 1) or count == 1:
-        assert share <= 0.97
+        assert share <= 0.95 + room
 
 
 def test_a_drag_at_the_cone_is_reported_and_widens():

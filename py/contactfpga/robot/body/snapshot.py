@@ -69,7 +69,8 @@ class LinkContact:
     @property
     def interval_n(self) -> tuple[float, float | None] | None:
         """Least and largest push, which hold the push in at least 95 of 100 cases; the second is None where there is no
-        largest one. None as ``force_n``."""
+        largest one. None as ``force_n``. With three contacts or more it may raise :class:`~contactfpga.MissingExtra`
+        without ``haptics``."""
         return None if self._felt is None else self._felt.interval_n
 
     def moved(self, pose: Pose, frame: str) -> LinkContact:

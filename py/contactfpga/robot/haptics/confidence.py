@@ -4,8 +4,9 @@ they exert fits the measured one nearly as well as the best.
 For one push the misfit (in squares of noise, uncertain places counted in) may exceed its least by 3.84, what chi-square
 of one degree of freedom stays below in 95 of 100 cases (profile likelihood: Meeker and Escobar, The American
 Statistician 49, 1995). Where the wrench alone fixes a push, and its ends lie within the cones, that is the push plus or
-minus 1.96 standard deviations. Else the ends are found by an interior-point method of numpy's: a logarithmic barrier for
-each cone and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3).
+minus 1.96 standard deviations. Else the ends of one or two contacts are found by Newton's method with a logarithmic
+barrier for each cone and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3), those of more by Clarabel
+(:mod:`contactfpga.robot.haptics.system`).
 """
 
 from __future__ import annotations
@@ -42,6 +43,9 @@ CENTERED = 1e-3
 STEPS = 80
 """Newton's at each barrier, and halvings of one, at most; some five are taken."""
 
+ROUNDING = 1e-13
+"""Added to a matrix of ones on the diagonal, so that rounding makes it no singular one."""
+
 KNOWN = 1e-9
 """Share below which a singular value, or what the null space does to a push, is 0."""
 
@@ -58,8 +62,9 @@ class Fit:
     def __init__(
         self, matrix: Floats, wanted: Floats, firsts: Sequence[int], frictions: Sequence[float], size_n: float
     ):
-        sensitive = np.linalg.norm(matrix, axis=0)
-        self._size = max(size_n, 1 / float(sensitive[sensitive > 0].min()))  # at least a standard deviation
+        felt = np.linalg.norm(matrix, axis=0)
+        matrix = np.where(felt > KNOWN * felt.max(), matrix, 0.0)
+        self._size = max(size_n, 1 / float(felt[matrix.any(axis=0)].min()))  # at least a standard deviation
         self.matrix, self.wanted, self.frictions, self.firsts = matrix * self._size, wanted, frictions, list(firsts)
         self.square = self.matrix.T @ self.matrix
         """(n, n): half the second derivative of the misfit."""
@@ -196,8 +201,10 @@ class _Goal:
             slope = slope + weight * self._goals + 2 * half / room
             edge = 2 * half / room
             curve = curve + 2 * self.fit.square / room[:, :, None] + edge[:, :, None] * edge[:, None]
-        found = -np.linalg.solve(curve, slope[:, :, None])[:, :, 0]
-        return found, -(found * slope).sum(axis=1)
+        scale = 1 / np.sqrt(np.diagonal(curve, axis1=1, axis2=2))
+        even = curve * scale[:, :, None] * scale[:, None] + ROUNDING * np.eye(x.shape[1])
+        found = -scale * np.linalg.solve(even, (scale * slope)[:, :, None])[:, :, 0]
+        return np.asarray(found), np.asarray(-(found * slope).sum(axis=1))
 
 
 def _descended(goal: _Goal, x: Floats, gap: float) -> Floats:

@@ -119,7 +119,7 @@ class Contact:
         With the units' noise it holds the push in at least 95 of 100 cases
         (:mod:`contactfpga.robot.haptics.confidence`): noise, uncertain places and what friction leaves open are in it.
         Without noise (:attr:`Wrench.noise` None) it is the range of all forces that friction allows and that exert
-        exactly this wrench; with three contacts or more that may need Clarabel: raises
+        exactly this wrench. With three contacts or more either may need Clarabel: raises
         :class:`~contactfpga.MissingExtra` without it."""
         return None if self._intervals is None else self._intervals()[self._number]
 
@@ -240,8 +240,8 @@ class Contacts(Sequence[Contact]):
 
     @property
     def unfelt(self) -> list[Contact]:
-        """What only the sheet sees: contacts that may push with no force at all (:attr:`Contact.interval_n`). Two fingers
-        that squeeze the link are such contacts."""
+        """What only the sheet sees: contacts that may push with no force at all (:attr:`Contact.interval_n`). Two
+        fingers that squeeze the link are such contacts."""
         return [one for one, (least, _) in zip(self._contacts, self._kept_intervals) if least <= 1e-9]
 
     @overload

@@ -154,7 +154,7 @@ def by_least_squares(system: System) -> Solution:
 
 
 def _beyond(system: System, forces: Sequence[Vector]) -> bool:
-    """Whether these forces, the best within friction's cones, exert the wrench worse than any forces at these places."""
+    """Whether these forces, the best within friction's cones, exert the wrench worse than others at these places."""
     matrix = system.root @ system.matrix()
     rest = system.root @ system.wrench - matrix @ np.ravel(forces)
     more = matrix @ np.linalg.lstsq(matrix, rest, rcond=confidence.KNOWN)[0]
