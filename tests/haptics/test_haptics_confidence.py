@@ -1,6 +1,6 @@
 """Intervals of pushes with the units' noise: how often they hold the true push, by contacts, wrenches and noise that
-the test draws itself; the ends against a cone program of its own, and for one contact on one unit against the closed form.
-"""
+the test draws itself; the ends against a cone program of its own, and for one contact on one unit against the closed
+form."""
 
 import dataclasses
 import math

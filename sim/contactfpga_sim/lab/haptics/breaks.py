@@ -1,7 +1,7 @@
 """Where force joined to location fails: one thing that is not as assumed is increased until what is stated is wrong.
 
-Each value of a knob is tried with contacts at random places and of random forces, as many as it takes to say whether the
-stated 95 % hold for 90 % of them. The system says so where it does for half of those for which they do not hold.
+Each value of a knob is tried with contacts at random places and of random forces, as many as it takes to say whether
+the stated 95 % hold for 90 % of them. The system says so where it does for half of those for which they do not hold.
 """
 
 from __future__ import annotations
