@@ -14,7 +14,7 @@ import numpy as np
 from contactfpga import notebook
 from contactfpga.inputs.values import shown
 from contactfpga.robot.haptics.units import LoadCells
-from contactfpga.robot.haptics.values import HapticsError
+from contactfpga.robot.haptics.values import HapticsError, within
 from contactfpga.robot.haptics.wrench import ALARM, Center, Motion, Wrench
 from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.zones.zone import Zone, Zones
@@ -27,6 +27,9 @@ PURE_FORCE_WITH_KNOWN_DIRECTION = "PURE_FORCE_WITH_KNOWN_DIRECTION"
 """At each contact a push along the normal."""
 
 Interval = tuple[float, float | None]
+
+LEAST_FRICTION = 1e-6
+"""Divided by, it is still a number."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -45,11 +48,12 @@ class Touch:
         length = math.hypot(*self.normal)
         if not abs(length - 1) < 1e-6:
             raise HapticsError(f"normal is {shown(self.normal)}; its length must be 1, and is {length:g}")
-        if not math.isfinite(sum(self.point_m)):
-            raise HapticsError(f"point_m is {shown(self.point_m)}; it must be three finite numbers in m")
+        within("point_m", self.point_m, "m")
         if not (0 <= self.friction < 1e3 and 0 <= self.point_sigma_m < 1e3):
             name = "point_sigma_m" if 0 <= self.friction < 1e3 else "friction"
             raise HapticsError(f"{name} is {shown(getattr(self, name))}; it must be a number from 0 to 1000")
+        if 0 < self.friction < LEAST_FRICTION:
+            raise HapticsError(f"friction is {self.friction:g}; it must be 0, or at least {LEAST_FRICTION:g}")
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

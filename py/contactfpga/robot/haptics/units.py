@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,17 @@ import numpy as np
 
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown, suggestion
-from contactfpga.robot.haptics.values import HapticsError, direction, matrix, number, positive, skew, vector
+from contactfpga.robot.haptics.values import (
+    HapticsError,
+    array,
+    direction,
+    matrix,
+    number,
+    positive,
+    skew,
+    vector,
+    within,
+)
 from contactfpga.robot.haptics.wrench import SURFACES, Bumper, Motion, Noise, Surface, Wrench, read_surface
 from contactfpga.surfaces.shapes import Floats, Vector
 
@@ -36,6 +45,15 @@ class Unit:
     """Readings at its ends: a unit that reads one of them is saturated. None: it has none."""
     preload_n: float | None = None
     """What a spring presses it with while nothing touches. None: not known, and whether it lifts is not told."""
+
+    def __post_init__(self) -> None:
+        within("point_m", self.point_m, "m")
+        within("axis", self.axis, "")
+        within("zero", (self.zero,), "")
+        positive("gain_n without its sign", abs(self.gain_n), "N")
+        positive("sigma_n", self.sigma_n, "N")
+        if self.preload_n is not None:
+            number("preload_n", self.preload_n, 0, unit="N")
 
 
 COMPONENTS = ("force along x", "force along y", "force along z", "moment about x", "moment about y", "moment about z")
@@ -114,7 +132,7 @@ class LoadCells:
     def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
         """What the contacts exert on the link, from one reading per unit. With ``motion`` the bumper's weight and
         inertia are taken out; without, it has to be at rest as when its zeros were read."""
-        read = np.array(readings, float)
+        read = array("readings", readings)
         if read.shape != self.zeros.shape:
             raise HapticsError(
                 f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
@@ -124,8 +142,6 @@ class LoadCells:
         if motion is not None and self.bumper is not None and self._weight is not None:
             values = values + (self.bumper.wrench(motion) - self._weight)
         fx, fy, fz, mx, my, mz = values.tolist()
-        if not math.isfinite(fx + fy + fz + mx + my + mz):
-            raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
         saturated, lifted = self._saturated(read), self._lifted(deviations)
         return Wrench((fx, fy, fz), (mx, my, mz), self.noise, self.frame, saturated, lifted)
 
@@ -144,13 +160,11 @@ class LoadCells:
         return np.asarray((np.atleast_2d(self._read(readings)) - self.zeros) @ self.matrix.T)
 
     def _read(self, readings: Sequence[float] | Floats) -> Floats:
-        read = np.asarray(readings, float)
+        read = array("readings", readings)
         if read.ndim == 0 or read.shape[-1] != len(self.units):
             raise HapticsError(
                 f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
             )
-        if not np.isfinite(read).all():
-            raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
         return read
 
     @functools.cached_property
