@@ -14,6 +14,7 @@ import numpy as np
 
 from contactfpga.design.cover import medium, sense
 from contactfpga.design.cover.answer import NoSolution, numbers
+from contactfpga.inputs.values import shown
 from contactfpga.robot.haptics import posterior
 from contactfpga.robot.haptics.posterior import Box, Posterior
 from contactfpga.robot.haptics.values import HapticsError, number
@@ -203,7 +204,9 @@ class Locator:
 
     def __init__(self, sheet: sheets.Sheet, reach: Reach, spread: float = 0.0, force_sigma_n: float = 0.0):
         if not (0 <= spread < 1 and 0 <= force_sigma_n < 1e6):
-            raise HapticsError(f"spread is {spread} and force_sigma_n {force_sigma_n}; give 0 to 1, and 0 N or above")
+            raise HapticsError(
+                f"spread is {shown(spread)} and force_sigma_n {shown(force_sigma_n)}; give 0 to 1, and 0 N or above"
+            )
         self._sheet = sheet
         self._pitch_x, self._pitch_y = 1e-3 * sheet.pitch_x_mm, 1e-3 * sheet.pitch_y_mm
         self._reach = reach
