@@ -67,6 +67,18 @@ def says(knob: Knob, sweep: Sweep) -> str:
     return "; ".join(parts)
 
 
+CLOSED = ("knob", "closed form", "value")
+
+
+def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
+    """A row for each knob that has a closed form: in words, and as values."""
+    lines = []
+    for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
+        values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
+        lines.append(writer.line((f"[{knob.title}](#{knob.name})", knob.closed_form, f"{values} ({knob.axis})")))
+    return writer.table(CLOSED, lines)
+
+
 UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
