@@ -39,6 +39,9 @@ SIGMA_N = 0.05
 REACH_M = 0.0036
 """How far 12 N close switches, which is as unsure as a zone's place is: half of it along each axis."""
 
+SLOW = 480
+"""Draws at most of what takes 10 ms each."""
+
 TRIES = 50
 """Touches for one that closes a switch."""
 
@@ -196,7 +199,10 @@ def _places(
         changed = dataclasses.replace(case, **{name: change(value) for name, change in knob.items()})  # type: ignore[arg-type]
         return _located(changed, rng, count)
 
-    return {name: _rated(functools.partial(draws, case), most=480) for name, case in methods}
+    return {
+        name: _rated(functools.partial(draws, case), SLOW if case.method == "closings" else LOOKS[-1])
+        for name, case in methods
+    }
 
 
 RAMP = (30.0, 30.0)
@@ -227,7 +233,7 @@ KNOBS = {
               "the right `Model`; with several, the one that agrees"),
         Knob("friction", "Two fingers that drag more than friction 0.5 allows", "drag over push", SHARE,
               (0.1, 0.3, 0.45, 0.55, 0.7, 0.9, 1.2),
-              {"interval": _rated(functools.partial(_friction, "interval"), most=480),
+              {"interval": _rated(functools.partial(_friction, "interval"), SLOW),
                f"estimate, {CLOSE_N:g} N": _rated(functools.partial(_friction, "estimate"))},
               "a larger `friction`: intervals grow, but hold"),
         Knob("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms", SHARE,
