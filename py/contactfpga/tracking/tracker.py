@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import PASSING_S, Member, Spot, place, radius_mm
+from contactfpga.tracking.spot import NEW, Known, Member, Spot, error_mm2, place, radius_mm
 from contactfpga.tracking.tracks import Event, Kind, Tracks
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
@@ -149,7 +149,7 @@ class Tracker:
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _expects(self, spot: Spot, zone: Zone) -> bool:
-        return expected(spot, zone, self._time_us, self._around_mm, self._gate_mm)
+        return expected(spot, zone, self._time_us, self._around_mm)
 
     # ---- what becomes of a spot
 
@@ -171,7 +171,7 @@ class Tracker:
 
     def _part(self, spot: Spot, zones: list[Zone]) -> None:
         first = spot.members[0].id
-        for zone, members in shared_out(spot, zones, self._time_us, self._around_mm, self._gate_mm):
+        for zone, members in shared_out(spot, zones, self._time_us, self._around_mm):
             if not members:
                 members = [self._begin(zone, (first,))]
             self._spots.append(piece(spot, zone, members, self._time_us, self._around_mm))
@@ -215,8 +215,16 @@ class Tracker:
         self._events.append(Event(kind, name, self._time_us, parents, zone, seen))
 
 
-FASTER = (1.0, 1.5, 2.0)
-"""How many times as fast as measured two may pass each other: a smoothed speed comes after the contact's."""
+GOING_S = 1.0
+"""For how long two that share a zone go on as they came, on average."""
+
+FIRST_S = 0.01
+
+STAYING_MM = 12.0
+"""How far a contact that stops, or goes back, is from where it came in: one standard deviation along each axis."""
+
+ODD = 30.0
+"""How unlikely a place may be for a contact that shared a zone."""
 
 Apart = Callable[[Spot, Zone], float]
 """From where a spot would be to a zone, in mm."""
@@ -240,7 +248,7 @@ def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_
         best, least = None, math.inf
         for other, zone in pairs:
             distance = apart(spot, zone)
-            grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2
+            grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2 or distance <= touch_mm(spot.zone, zone)
             if grown and distance < least and distance <= gate_mm + REACH * radius_mm(zone.area_mm2):
                 best, least = other, distance
         if best is not None:
@@ -296,6 +304,11 @@ def parted(
     return found
 
 
+def touch_mm(one: Zone, other: Zone) -> float:
+    """How close two round contacts come before they have one zone."""
+    return radius_mm(one.area_mm2) + radius_mm(other.area_mm2)
+
+
 def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: float | None) -> None:
     """Put the contacts of all these into this zone, each where it would be."""
     x, y = place(zone)
@@ -304,6 +317,7 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
         for member in one.members:
             member.dx, member.dy = across(ahead_x + member.dx - x, around_mm), ahead_y + member.dy - y
             member.vx, member.vy = member.vx + one.vx, member.vy + one.vy
+            member.known = one.known
     spot.members += [member for other in others for member in other.members]
     spot.members.sort(key=_rank)
     total = spot.area_mm2
@@ -319,49 +333,40 @@ def _rank(member: Member) -> tuple[float, int]:
     return -member.area_mm2, member.id
 
 
-def _ways(spot: Spot, time_us: int) -> tuple[float, ...]:
-    """For how many seconds at their measured speeds its contacts may have gone on against each other: for none, when
-    they came together and went back, or since they came together, when they pass."""
-    passed_s = (time_us - spot.joined_us) / 1e6
-    if len(spot.members) == 1 or not 0 < passed_s <= PASSING_S:
-        return (0.0,)
-    return 0.0, *(passed_s * faster for faster in FASTER)
+def _off(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> float:
+    return min(_ways(spot, member, zone, time_us, around_mm))
 
 
-def _off(spot: Spot, member: Member, zone: Zone, seconds: float, time_us: int, around_mm: float | None) -> float:
-    """From where a contact of a spot would be, having gone on for so long, to a zone, in mm."""
+def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[float, float]:
+    """How unlikely a contact of a spot is in a zone: -2 times the logarithm of its density there, in 1/mm^2.
+
+    It went on as it came, less surely the longer ago that is; or it stopped, or went back to where it came in.
+    """
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
-    dx, dy = member.dx + member.vx * seconds, member.dy + member.vy * seconds
-    return math.hypot(across(x - ahead_x - dx, around_mm), y - ahead_y - dy)
+    off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy
+    seconds = (time_us - spot.joined_us) / 1e6
+    went_x, went_y = off_x - member.vx * seconds, off_y - member.vy * seconds
+    error = error_mm2(zone)
+    far = member.known.later(seconds).place + error
+    went = (went_x * went_x + went_y * went_y) / far + 2 * math.log(far) + 2 * seconds / GOING_S
+    near = error + STAYING_MM**2
+    stays = -2 * math.log(-math.expm1(-(seconds + FIRST_S) / GOING_S))
+    return went, (off_x * off_x + off_y * off_y) / near + 2 * math.log(near) + stays
 
 
-def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float) -> bool:
-    """Whether one of several contacts of a spot would be where a zone is new."""
-    return len(spot.members) > 1 and any(
-        _off(spot, one, zone, seconds, time_us, around_mm) <= REACH * gate_mm
-        for seconds in _ways(spot, time_us)
-        for one in spot.members
-    )
+def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None) -> bool:
+    """Whether one of several contacts of a spot may be where a zone is new."""
+    return len(spot.members) > 1 and any(_off(spot, one, zone, time_us, around_mm) <= ODD for one in spot.members)
 
 
 def shared_out(
-    spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
+    spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None
 ) -> list[tuple[Zone, list[Member]]]:
-    """The zones a spot came apart into, each with its contacts: one each where they would be, the largest with most
-    right to it, the rest where they are nearest; none for a zone that begins a contact."""
-    far = 1 + spot.area_mm2 * REACH * gate_mm  # more than any pairing costs: whoever can have a zone has one
-    ways = []
-    for seconds in _ways(spot, time_us):
-        off = [[_off(spot, one, zone, seconds, time_us, around_mm) for zone in zones] for one in spot.members]
-        costs = [
-            [one.area_mm2 * distance if distance <= REACH * gate_mm else math.inf for distance in line]
-            for one, line in zip(spot.members, off)
-        ]
-        chosen = assign(costs, far)
-        total = math.fsum(far if column is None else line[column] for line, column in zip(costs, chosen))
-        ways.append((total, off, chosen))
-    _, off, chosen = min(ways, key=lambda way: way[0])
+    """The zones a spot came apart into, each with its contacts: one each where they would be, the rest where they are
+    most likely; none for a zone that begins a contact."""
+    off = [[_off(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
+    chosen = assign([[cost if cost <= ODD else math.inf for cost in line] for line in off], 10 * ODD)
     found: list[list[Member]] = [[] for _ in zones]
     for member, line, column in zip(spot.members, off, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
@@ -377,8 +382,15 @@ def piece(spot: Spot, zone: Zone, members: list[Member], time_us: int, around_mm
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     made = Spot(zone, time_us, members)
-    made.born_us = spot.born_us
-    made.vx, made.vy = spot.vx + members[0].vx, spot.vy + members[0].vy
+    made.vx, made.vy = spot.vx, spot.vy
+    first, seconds = members[0], (time_us - spot.joined_us) / 1e6
+    went, stays = _ways(spot, first, zone, time_us, around_mm)
+    if went <= stays:
+        made.vx, made.vy = spot.vx + first.vx, spot.vy + first.vy
+        off_x = across(x - ahead_x - first.dx - first.vx * seconds, around_mm)
+        off_y = y - ahead_y - first.dy - first.vy * seconds
+        made.fx, made.fy = x - off_x, y - off_y
+        made.correct(off_x, off_y, first.known.later(seconds), error_mm2(zone))
     for one in members:
         one.dx, one.dy = across(ahead_x + one.dx - x, around_mm), ahead_y + one.dy - y
     if len(members) == 1:
