@@ -17,8 +17,8 @@ FAST_MM_S = 1500.0
 """How fast a contact may be that was seen once: one standard deviation along each axis."""
 
 SAME_S = 0.003
-"""For how long the error of a barycenter stays the same: it jumps when a cell opens or closes, and frames that follow one
-another more closely say nothing new."""
+"""For how long the error of a barycenter stays the same: it jumps when a cell opens or closes, and frames that follow
+one another more closely say nothing new."""
 
 COAST_S = 0.05
 """How far ahead a speed is believed."""

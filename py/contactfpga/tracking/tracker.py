@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import NEW, Known, Member, Spot, error_mm2, place, radius_mm
+from contactfpga.tracking.spot import Member, Spot, error_mm2, place, radius_mm
 from contactfpga.tracking.tracks import Event, Kind, Tracks
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
@@ -121,8 +122,8 @@ class Tracker:
         spots = self._spots
         if not spots or not seen:
             return [], list(spots), list(seen)
-        costs = [[self._cost(spot, ahead, zone) for zone in seen] for spot, ahead in self._ahead()]
-        chosen = assign(costs, self._gate_mm * (1 + 1e-9))  # a pair at the gate is one
+        costs = [self._costs(spot, seen) for spot in spots]
+        chosen = assign(costs, SIGMAS**2 * (1 + 1e-9))  # a pair at the gate is one
         pairs = [(spot, seen[column]) for spot, column in zip(spots, chosen) if column is not None]
         lost = [spot for spot, column in zip(spots, chosen) if column is None]
         if len(pairs) == len(seen):
@@ -130,15 +131,20 @@ class Tracker:
         taken = set(chosen)
         return pairs, lost, [zone for column, zone in enumerate(seen) if column not in taken]
 
-    def _ahead(self) -> list[tuple[Spot, tuple[float, float]]]:
-        return [(spot, spot.ahead(self._time_us)) for spot in self._spots]
-
-    def _cost(self, spot: Spot, ahead: tuple[float, float], zone: Zone) -> float:
-        """Distance to where it would be; also one that stopped at once is within the gate."""
-        off = self._distance(ahead[0], ahead[1], zone)
-        if off <= self._gate_mm:
-            return off
-        return self._gate_mm if self._distance(spot.x, spot.y, zone) <= self._gate_mm else math.inf
+    def _costs(self, spot: Spot, seen: list[Zone]) -> list[float]:
+        """Squared Mahalanobis distances from where it would be. One that stopped at once is within the gate, too."""
+        ahead_x, ahead_y = spot.ahead(self._time_us)
+        seconds = (self._time_us - spot.seen_us) / 1e6
+        spread = max((self._gate_mm / SIGMAS) ** 2, spot.known.later(seconds).place)
+        found = []
+        for zone in seen:
+            off = self._distance(ahead_x, ahead_y, zone)
+            if off <= self._gate_mm:
+                found.append(off * off / spread)
+            else:
+                stopped = self._distance(spot.x, spot.y, zone) <= self._gate_mm
+                found.append(SIGMAS**2 if stopped else math.inf)
+        return found
 
     def _distance(self, x: float, y: float, zone: Zone) -> float:
         zone_x, zone_y = place(zone)
@@ -149,7 +155,7 @@ class Tracker:
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _expects(self, spot: Spot, zone: Zone) -> bool:
-        return expected(spot, zone, self._time_us, self._around_mm)
+        return expected(spot, zone, self._time_us, self._around_mm, self._gate_mm)
 
     # ---- what becomes of a spot
 
@@ -171,7 +177,7 @@ class Tracker:
 
     def _part(self, spot: Spot, zones: list[Zone]) -> None:
         first = spot.members[0].id
-        for zone, members in shared_out(spot, zones, self._time_us, self._around_mm):
+        for zone, members in shared_out(spot, zones, self._time_us, self._around_mm, self._gate_mm):
             if not members:
                 members = [self._begin(zone, (first,))]
             self._spots.append(piece(spot, zone, members, self._time_us, self._around_mm))
@@ -215,16 +221,26 @@ class Tracker:
         self._events.append(Event(kind, name, self._time_us, parents, zone, seen))
 
 
+SIGMAS = 3.0
+"""How many standard deviations the gate is away from a contact of which least is known."""
+
 GOING_S = 1.0
 """For how long two that share a zone go on as they came, on average."""
 
 FIRST_S = 0.01
 
-STAYING_MM = 12.0
-"""How far a contact that stops, or goes back, is from where it came in: one standard deviation along each axis."""
+LARGER = 1.0
+"""Standard deviation of the logarithm of how many times as large a contact is after it shared a zone."""
 
-ODD = 30.0
-"""How unlikely a place may be for a contact that shared a zone."""
+
+class Way(NamedTuple):
+    """How a contact may have come to a zone."""
+
+    off_mm: float
+    """From where it would be."""
+    odd: float
+    """-2 times the logarithm of its density there, in 1/mm^2."""
+
 
 Apart = Callable[[Spot, Zone], float]
 """From where a spot would be to a zone, in mm."""
@@ -333,40 +349,46 @@ def _rank(member: Member) -> tuple[float, int]:
     return -member.area_mm2, member.id
 
 
-def _off(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> float:
-    return min(_ways(spot, member, zone, time_us, around_mm))
-
-
-def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[float, float]:
-    """How unlikely a contact of a spot is in a zone: -2 times the logarithm of its density there, in 1/mm^2.
-
-    It went on as it came, less surely the longer ago that is; or it stopped, or went back to where it came in.
-    """
+def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[Way, Way]:
+    """How a contact of a spot may have come to a zone: it went on as it came, less surely the longer ago that is; or it
+    stopped, or went back to where it came in."""
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy
-    seconds = (time_us - spot.joined_us) / 1e6
-    went_x, went_y = off_x - member.vx * seconds, off_y - member.vy * seconds
-    error = error_mm2(zone)
-    far = member.known.later(seconds).place + error
-    went = (went_x * went_x + went_y * went_y) / far + 2 * math.log(far) + 2 * seconds / GOING_S
-    near = error + STAYING_MM**2
-    stays = -2 * math.log(-math.expm1(-(seconds + FIRST_S) / GOING_S))
-    return went, (off_x * off_x + off_y * off_y) / near + 2 * math.log(near) + stays
+    seconds, error = (time_us - spot.joined_us) / 1e6, error_mm2(zone)
+    went = math.hypot(off_x - member.vx * seconds, off_y - member.vy * seconds)
+    far = error + member.known.later(seconds).place
+    back = math.hypot(off_x, off_y)
+    near = error + (REACH * radius_mm(member.area_mm2)) ** 2
+    stopped = -math.expm1(-(seconds + FIRST_S) / GOING_S)
+    return (
+        Way(went, went * went / far + 2 * math.log(far) + 2 * seconds / GOING_S),
+        Way(back, back * back / near + 2 * math.log(near) - 2 * math.log(stopped)),
+    )
 
 
-def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None) -> bool:
+def _off(
+    spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float
+) -> tuple[float, bool]:
+    """How odd it is for a contact of a spot to be in a zone, by its place and area, and whether it may be there."""
+    ways = _ways(spot, member, zone, time_us, around_mm)
+    larger = math.log(zone.area_mm2 / member.area_mm2)
+    near = min(way.off_mm for way in ways) <= REACH * gate_mm
+    return min(way.odd for way in ways) + (larger / LARGER) ** 2, near
+
+
+def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float) -> bool:
     """Whether one of several contacts of a spot may be where a zone is new."""
-    return len(spot.members) > 1 and any(_off(spot, one, zone, time_us, around_mm) <= ODD for one in spot.members)
+    return len(spot.members) > 1 and any(_off(spot, one, zone, time_us, around_mm, gate_mm)[1] for one in spot.members)
 
 
 def shared_out(
-    spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None
+    spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
 ) -> list[tuple[Zone, list[Member]]]:
     """The zones a spot came apart into, each with its contacts: one each where they would be, the rest where they are
     most likely; none for a zone that begins a contact."""
-    off = [[_off(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
-    chosen = assign([[cost if cost <= ODD else math.inf for cost in line] for line in off], 10 * ODD)
+    off = [[_off(spot, one, zone, time_us, around_mm, gate_mm) for zone in zones] for one in spot.members]
+    chosen = assign([[odd if near else math.inf for odd, near in line] for line in off], 1e6)
     found: list[list[Member]] = [[] for _ in zones]
     for member, line, column in zip(spot.members, off, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
@@ -385,7 +407,7 @@ def piece(spot: Spot, zone: Zone, members: list[Member], time_us: int, around_mm
     made.vx, made.vy = spot.vx, spot.vy
     first, seconds = members[0], (time_us - spot.joined_us) / 1e6
     went, stays = _ways(spot, first, zone, time_us, around_mm)
-    if went <= stays:
+    if len(spot.members) > 1 and went.odd <= stays.odd:
         made.vx, made.vy = spot.vx + first.vx, spot.vy + first.vy
         off_x = across(x - ahead_x - first.dx - first.vx * seconds, around_mm)
         off_y = y - ahead_y - first.dy - first.vy * seconds

@@ -190,8 +190,7 @@ def _outside(edge: int, rng: Random) -> Place:
 
 
 FAMILIES: dict[str, Callable[[Random], Played]] = {
-    family.__name__: family
-    for family in (sliding, crossing, meeting, tapping, angles, stopping, row, entering)
+    family.__name__: family for family in (sliding, crossing, meeting, tapping, angles, stopping, row, entering)
 }
 """Every family by its name."""
 
