@@ -12,7 +12,7 @@ from typing import NamedTuple
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import Member, Spot, error_mm2, place, radius_mm
+from contactfpga.tracking.spot import SAME_S, Member, Spot, error_mm2, place, radius_mm
 from contactfpga.tracking.tracks import Event, Kind, Tracks
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
@@ -367,30 +367,37 @@ def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float
     )
 
 
-def _off(
-    spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float
-) -> tuple[float, bool]:
-    """How odd it is for a contact of a spot to be in a zone, by its place and area, and whether it may be there."""
-    ways = _ways(spot, member, zone, time_us, around_mm)
-    larger = math.log(zone.area_mm2 / member.area_mm2)
-    near = min(way.off_mm for way in ways) <= REACH * gate_mm
-    return min(way.odd for way in ways) + (larger / LARGER) ** 2, near
+def _larger(member: Member, zone: Zone) -> float:
+    """How odd the area of a zone is for a contact of a spot, likewise."""
+    return (math.log(zone.area_mm2 / member.area_mm2) / LARGER) ** 2
 
 
 def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float) -> bool:
     """Whether one of several contacts of a spot may be where a zone is new."""
-    return len(spot.members) > 1 and any(_off(spot, one, zone, time_us, around_mm, gate_mm)[1] for one in spot.members)
+    return len(spot.members) > 1 and any(
+        way.off_mm <= REACH * gate_mm for one in spot.members for way in _ways(spot, one, zone, time_us, around_mm)
+    )
 
 
 def shared_out(
     spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
 ) -> list[tuple[Zone, list[Member]]]:
-    """The zones a spot came apart into, each with its contacts: one each where they would be, the rest where they are
-    most likely; none for a zone that begins a contact."""
-    off = [[_off(spot, one, zone, time_us, around_mm, gate_mm) for zone in zones] for one in spot.members]
-    chosen = assign([[odd if near else math.inf for odd, near in line] for line in off], 1e6)
+    """The zones a spot came apart into, each with its contacts: one each by place and area, the rest where their places
+    are most likely; none for a zone that begins a contact."""
+    ways = [[_ways(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
+    off = [[min(way.off_mm for way in both) for both in line] for line in ways]
+    odd = [[min(way.odd for way in both) for both in line] for line in ways]
+    # Each zone has one of them. What that costs a contact is how much less likely it is there than where it would go.
+    costs = [
+        [
+            odd[n][m] - min(odd[n]) + _larger(one, zone) if off[n][m] <= REACH * gate_mm else math.inf
+            for m, zone in enumerate(zones)
+        ]
+        for n, one in enumerate(spot.members)
+    ]
+    chosen = assign(costs, 1e6)
     found: list[list[Member]] = [[] for _ in zones]
-    for member, line, column in zip(spot.members, off, chosen):
+    for member, line, column in zip(spot.members, odd, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
     for members in found:
         members.sort(key=_rank)
@@ -412,7 +419,7 @@ def piece(spot: Spot, zone: Zone, members: list[Member], time_us: int, around_mm
         off_x = across(x - ahead_x - first.dx - first.vx * seconds, around_mm)
         off_y = y - ahead_y - first.dy - first.vy * seconds
         made.fx, made.fy = x - off_x, y - off_y
-        made.correct(off_x, off_y, first.known.later(seconds), error_mm2(zone))
+        made.correct(off_x, off_y, first.known.later(seconds), error_mm2(zone) * max(1.0, SAME_S / max(seconds, 1e-6)))
     for one in members:
         one.dx, one.dy = across(ahead_x + one.dx - x, around_mm), ahead_y + one.dy - y
     if len(members) == 1:
