@@ -130,7 +130,7 @@ tracker was tuned on, at 100 frames per second."""
 def norfair() -> Update:
     """A published tracker: Kalman filters of constant velocity and a gate of 20 mm. Raises :class:`MissingExtra`."""
     try:
-        import norfair as published
+        import norfair as published  # type: ignore[import-not-found,unused-ignore]
     except ModuleNotFoundError as error:
         raise MissingExtra(f"the published tracker ({error})", "test") from None
     tracker = published.Tracker("euclidean", 20.0, hit_counter_max=NORFAIR_HOLD, initialization_delay=0)
@@ -138,7 +138,8 @@ def norfair() -> Update:
     def update(zones: Zones) -> dict[int, Place]:
         shown = [published.Detection(np.array([[zone.x_mm, zone.y_mm]])) for zone in zones if zone.x_mm is not None]
         tracked = [one for one in tracker.update(shown) if one.last_detection in shown]
-        return {one.id: tuple(map(float, one.last_detection.points[0])) for one in tracked}
+        places = {one.id: one.last_detection.points[0] for one in tracked}
+        return {name: (float(place[0]), float(place[1])) for name, place in places.items()}
 
     return update
 
@@ -180,9 +181,10 @@ class Score:
 
 
 def half(values: np.ndarray) -> float:
-    """Half of the 95 % interval of a mean, by Student's t."""
+    """Half of the 95 % interval of a mean, by Student's t. A scene in which nothing can be told apart has no score."""
     from scipy.stats import t
 
+    values = values[~np.isnan(values)]
     return float(t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
 
 
@@ -342,7 +344,7 @@ def of_family(family: str, rate_hz: float, count: int = SCENES, names: tuple[str
 def ahead(ours: Score, other: Score) -> tuple[float, float]:
     """By how much the first one's IDF1 is above the other's, scene by scene, and half of its 95 % interval."""
     gained = np.array(ours.idf1_each) - np.array(other.idf1_each)
-    return float(gained.mean()), half(gained)
+    return float(np.nanmean(gained)), half(gained)
 
 
 @functools.cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +12,6 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import tables as failures_tables
 from contactfpga_sim.lab.performance.scans import RECORDINGS
 from contactfpga_sim.lab.speed.driver import frame, greeting
 from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
@@ -122,10 +121,24 @@ def recorded_table() -> str:
     return writer.table_of(rows)
 
 
+BREAKS = ("knob", "method", "right in 95 % up to", "right there", "right at the next", "closed form", "what helps")
+
+
 def breaks_table() -> str:
     """Where ids are lost."""
-    lines = [line for knob in breaks.KNOBS.values() for line in failures_tables.rows(knob, knob.sweep(), False)]
-    return writer.table(failures_tables.HEAD, lines)
+    return writer.table_of([BREAKS, *(row for knob in breaks.KNOBS.values() for row in break_rows(knob))])
+
+
+def break_rows(knob: breaks.Knob) -> Iterator[tuple[str, ...]]:
+    """A knob's lines; what they have in common is said in the first one."""
+    for number, method in enumerate(knob.methods):
+        rates = knob.sweep(method)
+        held = [rate for rate in rates if rate.holds]
+        until = f"**{held[-1].value:g}**" if held else "nowhere"
+        until = until if len(held) < len(rates) else f"{until}, all there are"
+        after = f"{rates[-1].value:g}: {rates[-1]}" if len(held) < len(rates) else ""
+        first = (f"{knob.title}: {knob.axis}", knob.helps) if number == 0 else ("", "")
+        yield first[0], method, until, str(held[-1]) if held else "", after, knob.closed.get(method, ""), first[1]
 
 
 def speed_table() -> str:
