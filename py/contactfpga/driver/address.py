@@ -189,12 +189,12 @@ def _wait(name: str, text: str) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Flexitac:
-    """``flexitac://DEVICE?margin=15&frames=30&pitch=3&rows=16&columns=32&baud=2000000``, decoded."""
+    """``flexitac://DEVICE?margin=15&frames=20&pitch=3&rows=16&columns=32&baud=2000000``, decoded."""
 
     device: str
     margin: int = 15
     """By how much a pressed cell reads above its rest, of 255."""
-    frames: int = 30
+    frames: int = 20
     """How many frames the rest is taken from, at the beginning, while nothing touches the sheet."""
     pitch_mm: float = 3.0
     rows: int = 16

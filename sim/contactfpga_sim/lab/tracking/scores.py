@@ -315,7 +315,7 @@ RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
 JUDGED_RATES = RATES_HZ[1:]
 """At which the tracker must not be behind another one."""
 
-MOST_FRAMES = 10_000
+MOST_FRAMES = 5_000
 """Of a scene."""
 
 SCENES = 12
