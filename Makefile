@@ -42,8 +42,8 @@ check: ## look for Python and a C++ compiler; say what to install
 sim: $(VENV)/.stamp-sim ## run the gateware against the golden model and draw the scenes
 	$(PY) -m contactfpga_sim.demo $(ARGS)
 
-test: $(VENV)/.stamp-test | compiler ## run the tests, in some minutes
-	$(PY) -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder $(ARGS)
+test: $(VENV)/.stamp-test | compiler ## run the quick tests, in some minutes; with ARGS all but the slow ones of what these name
+	$(PY) -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder $(or $(ARGS),--quick)
 
 test-all: $(VENV)/.stamp-test | compiler ## run the slow tests, too, and write what became of each into build/tests.xml
 	$(PY) -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder -m "not campaign" --junitxml build/tests.xml $(ARGS)

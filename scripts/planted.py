@@ -52,7 +52,7 @@ def notice(root: Path, tests: Sequence[str], seconds: float) -> tuple[bool, str]
     They notice as well if the gateware cannot be imported or if they take longer than ``seconds``. Raises RuntimeError
     if there are no such tests.
     """
-    options = ["-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--tb=line", "--timeout", "600"]
+    options = ["--quick", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--tb=line", "--timeout", "600"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         result = subprocess.run(

@@ -254,7 +254,7 @@ def run_noting(folder: Path) -> None:
     with planted.planted(noting()) as root:
         environment = planted.environment(root) | {"CONTACTFPGA_TOUCHED": str(folder)}
         environment["PYTHONPATH"] += os.pathsep + str(planted.ROOT / "scripts")
-        options = ["-q", "-n", "2", "-p", "touching", "-p", "no:cacheprovider", "--timeout", "1200"]
+        options = ["--quick", "-q", "-n", "2", "-p", "touching", "-p", "no:cacheprovider", "--timeout", "1200"]
         command = [sys.executable, "-m", "pytest", *options, *TESTS]
         result = subprocess.run(command, cwd=planted.ROOT, env=environment, stdin=subprocess.DEVNULL)
     if result.returncode:

@@ -100,9 +100,38 @@ FIRST = (
 """Files that are begun first, in this order."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+LAB = ("boards", "browser", "circuit", "cover", "scenes", "sheet", "studies", "view")
+"""Folders of tests of what designs, draws and judges; the others are of what reads a sheet or serves a robot."""
+HALVED = ("cosim", "gateware")
+"""Folders of tests whose many cases go through the same code."""
+CASES = 4
+"""Of a test in them with this many cases or more, every second one is quick."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="leave out the tests of the lab and half of long lists of cases")
+
+
+@pytest.hookimpl(trylast=True)  # when the markers have been looked at
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     ranks = {name: rank for rank, name in enumerate(FIRST)}
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
+    if config.getoption("quick"):
+        kept = _quick(items)
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = [item for item in items if item in kept]
+
+
+def _quick(items: list[pytest.Item]) -> set[pytest.Item]:
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    kept: set[pytest.Item] = set()
+    for test, found in cases.items():
+        folder = test.split("/")[1]
+        if folder not in LAB:
+            kept.update(found[::2] if folder in HALVED and len(found) >= CASES else found)
+    return kept
 
 
 def pytest_xdist_auto_num_workers() -> int:
