@@ -179,12 +179,12 @@ def _pair(distance_mm: float, rng: Random) -> Made:
     left = [103.0 - half / 2 for half in (60, distance_mm, distance_mm, 60, 60)]
     moved = _moved(rng)
     fingers = [_finger(times, left, moved), _finger(times, [206.0 - x for x in left], moved)]
-    return _frames(fingers, _times(times[-1] - 0.002, rng))
+    return _frames(fingers, _times(times[-1] - 0.01, rng, 250.0))
 
 
 MEET = Knob(
     name="meet",
-    title="Two fingers of 16 mm that meet and part",
+    title="Two fingers of 16 mm that meet and part, at 250 frames per second",
     axis="distance of their middles, mm",
     values=tuple(float(value) for value in range(40, 6, -2)),
     scene=_pair,
@@ -238,7 +238,7 @@ def _holding(hold_ms: float) -> Update:
 
 BOUNCE = Knob(
     name="bounce",
-    title="A contact that bounces",
+    title="A contact that bounces, at 2,000 frames per second",
     axis="time for which it is open, ms",
     values=(0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 4.5, 5.0, 6.0, 8.0, 10.0, 15.0, 19.0, 19.5, 20.0, 25.0, 30.0),
     scene=_open,
@@ -269,7 +269,7 @@ def _slides_over(ids: Ids, count: float) -> bool:
 
 STUCK = Knob(
     name="stuck",
-    title="A finger that slides over stuck switches",
+    title="A finger that slides over stuck switches, at 250 frames per second",
     axis="how many are stuck",
     values=tuple(float(value) for value in range(10)),
     scene=_stuck,
@@ -282,12 +282,12 @@ STUCK = Knob(
 
 def _gap(lost_ms: float, rng: Random) -> Made:
     finger = _finger([0.0, 1.0], [30.0, 530.0], _moved(rng))
-    return _frames([finger], [now for now in _times(0.7, rng, 500.0) if not 0.2 < now < 0.2 + lost_ms / 1000])
+    return _frames([finger], [now for now in _times(0.5, rng, 500.0) if not 0.2 < now < 0.2 + lost_ms / 1000])
 
 
 LOST = Knob(
     name="lost",
-    title="A finger that slides at 500 mm/s while frames are lost",
+    title="A finger that slides at 500 mm/s while frames are lost, at 500 frames per second",
     axis="ms without a frame",
     values=tuple(float(value) for value in range(0, 140, 5)),
     scene=_gap,
