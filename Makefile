@@ -105,6 +105,10 @@ mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the
 mutants-tested: $(VENV)/.stamp-test | compiler ## change the gateware's source: does what `make test` runs notice? (an hour) [ARGS="--count 20"]
 	$(PY) scripts/tested_mutants.py $(ARGS)
 
+SEED ?= 0
+audit: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## draw claims, tables and mutants by a seed of yours and check them, in some minutes: SEED=7
+	$(PY) scripts/audit.py --seed $(call quoted,SEED) $(ARGS)
+
 lint: $(VENV)/.stamp-lint ## check style, types and who imports whom
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check

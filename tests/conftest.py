@@ -109,7 +109,9 @@ CASES = 4
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--quick", action="store_true", help="leave out the tests of the lab and half of long lists of cases")
+    parser.addoption(
+        "--quick", action="store_true", help="leave out the tests of the lab and half of long lists of cases"
+    )
 
 
 @pytest.hookimpl(trylast=True)  # when the markers have been looked at

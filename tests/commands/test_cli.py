@@ -88,6 +88,7 @@ def test_pages_are_files_in_a_source_tree_and_addresses_elsewhere(tmp_path, monk
 EITHER = {
     "--frame": {"NAME", None},  # of a coordinate frame: any name, or one of two
     "--output": {"FILE", "DIR"},
+    "-o": {"FILE", "DIR"},
 }
 """What an option takes in one command or another where that is not the same."""
 

@@ -1,10 +1,17 @@
 """A stage in Amaranth's simulator, clock by clock."""
 
+import contextlib
+import itertools
+import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from amaranth.hdl import Cat, Value
 from amaranth.sim import Simulator
+
+NUMBERS = itertools.count(1)
+"""Of waveforms."""
 
 
 class Source:
@@ -127,8 +134,17 @@ class Bench:
             self._simulator.reset()
         self._used = True
         self._cycles, self._until = cycles, until
-        self._simulator.run()
+        with self._waveform():
+            self._simulator.run()
         self._parts = []
+
+    def _waveform(self):
+        """Of every signal, in a file for each run, where a folder is named to look into a failing test."""
+        folder = os.environ.get("CONTACTFPGA_WAVES")
+        if not folder:
+            return contextlib.nullcontext()
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        return self._simulator.write_vcd(str(Path(folder) / f"run-{next(NUMBERS)}.vcd"))
 
     def _add(self, part):
         self._parts.append(part)

@@ -111,6 +111,7 @@ _ALL = (
         minutes=10,
         sections={
             "failures": Section("tables:table"),
+            "closed": Section("tables:closed"),
             "unnoticed": Section("tables:unnoticed"),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
@@ -377,6 +378,13 @@ _ALL = (
         pictures="tables:draw",
         extra="test",
         needs=("chromium",),
+    ),
+    Study(
+        "wave",
+        title="One touch as a waveform",
+        page="wave.md",
+        minutes=1,
+        pictures="picture:draw",
     ),
 )
 STUDIES = {study.name: study for study in _ALL}

@@ -11,6 +11,7 @@ from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Knob, Outcome
+from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
@@ -51,30 +52,64 @@ def judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: st
 
 LAZY = REFERENCE.replace(release_us=40.0)
 LAZY_GUARDED = GUARDED.replace(release_us=40.0)
-LAZY_CIRCUIT = Circuit(column_pull_ohm=40_000.0, line_ohm=2000.0)
+PULLED, WEAKLY = Circuit(column_pull_ohm=4700.0), Circuit(column_pull_ohm=40_000.0)
+LAZY_CIRCUIT = WEAKLY.replace(line_ohm=2000.0)
 
 
-def _slow(skin: Skin, circuit: Circuit, picofarad: float) -> Outcome:
-    spots = [(3, 4), (9, 10)]
-    cells = finger(skin, *spots)
+def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> list[tuple[int, int]]:
+    """Places of as many fingers of 2x2 cells, with this many free cells and more between any two of them."""
+    spots: list[tuple[int, int]] = []
+    while len(spots) < count:
+        row, column = map(int, rng.integers(0, (skin.rows - 1, skin.columns - 1)))
+        if all(max(abs(row - y), abs(column - x)) >= 2 + free for y, x in spots):
+            spots.append((row, column))
+    return spots
+
+
+def _slow(skin: Skin, circuit: Circuit, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """Two fingers that share no row or column, on lines that take their time."""
+    found = []
     with Rig(skin) as rig:
-        rig.board.settle(*lines_of(circuit.replace(line_pf=picofarad), skin, most=2))
-        rig.board.hold(cells[None], hello_clocks(skin) + 4 * rig.scan)
-        zones = rig.frames()[-1]
-    return judged(zones, cells, [finger(skin, spot) for spot in spots])
+        rig.board.settle(*lines_of(circuit, skin, most=2))
+        rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), 2 * hello_clocks(skin))
+        for _ in range(count):
+            spots = _crossed(rng, skin)
+            cells = finger(skin, *spots)
+            rig.frames()
+            rig.board.hold(cells[None], SETTLED_SCANS * rig.scan)
+            found.append(judged(rig.frames()[-1], cells, [finger(skin, spot) for spot in spots]))
+    return found
+
+
+def _crossed(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
+    while True:
+        (y, x), (v, u) = spots = _apart(rng, skin, 2)
+        if min(abs(y - v), abs(x - u)) > 2:
+            return spots
+
+
+SETTLED_SCANS = 6
+"""For which a sheet is held, so that a frame of it comes through whatever waits on the line."""
+
+
+def _capacitance(skin: Skin, circuit: Circuit, picofarad: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    return _slow(skin, circuit.replace(line_pf=picofarad), rng, count)
 
 
 SETTLE = Knob(
     name="settle",
     title="Columns slower than `settle_us = 5`",
     axis="capacitance of a line, pF",
-    amount="cells that read pressed",
+    amount=SHARE,
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
-        "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=4700.0)),
-        "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=40_000.0)),
-        "40 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(_slow, LAZY, LAZY_CIRCUIT),
-        "the same with guard lines": functools.partial(_slow, LAZY_GUARDED, LAZY_CIRCUIT),
+        name: Rated(functools.partial(_capacitance, skin, circuit), most=120)
+        for name, skin, circuit in (
+            ("4.7 kΩ pull-up, `release_us = 1`", REFERENCE, PULLED),
+            ("40 kΩ pull-up, the same", REFERENCE, WEAKLY),
+            ("40 kΩ, lines of 2 kΩ, `release_us = 40`", LAZY, LAZY_CIRCUIT),
+            ("the same with guard lines", LAZY_GUARDED, LAZY_CIRCUIT),
+        )
     },
     helps="`contactfpga settle` says which times a circuit needs; smaller resistances, precharge",
     unnoticed="a switch that pulls too slowly reads as one that is not pressed; a guard line does so too, and reports "
@@ -85,19 +120,27 @@ SETTLE = Knob(
 # ---- diodes
 
 
-def bare(skin: Skin, count: float) -> Outcome:
-    """Three fingers at the corners of a rectangle; of one of them the switches lose their diodes one by one. Undefined
-    levels are tried both ways."""
-    spots = [(3, 4), (3, 10), (11, 4)]
+def bare(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    """Three fingers at corners of rectangles; of one of them the switches lose their diodes one by one."""
+    return [_bare(skin, int(count), _rectangle(rng, skin)[:3], rng) for _ in range(draws)]
+
+
+def _rectangle(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
+    """Corners of a rectangle with a free row and column between fingers of 2x2 cells that stand at them."""
+    (y, x), (v, u) = _crossed(rng, skin)
+    return [(y, x), (y, u), (v, x), (v, u)]
+
+
+def _bare(skin: Skin, count: int, spots: list[tuple[int, int]], rng: np.random.Generator) -> Outcome:
+    """Undefined levels are tried both ways."""
     cells = finger(skin, *spots)
     bare = np.zeros_like(cells)
-    for row, column in [(3, 4), (3, 5), (4, 4), (4, 5)][: int(count)]:
-        bare[row, column] = True
+    bare.flat[rng.permutation(np.flatnonzero(finger(skin, spots[0])))[:count]] = True
     if skin.guard:
         cells_, bare_ = wiring.extended(cells), wiring.extended(bare, guard=False)
     else:
         cells_, bare_ = cells, bare
-    read, undefined, amperes = at_rest(Circuit(column_pull_ohm=4700.0), cells_, bare_)
+    read, undefined, amperes = at_rest(PULLED, cells_, bare_)
     frames = [_still(skin, each) for each in (read, read | undefined)]
     undefined = undefined[: skin.rows, : skin.columns]
     worst = min(frames, key=lambda zones: zones.pressed)
@@ -106,7 +149,7 @@ def bare(skin: Skin, count: float) -> Outcome:
     told = faults(frames[0]) if faults(frames[0]) and faults(frames[1]) else ()
     lost, of = int((undefined & cells).sum()), int(cells.sum())
     what = f"{lost} of {of} pressed cells undefined, {1e3 * amperes:.0f} mA from row pin to row pin"
-    return Outcome(right, told, what, worst.pressed, cells, places(worst))
+    return Outcome(right, told, what, cells=cells, zones=places(worst))
 
 
 def _still(skin: Skin, read: np.ndarray) -> Zones:
@@ -120,11 +163,11 @@ DIODES = Knob(
     name="diodes",
     title="Switches without a sound diode on a sheet that should have them",
     axis="such switches under one of three fingers",
-    amount="cells that surely read pressed",
+    amount=SHARE,
     values=(0, 1, 2, 3, 4),
     runs={
-        "three fingers at corners": functools.partial(bare, REFERENCE),
-        "the same with guard lines": functools.partial(bare, GUARDED),
+        "three fingers at corners": Rated(functools.partial(bare, REFERENCE)),
+        "the same with guard lines": Rated(functools.partial(bare, GUARDED)),
     },
     helps='test each diode before fitting; a board for `diodes = "none"` lets rows float and flags ghosts',
     unnoticed="two row pins drive against each other, and the level between low and high may read either way; the "
@@ -133,7 +176,6 @@ DIODES = Knob(
 
 BARE = Skin(rows=12, columns=12, diodes="none", connectivity=4)
 BARE_CELLS = BARE.replace(report="cells")
-CORNERS = [(1, 2), (1, 8), (8, 2), (8, 8)]
 
 
 def bare_read(pressed: np.ndarray) -> np.ndarray:
@@ -141,25 +183,11 @@ def bare_read(pressed: np.ndarray) -> np.ndarray:
     return Wiring(bare=np.ones((1, 1), bool), floating=True).read(pressed)[0]
 
 
-def _corners(count: float) -> Outcome:
-    spots = CORNERS[: int(count)]
-    cells = finger(BARE, *spots)
-    zones = still(BARE, bare_read(cells))
-    return judged(zones, cells, [finger(BARE, spot) for spot in spots])
-
-
-def scattered(count: int, places_: int = 60, seed: int = 5) -> list[list[tuple[int, int]]]:
-    """Fingers of 2x2 cells at random places of the sheet without diodes, at least a cell apart."""
-    rng = np.random.default_rng([seed, count])
-    found: list[list[tuple[int, int]]] = []
-    while len(found) < places_:
-        spots: list[tuple[int, int]] = []
-        while len(spots) < count:
-            row, column = map(int, rng.integers(0, BARE.rows - 1, 2))
-            if all(max(abs(row - y), abs(column - x)) > 2 for y, x in spots):
-                spots.append((row, column))
-        found.append(spots)
-    return found
+def _corners(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    spots = [_rectangle(rng, BARE)[: int(count)] for _ in range(draws)]
+    cells = [finger(BARE, *each) for each in spots]
+    frames = zip(_frames(BARE, cells), cells, spots)
+    return [judged(zones, each, [finger(BARE, spot) for spot in there]) for zones, each, there in frames]
 
 
 def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
@@ -174,46 +202,35 @@ def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
     return found
 
 
-def _scattered(count: float) -> Outcome:
-    """Zones are not what touches; it is reported if all frames in which that is so are flagged."""
-    placed = scattered(int(count))
+def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    """Zones that are not what touches."""
+    placed = [_apart(rng, BARE, int(count)) for _ in range(draws)]
     cells = [finger(BARE, *spots) for spots in placed]
-    frames = _frames(BARE, cells)
-    truth = [sorted(moments(finger(BARE, spot)) for spot in spots) for spots in placed]
-    wrong = [index for index, zones in enumerate(frames) if reported(zones) != truth[index]]
-    silent = [index for index in wrong if "ghost" not in frames[index].flags]
-    shown = (silent or wrong or [0])[0]
-    what = (
-        f"wrong zones at {100 * len(wrong) / len(frames):.0f} % of places, "
-        f"unflagged at {100 * len(silent) / len(frames):.0f} %"
-    )
-    told = () if silent else tuple({flag for index in wrong for flag in faults(frames[index])})
-    return Outcome(not wrong, told, what, len(wrong) / len(frames), cells[shown], places(frames[shown]))
+    truths = [[finger(BARE, spot) for spot in spots] for spots in placed]
+    return [judged(*each) for each in zip(_frames(BARE, cells), cells, truths)]
 
 
-def _scattered_cells(count: float) -> Outcome:
+def _scattered_cells(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
     """Cells that are read wrong; it is reported if each of them is marked."""
-    cells = [finger(BARE, *spots) for spots in scattered(int(count))]
-    frames = _frames(BARE_CELLS, cells)
-    read, marked = (np.array([getattr(zones, name) for zones in frames]) for name in ("cells", "ghost_cells"))
-    wrong = np.flatnonzero((read != cells).any(axis=(1, 2)))
-    missed = np.flatnonzero((read & ~np.array(cells) & ~marked).any(axis=(1, 2)))
-    shares = [100 * len(some) / len(frames) for some in (wrong, missed)]
-    what = f"ghosts at {shares[0]:.0f} % of places, unmarked at {shares[1]:.0f} %"
-    told = ("ghost",) if len(wrong) and not len(missed) else ()
-    return Outcome(not len(wrong), told, what, len(wrong) / len(frames), read[wrong[0] if len(wrong) else 0])
+    cells = [finger(BARE, *_apart(rng, BARE, int(count))) for _ in range(draws)]
+    return [_marked(zones, each) for zones, each in zip(_frames(BARE_CELLS, cells), cells)]
+
+
+def _marked(zones: Zones, cells: np.ndarray) -> Outcome:
+    assert zones.cells is not None
+    assert zones.ghost_cells is not None
+    wrong = zones.cells != cells
+    told = ("ghost",) if not (zones.cells & ~cells & ~zones.ghost_cells).any() and wrong.any() else ()
+    return Outcome(not wrong.any(), told, f"{int(wrong.sum())} ghosts", cells=zones.cells)
 
 
 GHOSTS = Knob(
     name="ghosts",
     title="Fingers on a sheet without diodes",
     axis="fingers of 2x2 cells",
-    amount="share of places read wrong",
+    amount=SHARE,
     values=tuple(range(1, 9)),
-    runs={
-        "zones, random places": _scattered,
-        "cells, random places": _scattered_cells,
-    },
+    runs={"zones": Rated(_scattered), "cells": Rated(_scattered_cells)},
     helps="diodes",
     unnoticed="the same switches read pressed as under one larger contact",
 )
@@ -222,46 +239,30 @@ GHOST = Knob(
     name="ghost",
     title="Three corners fake the fourth, without diodes",
     axis="fingers at the corners of a rectangle",
-    amount="cells that read pressed",
+    amount=SHARE,
     values=(1, 2, 3, 4),
-    runs={"zones": _corners},
+    runs={"zones": Rated(_corners)},
     helps="diodes",
 )
 
 
-SPOTS = [(3, 4), (9, 10)]
-PULLED = Circuit(column_pull_ohm=4700.0)
 PATIENT, PATIENT_GUARDED = (skin.replace(settle_us=5.0) for skin in (REVERSAL, REVERSAL_GUARDED))
 """Columns have the time that weak switches need."""
 
 
-def _slow_reversal(skin: Skin, circuit: Circuit) -> Outcome:
-    """Two fingers on a sheet whose columns and rows take their time."""
-    cells = finger(skin, *SPOTS)
-    with Rig(skin) as rig:
-        rig.board.settle(*lines_of(circuit, skin, most=2))
-        rig.board.hold(cells[None], 2 * hello_clocks(skin))
-        zones = rig.frames()[-1]
-    return judged(zones, cells, [finger(skin, spot) for spot in SPOTS])
-
-
-def _capacitance(skin: Skin, picofarad: float) -> Outcome:
-    return _slow_reversal(skin, PULLED.replace(line_pf=picofarad))
-
-
-def _switch(skin: Skin, kiloohm: float) -> Outcome:
-    return _slow_reversal(skin, Circuit(switch_ohm=1000 * kiloohm))
+def _switch(skin: Skin, kiloohm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    return _slow(skin, Circuit(switch_ohm=1000 * kiloohm), rng, count)
 
 
 SETTLE_REVERSAL = Knob(
     name="settle_reversal",
     title="Lines slower than `settle_us = 0.5`, by line reversal",
     axis="capacitance of a line, pF",
-    amount="cells that read pressed",
+    amount=SHARE,
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
-        "4.7 kΩ pull-up": functools.partial(_capacitance, REVERSAL),
-        "the same with guard lines": functools.partial(_capacitance, REVERSAL_GUARDED),
+        "4.7 kΩ pull-up": Rated(functools.partial(_capacitance, REVERSAL, PULLED), most=120),
+        "the same with guard lines": Rated(functools.partial(_capacitance, REVERSAL_GUARDED, PULLED), most=120),
     },
     helps="`contactfpga settle` says which times a circuit needs; smaller resistances",
 )
@@ -270,11 +271,11 @@ PROJECT_REVERSAL = Knob(
     name="project_reversal",
     title="Pressed switches too weak to lift their row, by line reversal",
     axis="resistance of a pressed switch, kΩ",
-    amount="cells that read pressed",
+    amount=SHARE,
     values=(0.1, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 20),
     runs={
-        "rows pulled by 10 kΩ": functools.partial(_switch, PATIENT),
-        "the same with guard lines": functools.partial(_switch, PATIENT_GUARDED),
+        "rows pulled by 10 kΩ": Rated(functools.partial(_switch, PATIENT), most=120),
+        "the same with guard lines": Rated(functools.partial(_switch, PATIENT_GUARDED), most=120),
     },
     helps="switches of less resistance, weaker pulls of the rows; `contactfpga settle` says what a circuit needs",
     unnoticed="a row that is not lifted reads as one that nobody touches; guard lines with such switches report it",
@@ -285,33 +286,37 @@ DIODES_REVERSAL = dataclasses.replace(
     name="diodes_reversal",
     title="Switches without a sound diode, by line reversal",
     runs={
-        "three fingers at corners": functools.partial(bare, REVERSAL),
-        "the same with guard lines": functools.partial(bare, REVERSAL_GUARDED),
+        "three fingers at corners": Rated(functools.partial(bare, REVERSAL)),
+        "the same with guard lines": Rated(functools.partial(bare, REVERSAL_GUARDED)),
     },
 )
 
 
-def _broken(skin: Skin, line: str, count: float) -> Outcome:
-    """``line``: row or column."""
-    cells = np.zeros((skin.rows, skin.columns), bool)
-    cells[4:11, 5:12] = True
-    lines = tuple(range(7, 7 + int(count)))
-    cut = dict.fromkeys(lines, 0)
-    cuts = wiring.LineCuts(cut, {}) if line == "row" else wiring.LineCuts({}, cut)
-    return judged(still(skin, cells, cuts), cells, [cells])
+def _broken(skin: Skin, line: str, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    """``line``: row or column. The contact lies anywhere, and the broken lines anywhere beneath it."""
+    found = []
+    for _ in range(draws):
+        top, left = map(int, rng.integers(0, (skin.rows - 6, skin.columns - 6)))
+        cells = np.zeros((skin.rows, skin.columns), bool)
+        cells[top : top + 7, left : left + 7] = True
+        first = (top if line == "row" else left) + int(rng.integers(0, 8 - int(count)))
+        cut = dict.fromkeys(range(first, first + int(count)), 0)
+        cuts = wiring.LineCuts(cut, {}) if line == "row" else wiring.LineCuts({}, cut)
+        found.append(judged(still(skin, cells, cuts), cells, [cells]))
+    return found
 
 
 BROKEN = Knob(
     name="broken",
     title="Lines that are broken under a contact of 7x7 cells",
     axis="broken lines side by side",
-    amount="cells that read pressed",
+    amount=SHARE,
     values=(0, 1, 2, 3),
     runs={
-        "row": functools.partial(_broken, REFERENCE, "row"),
-        "column": functools.partial(_broken, REFERENCE, "column"),
-        "row, with guard lines": functools.partial(_broken, GUARDED, "row"),
-        "column, with guard lines": functools.partial(_broken, GUARDED, "column"),
+        "row": Rated(functools.partial(_broken, REFERENCE, "row")),
+        "column": Rated(functools.partial(_broken, REFERENCE, "column")),
+        "row, with guard lines": Rated(functools.partial(_broken, GUARDED, "row")),
+        "column, with guard lines": Rated(functools.partial(_broken, GUARDED, "column")),
     },
     helps="guard lines; `contactfpga wire` shows lines that never read pressed",
     unnoticed="what is past a break looks like switches that nobody presses; only one that is closed for good shows "
@@ -323,47 +328,63 @@ BROKEN_REVERSAL = dataclasses.replace(
     name="broken_reversal",
     title="Lines that are broken, by line reversal",
     runs={
-        "row": functools.partial(_broken, REVERSAL, "row"),
-        "column": functools.partial(_broken, REVERSAL, "column"),
-        "row, with guard lines": functools.partial(_broken, REVERSAL_GUARDED, "row"),
-        "column, with guard lines": functools.partial(_broken, REVERSAL_GUARDED, "column"),
+        "row": Rated(functools.partial(_broken, REVERSAL, "row")),
+        "column": Rated(functools.partial(_broken, REVERSAL, "column")),
+        "row, with guard lines": Rated(functools.partial(_broken, REVERSAL_GUARDED, "row")),
+        "column, with guard lines": Rated(functools.partial(_broken, REVERSAL_GUARDED, "column")),
     },
 )
 
-STUCK_SPOTS = [(2, 3), (12, 2), (5, 12), (13, 13), (1, 9), (9, 14)]
-MASKED = REFERENCE.replace(mask=tuple(STUCK_SPOTS[:3]))
+MASKED = REFERENCE.replace(mask=((2, 3), (12, 2), (5, 12)))
 
 
-def _stuck(skin: Skin, count: float) -> Outcome:
-    touch = finger(skin, (7, 7))
-    closed = np.zeros_like(touch)
-    for row, column in STUCK_SPOTS[: int(count)]:
-        closed[row, column] = True
-    zones = still(skin, Wiring(closed=closed).read(touch)[0])
-    return judged(zones, touch | closed, [touch])
+def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    """Switches anywhere but beneath and beside the finger, those of the mask first."""
+    found = []
+    for _ in range(draws):
+        touch, beside = _finger_anywhere(rng, skin)
+        free = [spot for spot in zip(*np.nonzero(~beside)) if spot not in skin.mask]
+        drawn = rng.permutation(len(free))
+        spots = [*skin.mask, *(free[number] for number in drawn)][: int(count)]
+        closed = np.zeros_like(touch)
+        closed[tuple(np.array(spots, int).reshape(-1, 2).T)] = True
+        found.append(judged(still(skin, Wiring(closed=closed).read(touch)[0]), touch | closed, [touch]))
+    return found
 
 
-def _stuck_columns(skin: Skin, count: float) -> Outcome:
-    touch = finger(skin, (7, 7))
-    columns = np.zeros(skin.columns, bool)
-    columns[[2, 12, 4, 14, 0, 10][: int(count)]] = True
-    with Rig(skin) as rig:
-        rig.board.stick(columns)
-        rig.board.hold(touch[None], hello_clocks(skin) + 4 * skin.derived.frame_clocks)
-        zones = rig.frames()[-1]
-    return judged(zones, touch | columns, [touch])
+def _finger_anywhere(rng: np.random.Generator, skin: Skin) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, columns) bool each: a finger clear of the mask, and its cells with those around them."""
+    while True:
+        ((row, column),) = _apart(rng, skin, 1)
+        touch, beside = finger(skin, (row, column)), np.zeros((skin.rows, skin.columns), bool)
+        beside[max(row - 1, 0) : row + 3, max(column - 1, 0) : column + 3] = True
+        if not any(beside[spot] for spot in skin.mask):
+            return touch, beside
+
+
+def _stuck_columns(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    found = []
+    for _ in range(draws):
+        touch, _ = _finger_anywhere(rng, skin)
+        columns = np.isin(np.arange(skin.columns), rng.permutation(skin.columns)[: int(count)])
+        with Rig(skin) as rig:
+            rig.board.stick(columns)
+            rig.board.hold(touch[None], hello_clocks(skin) + 4 * skin.derived.frame_clocks)
+            zones = rig.frames()[-1]
+        found.append(judged(zones, touch | columns, [touch]))
+    return found
 
 
 STUCK = Knob(
     name="stuck",
     title="Switches that are stuck closed, beside a finger",
     axis="how many are stuck",
-    amount="cells that read pressed",
+    amount=SHARE,
     values=(0, 1, 2, 3, 4, 5, 6),
     runs={
-        "no mask": functools.partial(_stuck, REFERENCE),
-        "three in the mask": functools.partial(_stuck, MASKED),
-        "columns shorted to the rows' level": functools.partial(_stuck_columns, REFERENCE),
+        "no mask": Rated(functools.partial(_stuck, REFERENCE)),
+        "three in the mask": Rated(functools.partial(_stuck, MASKED)),
+        "columns shorted to the rows' level": Rated(functools.partial(_stuck_columns, REFERENCE)),
     },
     helps="`contactfpga doctor --watch` names them in time; list them in `mask`",
     unnoticed="a switch that is stuck and one that is pressed are the same circuit; only time tells them apart",
@@ -374,7 +395,7 @@ STUCK_REVERSAL = dataclasses.replace(
     name="stuck_reversal",
     title="Switches that are stuck closed, by line reversal",
     runs={
-        "no mask": functools.partial(_stuck, REVERSAL),
-        "columns shorted to the rows' level": functools.partial(_stuck_columns, REVERSAL),
+        "no mask": Rated(functools.partial(_stuck, REVERSAL)),
+        "columns shorted to the rows' level": Rated(functools.partial(_stuck_columns, REVERSAL)),
     },
 )

@@ -27,6 +27,8 @@ class Outcome:
     """(rows, columns) bool to be drawn: what is pressed."""
     zones: tuple[Place, ...] = ()
     """Barycenters to be drawn: what was reported."""
+    rate: str = ""
+    """The share of draws that are right with its interval, where there was more than one."""
 
     @property
     def verdict(self) -> str:
@@ -55,6 +57,10 @@ class Knob:
     """How a value is written."""
     unnoticed: str = ""
     """Why nothing tells where :func:`Outcome.verdict` is ``silent``."""
+    closed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    """Where a closed form says that it breaks, for the methods that have one."""
+    closed_form: str = ""
+    """The closed form in words."""
 
     def sweep(
         self, step: Callable[[], None] = lambda: None, so_far: dict[str, Sweep] | None = None

@@ -14,9 +14,11 @@ from contactfpga.driver.board import Board as Driver
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import HEARD_BITS
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Knob, Outcome
+from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
@@ -64,9 +66,9 @@ class Line:
         starts, lengths = rng.uniform(0, self.end, count), rng.uniform(0.5 * bit, 2 * bit, count)
         return dataclasses.replace(self, edges=np.sort(np.concatenate([self.edges, starts, starts + lengths])))
 
-    def read(self, bit_clocks: float) -> bytes:
+    def read(self, bit_clocks: float, phase: float = 0.0) -> bytes:
         """What a UART takes for bytes whose bits last this many of the board's clocks; without the bytes that have no
-        stop bit."""
+        stop bit. Its first look comes ``phase`` (0 to 1) of a look later."""
         tick = bit_clocks / OVERSAMPLING
         data, now, last = bytearray(), 0.0, self.end + 12 * self.skin.derived.bit_clocks
         offsets = tick * (OVERSAMPLING * np.arange(10) + OVERSAMPLING // 2)
@@ -75,7 +77,8 @@ class Line:
             if not index & 1:  # high: on to where it falls, as the next tick sees it
                 if index >= len(self.edges):
                     break
-                now = max(tick * math.ceil(self.edges[index] / tick), float(self.edges[index]))
+                look = tick * (math.ceil(self.edges[index] / tick - phase) + phase)
+                now = max(look, float(self.edges[index]))
                 if not int(np.searchsorted(self.edges, now, "right")) & 1:
                     continue
             levels = 1 - (np.searchsorted(self.edges, now + offsets, "right") & 1)
@@ -133,32 +136,38 @@ def _sent(zones: Zones) -> dict[str, object]:
     return own | {"flags": sorted(zones.frame.flags)}
 
 
-FRAMES = 60
 SKIN = REFERENCE
+ZONE_BYTES = 13 + 4
+"""Of a frame with one zone on the wire; each further zone takes 4."""
+FEW_FRAMES = 20
+RECORDED = 200
+"""Lines of :data:`FEW_FRAMES` from which draws choose."""
 
 
 @functools.cache
-def recorded(scans: int = FRAMES) -> Line:
+def recorded(scans: int, seed: int) -> Line:
     """A line to be heard in several ways."""
-    return Line.record(SKIN, scans, seed=3)
+    return Line.record(SKIN, scans, seed)
 
 
-def _of_line(found: HostDecoding, extra: str = "") -> Outcome:
+def _of_line(found: HostDecoding) -> Outcome:
     """Right if every frame arrives; a frame that was never sent is worse than one that is lost, and silent."""
     missing = found.sent - found.arrived
-    what = f"{missing} of {found.sent} frames do not arrive" + extra
+    what = f"{missing} of {found.sent} frames do not arrive"
     if found.wrong:
-        return Outcome(False, (), f"{found.wrong} frames that were never sent", missing / found.sent)
-    return Outcome(not missing and not found.told, found.told, what, missing / found.sent)
+        return Outcome(False, (), f"{found.wrong} frames that were never sent")
+    return Outcome(not missing and not found.told, found.told, what)
 
 
-def _baud(sign: int, per_cent: float) -> Outcome:
-    bits = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
-    return _of_line(heard(recorded(), recorded().read(bits)))
+def _lines(bit_clocks: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """Lines of a hello and some frames, each with its own contacts and phase, at a host whose bits last so long."""
+    lines = [recorded(FEW_FRAMES, int(seed)) for seed in rng.integers(0, RECORDED, count)]
+    found = [(line, line.read(bit_clocks, float(phase))) for line, phase in zip(lines, rng.random(count))]
+    return [_of_line(heard(line, data)) for line, data in found]
 
 
-ASKED = 0x15_2A_D0
-"""Of a request whose other digits mix zeros and ones; its lowest bits are left for a number."""
+def _baud(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    return _lines(SKIN.derived.bit_clocks / (1 + sign * per_cent / 100), rng, count)
 
 
 def _send(rig: Rig, byte: int, bit: float) -> None:
@@ -171,66 +180,78 @@ def _send(rig: Rig, byte: int, bit: float) -> None:
         rig.board.run(end - start)
 
 
-def _asked(sign: int, per_cent: float) -> Outcome:
-    """The host's requests, at the host's rate, at the board's receive pin: does a frame answer?"""
+def _number(rng: np.random.Generator) -> int:
+    """Of a request, any that may be sent."""
+    while not protocol.may_number(number := int(rng.integers(1 << protocol.DIGIT_BITS * protocol.HEARD_DIGITS))):
+        pass
+    return number
+
+
+def _asked(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """Any requests of the host, at the host's rate, at the board's receive pin at any time: does a frame answer?"""
     bit = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
-    answered = 0
-    lows = (1, 2, 3, 4)
+    found = []
     with Rig(SKIN) as rig:
         rig.board.run(hello_clocks(SKIN))
-        for low in lows:
+        for _ in range(count):
+            number = _number(rng)
             rig.frames()
-            for byte in protocol.encode_request(ASKED + low):
+            rig.board.run(int(rng.integers(rig.scan)))
+            for byte in protocol.encode_request(number):
                 _send(rig, byte, bit)
             rig.board.run(6 * rig.scan)
-            answered += any(zones.frame.heard == low for zones in rig.frames())
-    right = answered == len(lows)
-    what = f"{len(lows) - answered} of {len(lows)} requests unanswered"
-    return Outcome(right, () if right else ("ReadTimeout",), what, 1 - answered / len(lows))
+            right = any(zones.frame.heard == number % (1 << HEARD_BITS) for zones in rig.frames())
+            found.append(Outcome(right, () if right else ("ReadTimeout",), "a request is not answered"))
+    return found
 
 
 BAUD = Knob(
     name="baud",
     title="Baud rates that differ",
     axis="difference, %",
-    amount="share lost",
-    values=tuple(np.arange(0, 12.01, 0.25).round(2).tolist()),
+    amount=SHARE,
+    values=tuple(np.arange(0, 8.01, 0.25).round(2).tolist()),
     runs={
-        "host faster, frames": functools.partial(_baud, 1),
-        "host slower, frames": functools.partial(_baud, -1),
-        "host faster, requests": functools.partial(_asked, 1),
-        "host slower, requests": functools.partial(_asked, -1),
+        f"host {speed}, {what}": Rated(functools.partial(draws, sign), most=480)
+        for what, draws in (("frames", _baud), ("requests", _asked))
+        for speed, sign in (("faster", 1), ("slower", -1))
     },
     helps="a Skin is refused beyond 1.5 %; `contactfpga doctor` counts what is damaged",
+    closed={f"host {speed}, frames": round(100 * 0.5 / 9.5, 2) for speed in ("faster", "slower")},
+    closed_form="the middle of the stop bit, 9.5 bits after the start, slips by half a bit; a look takes 1/16 of a bit",
 )
 
 
-def _noise(rate_hz: float) -> Outcome:
-    """The port was opened before the noise began."""
-    line = recorded(200)
-    noisy = line.noisy(rate_hz, seed=1).read(SKIN.derived.bit_clocks)
-    return _of_line(heard(line, noisy, greeted=protocol.encode_hello(SKIN)))
+def _noise(rate_hz: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """Each frame is a draw. The port was opened before the noise began."""
+    line = recorded(count + 10, int(rng.integers(RECORDED)))
+    data = line.noisy(rate_hz, int(rng.integers(1 << 32))).read(SKIN.derived.bit_clocks)
+    found = heard(line, data, greeted=protocol.encode_hello(SKIN))
+    if found.wrong:
+        return [Outcome(False, (), f"{found.wrong} frames that were never sent")] * count
+    lost = Outcome(False, found.told, "a frame does not arrive")
+    return ([lost] * (found.sent - found.arrived) + [Outcome(True, found.told)] * found.arrived)[:count]
 
 
 NOISE = Knob(
     name="noise",
     title="Pulses on the line",
     axis="pulses per second",
-    amount="share of frames lost",
-    values=(0, 10, 30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000),
-    runs={"half a bit to two bits long": _noise},
+    amount=SHARE,
+    values=(0, 100, 300, 500, 600, 700, 800, 900, 1_000, 2_000, 5_000, 10_000, 30_000, 100_000, 300_000),
+    runs={"half a bit to two bits long": Rated(_noise)},
     helps="a shorter cable, a slower `baud`",
+    closed={"half a bit to two bits long": float(round(-math.log(0.95) * SKIN.baud / (10 * ZONE_BYTES + 1.25)))},
+    closed_form="pulses come at random, and any of them in one of the 17 bytes of a frame with a zone spoils it",
 )
 
 
-def _clock(per_cent: float) -> Outcome:
+def _clock(per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
     """The board's crystal is fast: bits are short, and so are its microseconds."""
     faster = 1 + per_cent / 100
-    found = heard(recorded(), recorded().read(SKIN.derived.bit_clocks * faster))
-    if found.arrived < found.sent or found.wrong:
-        return _of_line(found)
     told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
-    return Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off", per_cent / 100)
+    times = Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off")
+    return [times if one.right else one for one in _lines(SKIN.derived.bit_clocks * faster, rng, count)]
 
 
 DOCTOR_S = 10.0
@@ -243,15 +264,17 @@ CLOCK = Knob(
     name="clock",
     title="A board whose clock is fast",
     axis="%",
-    amount="share of frames lost, else error of times",
+    amount=SHARE,
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
-    runs={"board with `clock_hz` off": _clock},
+    runs={"board with `clock_hz` off": Rated(_clock, most=480)},
     helps="a crystal: 0.01 % at worst; on-chip oscillators cannot be chosen",
     unnoticed="over USB the host knows a frame's instant to a millisecond only, so a small difference shows late",
 )
 
 
 # ---- a host that is slow
+
+SCAN_MS = 1000 * SKIN.derived.frame_clocks / SKIN.clock_hz
 
 TTY_BYTES = 4095
 """What Linux keeps of a serial port that nobody reads; what comes then is dropped."""
@@ -293,27 +316,27 @@ class SlowHost:
         self._board.close()
 
 
-TURNS = 3
-
-
-def _slow_host(milliseconds: float) -> Outcome:
-    """The driver reads all there is, then the host works for a while, and so on."""
+def _slow_host(milliseconds: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """The driver reads all there is, then the host works for a while, and so on: each time is a draw."""
     transport = SlowHost()
+    scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
+    found = []
     with Driver(transport) as board:
         board.greet(1.0)
-        times = []
-        for _ in range(TURNS):
-            transport.work(milliseconds / 1000)
-            until = transport.clock() + 0.002
+        last_us = board.next().time_us
+        for _ in range(count):
+            lost, overwritten, unexplained = board.stats.lost, board.stats.overwritten, board.stats.unexplained
+            transport.work((milliseconds + rng.random() * scan_us / 1000) / 1000)
+            until, times = transport.clock() + 0.002, []
             while transport.clock() < until:
                 times.append(board.next().time_us)
-        stats = board.stats
-    scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
-    missing = round((times[-1] - times[0]) / scan_us) + 1 - len(times) - stats.overwritten
-    told = tuple(name for name in ("lost", "unexplained") if getattr(stats, name))
-    what = f"{missing} frames missing, `lost` says {stats.lost}"
-    what += f", {stats.unexplained} whose time was not known" if stats.unexplained else ""
-    return Outcome(missing <= 0 and not stats.damaged, told, what, missing)
+            stats = board.stats
+            missing = round((times[-1] - last_us) / scan_us) - len(times) - (stats.overwritten - overwritten)
+            lost, unexplained, last_us = stats.lost - lost, stats.unexplained - unexplained, times[-1]
+            told = tuple(name for name, number in (("lost", lost), ("unexplained", unexplained)) if number)
+            what = f"{missing} frames missing, `lost` says {lost}"
+            found.append(Outcome(missing <= 0 and not stats.damaged, told, what, missing))
+    return found
 
 
 class DyingBoard(SlowHost):
@@ -332,12 +355,14 @@ MAX_AGE_S = 0.005
 
 
 @functools.cache
-def _silence(max_age_s: float | None) -> tuple[str, float]:
-    """A program reads the newest frame again and again, and the board stops: the error that it gets, and seconds until
-    then."""
+def _silence(max_age_s: float | None, phase: float) -> tuple[str, float]:
+    """A program reads the newest frame again and again, and the board stops at this phase of a scan: the error that it
+    gets, and seconds until then."""
     transport = DyingBoard()
     with Driver(transport) as board:
         board.greet(1.0)
+        board.latest()
+        transport.work(phase * SKIN.derived.frame_clocks / SKIN.clock_hz)
         board.latest()
         transport.runs = False
         begun = transport.clock()
@@ -348,21 +373,27 @@ def _silence(max_age_s: float | None) -> tuple[str, float]:
             return type(error).__name__, transport.clock() - begun
 
 
-def _told_late(max_age_s: float | None, milliseconds: float) -> Outcome:
-    error, after_s = _silence(max_age_s)
-    told = (error,) if milliseconds >= 1000 * after_s else ()
-    return Outcome(milliseconds <= 1000 * MAX_AGE_S, told, f"no frame for {milliseconds:g} ms", milliseconds)
+def _told_late(max_age_s: float | None, milliseconds: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    found = []
+    for phase in rng.integers(0, PHASES, count) / PHASES:
+        error, after_s = _silence(max_age_s, float(phase))
+        told = (error,) if milliseconds >= 1000 * after_s else ()
+        found.append(Outcome(milliseconds <= 1000 * MAX_AGE_S, told, f"no frame for {milliseconds:g} ms"))
+    return found
 
+
+PHASES = 32
+"""Of a scan, at which a board stops."""
 
 SILENCE = Knob(
     name="silence",
     title="A board without supply, clock or configuration, or a broken cable",
     axis="ms since its last byte",
-    amount="ms without a frame",
+    amount=SHARE,
     values=(1, 2, 4, 6, 10, 20, 50, 100, 200, 500, 1000, 2000),
     runs={
-        "`latest()`": functools.partial(_told_late, None),
-        "`latest(max_age_s=0.005)`": functools.partial(_told_late, MAX_AGE_S),
+        "`latest()`": Rated(functools.partial(_told_late, None)),
+        "`latest(max_age_s=0.005)`": Rated(functools.partial(_told_late, MAX_AGE_S)),
     },
     helps="`max_age_s`, or `deadline_s` of `subscribe` and `events`; a watchdog at the pin `alive`",
     unnoticed="a read waits for a frame until its timeout; how old one may be, only your program knows",
@@ -372,8 +403,10 @@ HOST = Knob(
     name="host",
     title="A host that reads every now and then",
     axis="ms between reads",
-    amount="frames missing",
+    amount=SHARE,
     values=(1, 2, 5, 8, 10, 12, 14, 16, 20, 25, 30, 40, 50, 70, 100),
-    runs={"every frame of `contactfpga.open()`": _slow_host},
+    runs={"every frame of `contactfpga.open()`": Rated(_slow_host, most=120)},
     helps='`Board.latest()` where only the newest frame counts; `send = "on_change"`',
+    closed={"every frame of `contactfpga.open()`": round(TTY_BYTES / (ZONE_BYTES + 4) * SCAN_MS, 1)},
+    closed_form="the system's buffer of 4,095 bytes is full of packets of 21 bytes, one per scan",
 )

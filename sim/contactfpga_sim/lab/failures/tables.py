@@ -9,10 +9,13 @@ from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import knob_pictures
 from contactfpga_sim.lab.failures.catalogue import KNOBS
-from contactfpga_sim.lab.failures.knob import Knob, Sweep
+from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.pool import progress
 
-HEAD = ("knob", "method", "holds until", "breaks at", "what breaks", "what the system says", "what helps")
+HEAD = (
+    *("knob", "method", "holds until", "breaks at", "closed form"),
+    *("what breaks", "what the system says", "what helps"),
+)
 
 
 def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
@@ -27,16 +30,24 @@ def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> lis
     for number, (method, sweep) in enumerate(methods.items()):
         first = f"{title}: {knob.axis}" if number == 0 else ""
         helps = knob.helps if number == 0 else ""
-        lines.append(writer.line((first, method, *_cells(knob, sweep), helps)))
+        closed = knob.format.format(knob.closed[method]) if method in knob.closed else ""
+        holds, breaks, *rest = _cells(knob, sweep)
+        lines.append(writer.line((first, method, holds, breaks, closed, *rest, helps)))
     return lines
 
 
 def _cells(knob: Knob, sweep: Sweep) -> list[str]:
-    holds = "" if sweep.holds_until is None else knob.format.format(sweep.holds_until)
+    last = len(sweep.values) - 1 if sweep.broken is None else sweep.broken - 1
+    holds = "nowhere" if last < 0 else knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
     if sweep.broken is None:
         return [f"{holds}, all there are", "", "nothing", ""]
+    first = sweep.outcomes[sweep.broken]
     at = knob.format.format(sweep.breaks_at)
-    return [holds or "nowhere", f"**{at}**", sweep.outcomes[sweep.broken].what, says(knob, sweep)]
+    return [holds, f"**{at}**{_rate(first)}", first.what, says(knob, sweep)]
+
+
+def _rate(outcome: Outcome) -> str:
+    return f": {outcome.rate}" if outcome.rate else ""
 
 
 def says(knob: Knob, sweep: Sweep) -> str:
@@ -54,6 +65,18 @@ def says(knob: Knob, sweep: Sweep) -> str:
         first = sweep.outcomes[sweep.values.index(later[0])].told
         parts.append(f"{', '.join(f'`{word}`' for word in first)} from {knob.format.format(later[0])} on")
     return "; ".join(parts)
+
+
+CLOSED = ("knob", "closed form", "value")
+
+
+def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
+    """A row for each knob that has a closed form: in words, and as values."""
+    lines = []
+    for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
+        values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
+        lines.append(writer.line((f"[{knob.title}](#{knob.name})", knob.closed_form, f"{values} ({knob.axis})")))
+    return writer.table(CLOSED, lines)
 
 
 UNNOTICED = ("knob", "where", "why nothing reports it")

@@ -3,6 +3,7 @@ shadows that cross, more zones than a frame carries."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 
@@ -12,6 +13,7 @@ from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Knob, Outcome
+from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import (
     REFERENCE,
     Rig,
@@ -22,58 +24,54 @@ from contactfpga_sim.lab.failures.rig import (
     plural,
     reported,
     seen,
-    still,
 )
 from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Track
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
 
-PLACES = 24
-"""Places of a pair within a pitch, and angles; the worst one counts."""
+
+def _pair(gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator) -> Scene:
+    """Two fingers around any place of a pitch near the middle of the sheet, at any angle."""
+    x, y = pitch_mm * rng.uniform(7, 8, 2)
+    return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180)))
 
 
-def _pairs(gap_mm: float, pitch_mm: float) -> list[Scene]:
-    """Two fingers of 8 mm radius, which cover a switch wherever they are, spread over places and angles."""
-    found = []
-    for number in range(PLACES):
-        x, y, turn = ((number * step) % 1 for step in (0.618034, 0.754878, 0.569840))
-        middle = 7.0 * pitch_mm
-        found.append(Scene(contacts.pair(gap_mm, 8.0, middle + x * pitch_mm, middle + y * pitch_mm, 180.0 * turn)))
-    return found
-
-
-def _closing(skin: Skin, pitch_mm: float, gap_mm: float) -> Outcome:
-    """The pitch is in no wire of the gateware: the same one serves sheets of any pitch."""
+def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """Fingers of 8 mm radius cover a switch wherever they are. The pitch is in no wire of the gateware: the same one
+    serves sheets of any pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
-    cells = np.array([scene.pressed(0.0, sheet) for scene in _pairs(gap_mm, pitch_mm)])
-    frames = seen(skin, cells)
-    wrong = [index for index, zones in enumerate(frames) if len(zones) != 2]
-    shown = wrong[0] if wrong else 0
-    return Outcome(
-        right=not wrong,
-        told=tuple({fault for index in wrong for fault in faults(frames[index])}),
-        what=f"1 zone of 2 contacts at {len(wrong)} of {PLACES} places",
-        amount=1 - len(wrong) / PLACES,
-        cells=cells[shown],
-        zones=places(frames[shown]),
-    )
+    cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
+    return [_pair_told(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
+
+
+def _pair_told(zones: Zones, cells: np.ndarray, there: int) -> Outcome:
+    what = f"{plural(len(zones), 'zone')} of {plural(there, 'contact')}"
+    return Outcome(len(zones) == there, faults(zones), what, cells=cells, zones=places(zones))
 
 
 CLOSING = Knob(
     name="closing",
     title="Two fingers of 16 mm that come close",
     axis="gap between their rims, mm",
-    amount="share of places counted right",
-    values=tuple(np.arange(20, -0.25, -0.5).round(2).tolist()),
+    amount=SHARE,
+    values=tuple(np.arange(16, -0.25, -0.5).round(2).tolist()),
     runs={
-        "8-connectivity, 10 mm": functools.partial(_closing, REFERENCE, 10.0),
-        "4-connectivity, 10 mm": functools.partial(_closing, REFERENCE.replace(connectivity=4), 10.0),
-        "8-connectivity, 5 mm": functools.partial(_closing, REFERENCE, 5.0),
-        "4-connectivity, 5 mm": functools.partial(_closing, REFERENCE.replace(connectivity=4), 5.0),
+        f"{connectivity}-connectivity, {pitch} mm": Rated(
+            functools.partial(_closing, REFERENCE.replace(connectivity=connectivity), float(pitch))
+        )
+        for pitch in (10, 5)
+        for connectivity in (8, 4)
     },
     helps="a finer pitch; 4-connectivity",
     unnoticed="the same switches are pressed as by one contact of that shape",
+    closed={
+        f"{connectivity}-connectivity, {pitch} mm": round(pitch * (math.sqrt(2) if connectivity == 8 else 1), 2)
+        for pitch in (10, 5)
+        for connectivity in (8, 4)
+    },
+    closed_form="wherever the pair lies, a row or column between the fingers is free: by 8-connectivity from √2 "
+    "pitches on, by 4-connectivity from one on",
 )
 
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
@@ -83,15 +81,16 @@ FIRST, LAST = 2.0, 13.0
 """Where a moving finger starts and ends, in pitches."""
 
 
-def _slide(skin: Skin, speed: float, way: tuple[int, int]) -> tuple[float, Zones, np.ndarray]:
-    """The frame whose zones are farthest from the finger at the frame's time: distance in pitches, frame, pressed cells
-    at that time. A frame without exactly one zone is infinitely far."""
+def _slide(skin: Skin, speed: float, rng: np.random.Generator) -> Outcome:
+    """The frame whose zones are farthest from the finger at the frame's time, of a finger that starts at any time of a
+    scan. A frame without exactly one zone is infinitely far."""
     derived, pitch = skin.derived, skin.pitch_x_mm
-    start = hello_clocks(skin) / skin.clock_hz
+    way = WAYS[rng.integers(len(WAYS))]
+    start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
     end = start + (LAST - FIRST) / speed * derived.frame_clocks / skin.clock_hz
     ends = (FIRST * pitch, LAST * pitch)
     moving = Track((start, end), ends if sum(way) > 0 else ends[::-1])
-    middle = 7.3 * pitch
+    middle = rng.uniform(7, 8) * pitch
     x, y = (moving, middle) if way[0] else (middle, moving)
     scene = Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),))
     with Rig(skin) as rig:
@@ -100,32 +99,31 @@ def _slide(skin: Skin, speed: float, way: tuple[int, int]) -> tuple[float, Zones
             rig.board.run(derived.row_clocks)
         rig.board.run(2 * rig.scan)
         frames = [zones for zones in rig.frames() if start * 1e6 <= zones.time_us <= end * 1e6]
-    found = []
-    for zones in frames:
-        seconds = zones.time_us / 1e6
-        truth = scene.truth(seconds).contacts[0]
-        far = math.inf
-        if len(zones) == 1 and zones[0].x_mm is not None and zones[0].y_mm is not None:
-            far = math.hypot(zones[0].x_mm - truth.x_mm, zones[0].y_mm - truth.y_mm) / pitch
-        found.append((far, zones, scene.pressed(seconds, skin)))
-    return max(found, key=lambda one: one[0])
+    return max((_off(skin, scene, zones) for zones in frames), key=lambda one: one.amount)
 
 
-def _moving(skin: Skin, speed: float) -> Outcome:
-    far, zones, cells = max((_slide(skin, speed, way) for way in WAYS), key=lambda one: one[0])
-    what = f"zone {far:.1f} pitches off" if math.isfinite(far) else f"{plural(len(zones), 'zone')} of 1 contact"
-    return Outcome(far <= 1, faults(zones), what, min(far, 5.0), cells, places(zones))
+def _off(skin: Skin, scene: Scene, zones: Zones) -> Outcome:
+    seconds, far, what = zones.time_us / 1e6, math.inf, f"{plural(len(zones), 'zone')} of 1 contact"
+    truth = scene.truth(seconds).contacts[0]
+    if len(zones) == 1 and zones[0].x_mm is not None and zones[0].y_mm is not None:
+        far = math.hypot(zones[0].x_mm - truth.x_mm, zones[0].y_mm - truth.y_mm) / skin.pitch_x_mm
+        what = f"zone {far:.1f} pitches off"
+    return Outcome(far <= 1, faults(zones), what, far, scene.pressed(seconds, skin), places(zones))
+
+
+def _moving(skin: Skin, speed: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    return [_slide(skin, speed, rng) for _ in range(count)]
 
 
 MOVING = Knob(
     name="moving",
     title="A finger of 24 mm that moves during the scan",
     axis="pitches per raster scan",
-    amount="pitches off at the frame's time",
-    values=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
+    amount=SHARE,
+    values=(0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={
-        "`raster`": functools.partial(_moving, REFERENCE),
-        "`adaptive`": functools.partial(_moving, adaptive_skin(16, 16)),
+        "`raster`": Rated(functools.partial(_moving, REFERENCE), most=480),
+        "`adaptive`": Rated(functools.partial(_moving, adaptive_skin(16, 16)), most=480),
     },
     helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time, `adaptive`",
 )
@@ -157,28 +155,29 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
     return sum(now and not before for before, now in zip([False, *states], states))
 
 
-def _bounce(skin: Skin, open_us: float) -> Outcome:
-    scan = skin.derived.frame_clocks
-    shortly, for_good = 30.0, 300.0
+def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """The switch closes at any time of a scan, for 30 to 300 us before it opens again."""
+    closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
-        _touches(skin, closed_us, open_us, phase * scan // 4) for closed_us in (shortly, for_good) for phase in range(4)
+        _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)
     ]
-    most = max(counts)
-    return Outcome(set(counts) == {1}, (), f"{most} touches of 1", most)
+    return [Outcome(touches == 1, (), f"{touches} touches of 1", touches) for touches in counts]
 
 
 BOUNCE = Knob(
     name="bounce",
     title=f"A switch that bounces; debounce of {24 * DEBOUNCE_SCANS} us",
     axis="time for which it opens once more, us",
-    amount="touches seen",
+    amount=SHARE,
     values=tuple(range(0, 193, 12)),
     runs={
-        f"`{method}`": functools.partial(_bounce, BOUNCING if method == "none" else debounced(method))
+        f"`{method}`": Rated(functools.partial(_bounce, BOUNCING if method == "none" else debounced(method)))
         for method in ("none", "sym_defer_pk", "asym_eager_defer_pk")
     },
     helps="longer debounce times than the switch bounces; nobody can tell a long bounce from a second touch",
     unnoticed="a switch that opens and closes once more is what a second touch is",
+    closed={f"`{method}`": 24.0 * DEBOUNCE_SCANS for method in ("sym_defer_pk", "asym_eager_defer_pk")},
+    closed_form="a switch that is open for the release time counts as released",
 )
 
 
@@ -200,71 +199,86 @@ def arm(size: int, quarters: int) -> np.ndarray:
     return cells
 
 
-def _counted(zones: Zones, cells: np.ndarray, right: bool, what: str) -> Outcome:
-    """The outcome where the picture shows how many zones there are."""
-    return Outcome(right, faults(zones), what, len(zones), cells, places(zones))
-
-
-def _winding(skin: Skin, quarters: float) -> Outcome:
+def _winding(skin: Skin, quarters: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """Turned and mirrored in any way."""
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)
     finger[middle, middle] = True
-    zones = still(skin, around | finger)
-    right = reported(zones) == sorted([moments(around), moments(finger)])
-    return _counted(zones, around | finger, right, f"{plural(len(zones), 'zone')} of 2 contacts")
+    ways = [
+        (int(turns), bool(mirrored)) for turns, mirrored in zip(rng.integers(4, size=count), rng.random(count) < 0.5)
+    ]
+    pairs = [[_turned(one, *way) for one in (around, finger)] for way in ways]
+    frames = seen(skin, np.array([np.logical_or(*pair) for pair in pairs]))
+    return [_both(zones, pair) for zones, pair in zip(frames, pairs)]
+
+
+def _turned(cells: np.ndarray, turns: int, mirrored: int) -> np.ndarray:
+    turned = np.rot90(cells, turns)
+    return turned.T if mirrored else turned
+
+
+def _both(zones: Zones, pair: list[np.ndarray]) -> Outcome:
+    right = reported(zones) == sorted(map(moments, pair))
+    return dataclasses.replace(_pair_told(zones, np.logical_or(*pair), 2), right=right)
 
 
 WINDING = Knob(
     name="winding",
     title="An arm that winds around a finger",
     axis="quarters of a turn",
-    amount="zones",
+    amount=SHARE,
     values=tuple(range(12)),
-    runs={f"`{name}`": functools.partial(_winding, skin) for name, skin in SKINS.items()},
+    runs={f"`{name}`": Rated(functools.partial(_winding, skin)) for name, skin in SKINS.items()},
     helps="an exact labeller: `run` or `serial`",
     unnoticed="`projection` and `single` keep the shadows of what is pressed, and both shapes have the same ones",
 )
 
 
-def _crossing(skin: Skin, distance_mm: float) -> Outcome:
-    middle = (skin.rows - 1) * skin.pitch_y_mm / 2
-    pair = contacts.pair(distance_mm - 2 * FINGER_MM, FINGER_MM, middle, middle, 45.0)
-    scene = Scene(pair)
-    cells = scene.pressed(0.0, skin)
-    zones = still(skin, cells)
-    right = len(zones) == scene.truth(0.0).count
-    return _counted(zones, cells, right, f"{plural(len(zones), 'zone')} of {scene.truth(0.0).count} contacts")
+def _crossing(skin: Skin, distance_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    gap, pitch = distance_mm - 2 * FINGER_MM, skin.pitch_x_mm
+    scenes = [_pair(gap, FINGER_MM, pitch, rng) for _ in range(count)]
+    cells = np.array([scene.pressed(0.0, skin) for scene in scenes])
+    counts = [scene.truth(0.0).count for scene in scenes]
+    return [_pair_told(zones, each, there) for zones, each, there in zip(seen(skin, cells), cells, counts)]
 
 
 CROSSING = Knob(
     name="crossing",
-    title="Two fingers of 24 mm, one diagonally behind the other",
+    title="Two fingers of 24 mm, side by side at any angle",
     axis="distance of their middles, mm",
-    amount="zones",
+    amount=SHARE,
     values=tuple(range(70, 24, -1)),
-    runs={f"`{name}`": functools.partial(_crossing, SKINS[name]) for name in ("run", "projection", "single")},
+    runs={f"`{name}`": Rated(functools.partial(_crossing, SKINS[name])) for name in ("run", "projection", "single")},
     helps="an exact labeller; a sheet turned so that shadows part",
     unnoticed="pressed cells that touch are one zone by definition; `projection` and `single` see shadows only",
+    closed={"`run`": 38.14},
+    closed_form="as for two fingers that close in: 24 mm and √2 pitches",
 )
 
 
-def _many(skin: Skin, count: float) -> Outcome:
-    cells = np.zeros((skin.rows, skin.columns), bool)
-    spots = [(2 * (place // (skin.columns // 2)), 2 * (place % (skin.columns // 2))) for place in range(int(count))]
-    for row, column in spots:
-        cells[row, column] = True
-    zones = still(skin, cells)
-    right = reported(zones) == sorted((1, column, row) for row, column in spots) and not zones.flags
-    return _counted(zones, cells, right, f"{len(zones)} of {int(count)} zones; `total_zones` says {zones.total_zones}")
+def _many(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
+    """Single cells, no two of which touch."""
+    cells = np.zeros((draws, skin.rows // 2, skin.columns // 2), bool)
+    for each in cells:
+        each.flat[rng.choice(each.size, int(count), replace=False)] = True
+    frames = np.zeros((draws, skin.rows, skin.columns), bool)
+    frames[:, ::2, ::2] = cells
+    return [_each(zones, frame) for zones, frame in zip(seen(skin, frames), frames)]
+
+
+def _each(zones: Zones, cells: np.ndarray) -> Outcome:
+    right = reported(zones) == sorted((1, int(column), int(row)) for row, column in zip(*np.nonzero(cells)))
+    what = f"{len(zones)} of {int(cells.sum())} zones; `total_zones` says {zones.total_zones}"
+    return Outcome(right and not zones.flags, faults(zones), what, cells=cells, zones=places(zones))
 
 
 MANY = Knob(
     name="capacity",
     title=f"More zones than `zone_capacity = {CAPACITY}`",
     axis="zones on the sheet",
-    amount="zones in the frame",
+    amount=SHARE,
     values=(*range(1, 13), 16, 32, 64),
-    runs={"any labeller": functools.partial(_many, REFERENCE.replace(zone_capacity=CAPACITY))},
+    runs={"any labeller": Rated(functools.partial(_many, REFERENCE.replace(zone_capacity=CAPACITY)))},
     helps='a larger `zone_capacity`; `report = "cells"`',
 )

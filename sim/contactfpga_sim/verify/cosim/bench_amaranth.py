@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import time
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,14 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 
-def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> Trace:
-    """Simulate ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` seconds."""
+def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0, vcd: str | None = None) -> Trace:
+    """Simulate ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` seconds.
+
+    ``vcd`` is a file for every signal in every clock, in the time of the board.
+    """
     top = Top(skin, probes=True)
     simulator = Simulator(top)
-    simulator.add_clock(1e-6)
+    simulator.add_clock(1 / skin.clock_hz)
     recorder = TraceRecorder(cycles)
     stimulus = InputDriver(skin, timeline)
     there = ports(LEVELS, skin)
@@ -43,5 +47,6 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
                 raise OutOfTime(f"{cycle} of {cycles} cycles simulated in {limit_s:g} s")
 
     simulator.add_testbench(bench)
-    simulator.run()
+    with simulator.write_vcd(vcd) if vcd else contextlib.nullcontext():
+        simulator.run()
     return recorder.trace

@@ -1,0 +1,45 @@
+"""`contactfpga wave`: a touch as a waveform of the gateware."""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+from contactfpga import terminal
+from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, outputs
+
+EXTRA = "sim"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    flags.sheet(parser, "Skin of the board (default: the reference Skin).")
+    pressed = "Press the first frame of this array of (frames, rows, columns) (default: 2x2 cells in the middle)."
+    parser.add_argument("--pressed", metavar="FRAMES.npy", help=pressed)
+    parser.add_argument("-o", "--output", metavar="FILE", default="touch.vcd", help="Default: %(default)s.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.model.scenes.recordings import Recording
+    from contactfpga_sim.verify import wave
+
+    file = flags.sheet_file(args)
+    skin = Skin.load(file) if file else Skin()
+    cells = Recording.load(args.pressed, None).pressed[0] if args.pressed else wave.finger(skin)
+    vcd = outputs.file(args.output)
+    started = time.monotonic()
+    touch = wave.simulate(skin, cells, vcd)
+    us = 1e6 / skin.clock_hz
+    gtkw, surfer = wave.layouts(skin, vcd)
+    for title, what in (
+        ("waveform", f"{vcd}, {(touch.ends - touch.begins) * us:,.1f} us of a sheet of {skin.rows}x{skin.columns}"),
+        ("touched", f"at {(touch.touched - touch.begins) * us:,.1f} us"),
+        ("frame is sent", f"at {(touch.ends - touch.begins) * us:,.1f} us, with {len(touch.zones)} zone(s)"),
+        ("golden model", f"the same in each of {touch.ends:,} clocks ({time.monotonic() - started:.0f} s)"),
+        ("open it", f"gtkwave {vcd} {gtkw}"),
+        ("or", f"surfer {vcd} --command-file {surfer}"),
+    ):
+        terminal.say(f"{title:16}{what}", hang=16)
+    return 0

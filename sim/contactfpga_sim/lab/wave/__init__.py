@@ -1,0 +1,1 @@
+"""One touch as a waveform, for a page."""
