@@ -89,7 +89,7 @@ def scores_table() -> str:
 
 def scores_sample() -> str:
     """A row of :func:`scores_table`."""
-    return writer.line(_scores("meeting", 25.0, scores.of_family("meeting", 25.0)))
+    return writer.line(_scores("meeting", 100.0, scores.of_family("meeting", 100.0)))
 
 
 def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
