@@ -193,6 +193,16 @@ _ALL = (
         pictures="tables:draw",
     ),
     Study(
+        "mujoco",
+        title="A sheet beside a momentum observer",
+        page="mujoco.md",
+        minutes=6,
+        sections={
+            "observer": Section("collisions:observer_table"),
+        },
+        extra="mujoco",
+    ),
+    Study(
         "mutants",
         title="Mutants of the netlist that the comparison with the golden model tells",
         page="mutants.md",
