@@ -357,7 +357,7 @@ def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float
     off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy
     seconds, error = (time_us - spot.joined_us) / 1e6, error_mm2(zone)
     went = math.hypot(off_x - member.vx * seconds, off_y - member.vy * seconds)
-    far = error + member.known.later(seconds).place
+    far = error + member.known.place + seconds * (2 * member.known.both + seconds * member.known.speed)
     back = math.hypot(off_x, off_y)
     near = error + (REACH * radius_mm(member.area_mm2)) ** 2
     stopped = -math.expm1(-(seconds + FIRST_S) / GOING_S)
