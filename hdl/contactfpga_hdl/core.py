@@ -4,15 +4,10 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_hdl.top import Top
 
 STREAM = {"m_axis_tdata": Out(8), "m_axis_tvalid": Out(1), "m_axis_tready": In(1), "m_axis_tlast": Out(1)}
-
-
-class CoreError(ContactFPGAError):
-    """There is no such core; the message says why."""
 
 
 class Core(wiring.Component):
@@ -23,11 +18,11 @@ class Core(wiring.Component):
     m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): the packets of docs/protocol.md as an
     AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A frame that is ready
     while another one waits takes its place, so the reader may take its time and gets the newest one.
+
+    A Skin with ``dual`` has none: its two copies are compared at the transmit pin.
     """
 
     def __init__(self, skin: Skin):
-        if skin.dual:
-            raise CoreError("dual = true compares two copies at the transmit pin, which a core has not; leave it out")
         self._top = Top(skin, streams=True)
         ports = {name: member for name, member in self._top.signature.members.items() if name != "bytes"}
         super().__init__({**ports, **STREAM})

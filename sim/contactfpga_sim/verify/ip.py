@@ -16,6 +16,7 @@ from amaranth.lib.wiring import In
 from amaranth.sim import Simulator
 
 from contactfpga import __version__
+from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 from contactfpga_hdl.core import Core
@@ -68,6 +69,10 @@ MEANINGS = {
 }
 
 
+class IpError(ContactFPGAError):
+    """There is no such core; the message says why."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Port:
     """A port of the core."""
@@ -94,8 +99,10 @@ def ports(skin: Skin, core: Core) -> list[Port]:
 def write(skin: Skin, folder: Path) -> list[Path]:
     """Write all files of the core into a folder, which is there.
 
-    Raises :class:`~contactfpga_hdl.core.CoreError` if the Skin has no core.
+    Raises :class:`IpError` if the Skin has no core.
     """
+    if skin.dual:
+        raise IpError("dual = true compares two copies at the transmit pin, which a core has not; leave it out")
     core = Core(skin)
     known = ports(skin, core)
     vectors = simulated(skin, core, known)
