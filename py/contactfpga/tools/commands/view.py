@@ -13,8 +13,8 @@ from contactfpga.tools.console import flags, interrupt, numbers
 EXTRA = "view"
 
 WHAT = (
-    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, sim://, a recording's file, or ROBOT.toml (default: "
-    "a virtual sheet to press)."
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, flexitac://DEVICE, sim://, a recording's file, or "
+    "ROBOT.toml (default: a virtual sheet to press)."
 )
 
 
