@@ -359,7 +359,7 @@ _ALL = (
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table", sample="tables:scores_sample"),
+            "scores": Section("tables:scores_table"),
             "ahead": Section("tables:ahead_table"),
             "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
         },

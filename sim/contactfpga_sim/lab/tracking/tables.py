@@ -87,11 +87,6 @@ def scores_table() -> str:
     return writer.table_of(rows)
 
 
-def scores_sample() -> str:
-    """A row of :func:`scores_table`."""
-    return writer.line(_scores("meeting", 100.0, scores.of_family("meeting", 100.0)))
-
-
 def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
     each = (f"{100 * one.idf1:.1f} ± {100 * one.half:.1f}" for one in found.values())
     ours = found["`Tracker`"]
