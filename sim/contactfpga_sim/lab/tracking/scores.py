@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib
 import itertools
 import math
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -132,8 +134,7 @@ def norfair() -> Update:
 
     It asks for a numpy below 2 but needs none, so no extra has it (docs/tracking.md says how to install it).
     """
-    import norfair as published  # type: ignore[import-not-found,unused-ignore]
-
+    published: Any = importlib.import_module("norfair")
     tracker = published.Tracker("euclidean", 20.0, hit_counter_max=NORFAIR_HOLD, initialization_delay=0)
 
     def update(zones: Zones) -> dict[int, Place]:
