@@ -60,8 +60,15 @@ def test_force_is_that_which_the_units_measure(robot):
     assert chest.force_n == pytest.approx(tuple(push))
     assert chest.normal_n == pytest.approx(4.0)
     assert (arm.force_n, arm.normal_n, arm.interval_n) == (None, None, None)
-    assert chest.interval_n == pytest.approx((4.0, 4.0))
-    assert json.loads(json.dumps(chest.to_dict()))["interval_n"] == pytest.approx([4.0, 4.0])
+    # Its noise is that of the force at a place that is certain at least, and that of the force alone at most.
+    noise = 0.05**2 * cells.geometry @ cells.geometry.T
+    x, y, z = chest.point_m
+    exerts = np.vstack([np.eye(3), [[0, -z, y], [z, 0, -x], [-y, x, 0]]])
+    certain = np.linalg.inv(exerts.T @ np.linalg.inv(noise) @ exerts)
+    low, high = chest.interval_n
+    assert low + high == pytest.approx(8.0)
+    assert certain[2, 2] ** 0.5 < (high - low) / 2 / 1.95996 < noise[2, 2] ** 0.5
+    assert json.loads(json.dumps(chest.to_dict()))["interval_n"] == [low, high]
     turned = chest.moved(Pose.of((0, 0, 1), (math.pi / 2, 0, 0)), "elsewhere")
     assert turned.force_n == pytest.approx((0.5, 4.0, -0.25))
 

@@ -26,11 +26,11 @@ from contactfpga.design.cover import (
     point,
     sense,
 )
-from contactfpga.design.cover.arm import Arm
+from contactfpga.design.cover.arm import Arm, course
 from contactfpga.design.cover.sense import Model, PaddedSheet
 
 ODD = (1e300, 5e-324, 1e25, 1e-25, math.nan, math.inf, -1.0, 0.0, 10**400)
-BALL, SWITCH = Ball(0.02, 5e5), Switch()
+BALL, SWITCH, ARM = Ball(0.02, 5e5), Switch(), Arm(0.02, 0.2, 1.0, 0.5, 0.3)
 
 
 def pressed(model, force, half_x, half_y, x, thickness=5e-3, pitch=0.01, **more):
@@ -58,6 +58,10 @@ def lightest(length, pitch, acceleration):
 def struck(mass, speed, modulus):
     hit = impact.strike(Arm.link(mass, 0.038, 0.15, 0.2), speed, elastic.stiffness(Ball(0.02, modulus)))
     return hit if isinstance(hit, NoSolution) else [hit.compression_m, hit.time_s, hit.force_n]
+
+
+def held(hit):
+    return hit if isinstance(hit, NoSolution) else [hit.compression_m, hit.time_s, hit.force_n, hit.stiffness]
 
 
 def detected(offset, thickness, model):
@@ -92,6 +96,12 @@ CALLS = {
     "sense by a half-space": (lambda *given: detected(*given, "halfspace"), 3e-3, 5e-3),
     "sense by a layer": (lambda *given: detected(*given, "bonded"), 3e-3, 5e-3),
     "impact.strike": (struck, 0.6, 0.4, 3e5),
+    "impact.stiffness_for": (lambda *given: held(impact.stiffness_for(ARM, *given)), 0.3, 6e-3),
+    "impact.compression_m": (lambda *given: impact.compression_m(ARM, *given), 0.3, 1e5),
+    "impact.time_s": (lambda *given: impact.time_s(ARM, *given) or 0.0, 0.3, 1e5, 2e-3),
+    "arm.push_n": (ARM.push_n, 1e-3),
+    "arm.work_j": (ARM.work_j, 1e-3),
+    "arm.course": (lambda *given: course(ARM, *given, 8).time_s, 0.3, 1e5, 2e-3),
     "false presses": (
         lambda *given: (lambda cells, more: cells.false_presses(*more))(*rest(*given)),
         9.81,

@@ -164,7 +164,7 @@ def test_errors_cannot_command_the_terminal(capsys, monkeypatch):
     ("port", "kind", "said"),
     [
         ("", AddressError, "the port has no name"),
-        ("xyz://there", AddressError, "xyz:// is not known; there are sim://, replay://FILE and zenoh://KEY"),
+        ("xyz://there", AddressError, "there are sim://, replay://FILE, zenoh://KEY and flexitac://DEVICE"),
         ("my touches.mcap", AddressError, "is a file; to play a recording name 'replay://my touches.mcap' as the port"),
         ("robot.toml", AddressError, "is a file; for the boards of a robot there is: contactfpga body robot.toml"),
         ("replay://touches.mcap?speed=2", PortNotFound, "; the options are ?pace=1, ?start=SECONDS and ?link=NAME"),

@@ -1,5 +1,6 @@
 """Many frames at once, and what a single one takes."""
 
+import dataclasses
 import time
 
 import numpy as np
@@ -33,7 +34,8 @@ def test_batches_give_what_single_frames_give():
         for number, load in enumerate(loads):
             pair = solved(points[number], normals[number], load)
             assert np.ravel(many[number]) == pytest.approx(np.ravel([one.force_n for one in pair]), abs=1e-6)
-            stated = [[low, np.inf if high is None else high] for low, high in (one.interval_n for one in pair)]
+            exact = solved(points[number], normals[number], dataclasses.replace(load, noise=None))
+            stated = [[low, np.inf if high is None else high] for low, high in (one.interval_n for one in exact)]
             assert intervals[number] == pytest.approx(np.array(stated), rel=1e-6, abs=1e-6)
             (single,) = contacts(load, [touch(points[number, 0], -alone[number] / np.linalg.norm(alone[number]))])
             assert alone[number] == pytest.approx(single.force_n, abs=1e-8)

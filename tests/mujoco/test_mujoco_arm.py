@@ -43,12 +43,22 @@ class Run:
     """A reflex at 1 kHz; ``course`` is (time in s, angle, speed, force in N) each ms. ``fault``, at ``at_s``, is a
     function of the sheet."""
 
-    def __init__(self, reflex, seconds=0.12, damping=FIXED, push_n=0.0, fault=None, at_s=0.0, golden=True):
+    def __init__(
+        self,
+        reflex,
+        seconds=0.12,
+        damping=FIXED,
+        push_n=0.0,
+        fault=None,
+        at_s=0.0,
+        golden=True,
+        robot=HERE / "robot.toml",
+    ):
         model = mujoco.MjModel.from_xml_string(ARM.format(damping=damping))
         data = mujoco.MjData(model)
         data.ctrl[1] = -push_n
         self.course = []
-        with Sheets(model, data, HERE / "robot.toml", radius_m=0.038, foam=True, golden=golden) as sheets:
+        with Sheets(model, data, robot, radius_m=0.038, foam=True, golden=golden) as sheets:
             while data.time < seconds:
                 if fault is not None and data.time >= at_s:
                     fault(sheets["arm"])
@@ -127,3 +137,48 @@ def test_with_a_third_of_all_packets_lost_it_goes_on_and_still_stops():
     assert run.touched
     assert max(force for *_, force in run.course) < 20
     assert abs(run.course[-1][2]) < 0.03
+
+
+def guarded(folder):
+    """The arm's robot.toml, with guard lines."""
+    (folder / "robot.toml").write_text((HERE / "robot.toml").read_text())
+    (folder / "skin.toml").write_text("guard = true\n" + (HERE / "skin.toml").read_text())
+    return folder / "robot.toml"
+
+
+CUTS = {
+    "row at the board": ({8: 0}, {}),
+    "row after 12 columns": ({3: 12}, {}),
+    "column at the board": ({}, {8: 0}),
+    "column after 15 rows": ({}, {0: 15}),
+}
+
+
+@pytest.mark.slow  # 15 s, and the build of a guarded board
+@pytest.mark.parametrize("where", CUTS)
+@pytest.mark.parametrize("reflex", [reflexes.Stop, reflexes.BackOff, reflexes.Follow])
+def test_a_line_that_is_cut_stops_the_arm_before_it_touches_on_a_guarded_sheet(reflex, where, tmp_path):
+    """The arm would touch after some 25 ms at switch (8, 8); the break comes at 5 ms."""
+    made, told = reflex(1.0), []
+
+    def asked(snapshot, angle):
+        speed = made(snapshot, angle)
+        told.append(set(snapshot.links["arm"].zones.faults))
+        return speed
+
+    run = Run(
+        asked, 0.05, fault=lambda sheet: sheet.cut(*CUTS[where]), at_s=0.005, golden=False, robot=guarded(tmp_path)
+    )
+    assert not told[4]
+    assert told[-1], "the break is named"
+    assert not run.touched
+    assert made.speed == 0
+    assert abs(run.course[-1][2]) < 0.01
+
+
+@pytest.mark.slow  # 3 s
+def test_without_guard_lines_a_cut_row_is_not_felt_as_the_page_says():
+    """docs/faults.md: a broken wire looks like an untouched sheet."""
+    run = Run(reflexes.Stop(1.0), 0.06, fault=lambda sheet: sheet.cut({8: 0}), at_s=0.005, golden=False)
+    assert run.touched
+    assert max(force for *_, force in run.course) > 15

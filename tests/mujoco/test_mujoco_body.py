@@ -81,6 +81,28 @@ def standing(robot, touches):
     return model, found
 
 
+def test_frames_are_those_of_pinocchio(robot):
+    """Each link of JVRC-1 that MuJoCo has, at five random postures."""
+    pinocchio = pytest.importorskip("pinocchio")
+    body = Body.load(robot)
+    other = pinocchio.buildModelFromUrdf(str(body.urdf))
+    theirs, rng, compared = other.createData(), np.random.default_rng(5), 0
+    model, data = standing(robot, [])
+    for _ in range(5):
+        data.qpos[:] = rng.uniform(-1, 1, model.nq)
+        mujoco.mj_kinematics(model, data)
+        q = np.zeros(other.nq)
+        for joint in range(model.njnt):
+            q[other.joints[other.getJointId(model.joint(joint).name)].idx_q] = data.qpos[model.jnt_qposadr[joint]]
+        pinocchio.framesForwardKinematics(other, theirs, q)
+        for number in range(1, model.nbody):
+            frame = theirs.oMf[other.getFrameId(model.body(number).name)]
+            assert data.xpos[number] == pytest.approx(frame.translation, abs=1e-9)
+            assert data.xmat[number].reshape(3, 3) == pytest.approx(frame.rotation, abs=1e-9)
+            compared += 1
+    assert compared == 5 * (model.nbody - 1) > 200
+
+
 def random_touches(rng, link, skin, count):
     """Pushes of 2 to 8 N, at least 40 mm apart and a pitch from the edges."""
     found = []

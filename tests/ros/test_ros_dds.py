@@ -25,13 +25,30 @@ def publisher():
         yield publisher
 
 
-def reader(publisher, name):
+def reader(publisher, name, qos=None):
     from cyclonedds.sub import DataReader
     from cyclonedds.topic import Topic
 
     topic, participant = TOPICS[name], publisher._participant
     made = Topic(participant, f"rt{publisher.topic(name)}", dds.idl_type(topic.type))
-    return DataReader(participant, made, qos=dds.qos_of(topic))
+    return DataReader(participant, made, qos=qos or dds.qos_of(topic))
+
+
+def of_subscriber(kind):
+    """What a node asks for, written here: `reliable` as RViz's displays do, or `best effort` as for sensors."""
+    from cyclonedds.core import Policy, Qos
+    from cyclonedds.util import duration
+
+    wanted = {
+        "reliable": Policy.Reliability.Reliable(duration(seconds=1)),
+        "best effort": Policy.Reliability.BestEffort,
+    }
+    return Qos(
+        wanted[kind],
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(5),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
 
 
 def taken(reader):
@@ -54,6 +71,28 @@ def test_cyclone_reads_what_we_write(publisher, name):
     (sample,) = taken(read)
     # Only what cyclonedds writes tells whether it read the same; its floats of 32 bits are ours already.
     assert sample.serialize(use_version_2=False)[4:] == data[4:]
+
+
+@pytest.mark.parametrize("kind", ["reliable", "best effort"])
+@pytest.mark.parametrize("name", ["zones", "markers"])
+def test_reliable_and_best_effort_subscribers_both_receive(publisher, name, kind):
+    read = reader(publisher, name, of_subscriber(kind))
+    publisher.send(name, data := encode(TOPICS[name].type, same_type(name)))
+    (sample,) = taken(read)
+    assert sample.serialize(use_version_2=False)[4:] == data[4:]
+
+
+def test_a_best_effort_publisher_would_not_reach_a_reliable_subscriber(monkeypatch):
+    """So the test before can fail."""
+    from cyclonedds.core import Policy, Qos
+
+    best = Qos(Policy.Reliability.BestEffort, Policy.DataRepresentation(use_cdrv0_representation=True))
+    monkeypatch.setattr(dds, "qos_of", lambda topic: best)
+    with dds.Publisher("arm/skin", DOMAIN) as publisher:
+        reads = [reader(publisher, "zones", of_subscriber(kind)) for kind in ("best effort", "reliable")]
+        publisher.send("zones", encode(TOPICS["zones"].type, same_type("zones")))
+        assert len(taken(reads[0])) == 1
+        assert not reads[1].take(10)
 
 
 def test_who_comes_late_gets_the_skin(publisher):

@@ -1,5 +1,5 @@
 """What a port's name asks for: a serial port, a virtual board, a recording, a board on the network, one of several
-sheets."""
+sheets, a foreign sheet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from contactfpga.skin.several import MOST_SHEETS
 
 NAME, USB = "name:", "usb:"
 """What the names begin with of boards that have to be searched (:mod:`contactfpga.driver.finding`)."""
-SIM, REPLAY, NET = "sim:", "replay://", "zenoh://"
+SIM, REPLAY, NET, FLEXITAC = "sim:", "replay://", "zenoh://", "flexitac://"
 """What the other addresses begin with."""
 
 
@@ -188,6 +188,55 @@ def _wait(name: str, text: str) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
+class Flexitac:
+    """``flexitac://DEVICE?margin=15&frames=20&pitch=3&rows=16&columns=32&baud=2000000``, decoded."""
+
+    device: str
+    margin: int = 15
+    """By how much a pressed cell reads above its rest, of 255."""
+    frames: int = 20
+    """How many frames the rest is taken from, at the beginning, while nothing touches the sheet."""
+    pitch_mm: float = 3.0
+    rows: int = 16
+    columns: int = 32
+    baud: int = 2_000_000
+
+    @classmethod
+    def parse(cls, name: str) -> Flexitac:
+        """Read an address; raises :class:`AddressError` that says what is wrong."""
+        device, _, query = name.removeprefix(FLEXITAC).partition("?")
+        if not device:
+            raise AddressError(f"{name}: it names no device; {_FLEXITAC_FORM}")
+        found: dict[str, Any] = {}
+        for part in query.split("&") if query else ():
+            key, _, text = part.partition("=")
+            if key not in FLEXITAC_LIMITS or key in found:
+                raise AddressError(f"{name}: {part!r} is no option, or given twice; {_FLEXITAC_FORM}")
+            low, high = FLEXITAC_LIMITS[key]
+            value = number_in(text)
+            whole = key != "pitch"
+            if not low <= value <= high or (whole and value != int(value)):
+                kind = "a whole number" if whole else "a number"
+                raise AddressError(f"{name}: {key} is {text!r}; it must be {kind} from {low:,} to {high:,}")
+            found[key] = int(value) if whole else value
+        if "pitch" in found:
+            found["pitch_mm"] = found.pop("pitch")
+        return cls(device, **found)
+
+
+FLEXITAC_LIMITS: dict[str, tuple[float, float]] = {
+    "margin": (1, 255),
+    "frames": (1, 1000),
+    "pitch": (0.1, 100),
+    "rows": (1, 64),
+    "columns": (1, 64),
+    "baud": (9600, 12_000_000),
+}
+"""Least and most of each option."""
+_FLEXITAC_FORM = "it reads flexitac://DEVICE, with " + ", ".join(f"{key}=" for key in FLEXITAC_LIMITS) + " where wanted"
+
+
+@dataclasses.dataclass(frozen=True)
 class SheetOf:
     """``PORT#NUMBER``: one sheet of a board that serves several."""
 
@@ -207,7 +256,7 @@ class SheetOf:
         return cls(found[1], int(found[2]))
 
 
-Address = Serial | Sim | Replay | Net | SheetOf
+Address = Serial | Sim | Replay | Net | Flexitac | SheetOf
 
 
 def parse(name: str) -> Address:
@@ -220,6 +269,8 @@ def parse(name: str) -> Address:
         return Replay.parse(name)
     if name.startswith(NET):
         return Net.parse(name)
+    if name.startswith(FLEXITAC):
+        return Flexitac.parse(name)
     if (reason := _no_port(name)) is not None:
         raise AddressError(reason)
     return Serial(name)
@@ -231,7 +282,7 @@ def _no_port(name: str) -> str | None:
         return "the port has no name; leave it out to take the board that is plugged in"
     scheme, colon, _ = name.partition("://")
     if colon:
-        return f"{name}: {scheme}:// is not known; there are sim://, replay://FILE and zenoh://KEY"
+        return f"{name}: {scheme}:// is not known; there are sim://, replay://FILE, zenoh://KEY and flexitac://DEVICE"
     if not os.path.isfile(name):
         return None
     if name.endswith(".toml"):

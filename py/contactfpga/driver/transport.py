@@ -1,4 +1,5 @@
-"""Where bytes come from: a serial port, the simulated board, or a recording. All look alike to the driver."""
+"""Where bytes come from: a serial port, the simulated board, a recording, or a foreign sheet. All look alike to the
+driver."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from importlib import import_module
 from typing import Any, Protocol
 
 from contactfpga.driver import forks
-from contactfpga.driver.address import Replay, Serial, SheetOf, Sim, parse
+from contactfpga.driver.address import Flexitac, Net, Replay, Serial, SheetOf, Sim, parse
 from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
 from contactfpga.inputs.values import shown
@@ -23,10 +24,14 @@ SCHEMES = {
     "sim": "contactfpga_sim.model.board.virtual:board_at",
     "replay": "contactfpga.driver.recording:ReplayTransport",
     "zenoh": "contactfpga.robot.net.port:ZenohPort",
+    "flexitac": "contactfpga.driver.flexitac:FlexitacPort",
     "sheet": "contactfpga.driver.sheets:share",
 }
 """What opens the addresses of a scheme, loaded when it is used first: a function of the address, "module:attribute".
 It returns a :class:`Transport`; ``sim`` a :class:`SimulatedPort`."""
+
+OPENED_BY_NAME = {Replay: "replay", Net: "zenoh", Flexitac: "flexitac"}
+"""The scheme of each kind of address whose opener takes the name alone."""
 
 CHUNK = 65_536
 """Most bytes one read returns."""
@@ -209,7 +214,7 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     if isinstance(address, SheetOf):
         transport: Transport = _opener("sheet")(address, baud)
     else:
-        transport = _opener("replay" if isinstance(address, Replay) else "zenoh")(name)
+        transport = _opener(OPENED_BY_NAME[type(address)])(name)
     return transport
 
 

@@ -36,6 +36,7 @@ COMMANDS = {
     "publish": "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one.",
     "ros": "Publish contacts as ROS 2 topics, with no ROS installed.",
     "sheet": "Lay out the sheet of a Skin as files to order: board, Gerbers, drill, parts, caps.",
+    "ip": "Write the gateware as Verilog for another design, with assertions, testbench and example.",
     "settle": "Compute the times that the circuit of a sheet needs.",
     "cover": "Compute the soft cover: touches felt, impact, sensitivity and design.",
     "haptics": "Compute forces at contacts from pressure units; set their zeros and thresholds.",

@@ -4,20 +4,42 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 from contactfpga.tracking.tracks import Track
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone
 
-SETTLING_S, SMOOTH_S = 0.004, 0.015
-"""Over how long a speed is smoothed: half the spot's age, within these. A barycenter jumps when a cell opens or closes,
-and frames follow one another so fast that the jump alone would be meters per second."""
+SUDDEN = 4e6
+"""How suddenly a contact speeds up or turns: the spectral density of its acceleration, in mm^2/s^3."""
+
+FAST_MM_S = 1500.0
+"""How fast a contact may be that was seen once: one standard deviation along each axis."""
+
+SAME_S = 0.003
+"""For how long the error of a barycenter stays the same: it jumps when a cell opens or closes, and frames that follow
+one another more closely say nothing new."""
 
 COAST_S = 0.05
 """How far ahead a speed is believed."""
 
-PASSING_S = 0.5
-"""How long two contacts in one zone may take to pass each other."""
+
+class Known(NamedTuple):
+    """How well a place and a speed are known: covariance along each axis, in mm^2, mm^2/s and mm^2/s^2."""
+
+    place: float
+    both: float
+    speed: float
+
+    def later(self, seconds: float) -> Known:
+        """What is left of it after a time in which the contact may have sped up or turned."""
+        spread = SUDDEN * seconds
+        place = self.place + seconds * (2 * self.both + seconds * (self.speed + spread / 3))
+        return Known(place, self.both + seconds * (self.speed + spread / 2), self.speed + spread)
+
+
+NEW = Known(0.0, 0.0, FAST_MM_S**2)
+"""Of a contact that was seen once."""
 
 
 @dataclasses.dataclass(slots=True)
@@ -34,6 +56,8 @@ class Member:
     vx: float = 0.0
     """How fast it came, in mm/s, beside the spot's own speed."""
     vy: float = 0.0
+    known: Known = NEW
+    """How well that was known."""
 
 
 class Spot:
@@ -43,7 +67,8 @@ class Spot:
         self.members = members
         """The one that it goes by comes first."""
         self.vx = self.vy = 0.0
-        self.born_us = self.joined_us = time_us
+        self.known = NEW
+        self.joined_us = time_us
         self.small_us: int | None = None
         """Since when it is no larger than it would be without one of its contacts."""
         self.place(zone, time_us)
@@ -52,6 +77,7 @@ class Spot:
         """Put it there, as a zone that grew or shrank by a whole contact is not the place it moved to."""
         self.zone, self.seen_us, self.held = zone, time_us, False
         self.x, self.y = self.fx, self.fy = self.from_x, self.from_y = place(zone)
+        self.known = Known(error_mm2(zone), 0.0, self.known.speed)
 
     def ahead(self, time_us: int) -> tuple[float, float]:
         """Where it would be then."""
@@ -59,22 +85,25 @@ class Spot:
         return self.fx + self.vx * seconds, self.fy + self.vy * seconds
 
     def follow(self, zone: Zone, time_us: int, around_mm: float | None) -> None:
-        """Go on in this zone: a filter of second order that fades with time, however often frames come."""
+        """Go on in this zone: a Kalman filter of a contact with constant velocity."""
         x, y = place(zone)
         seconds = (time_us - self.seen_us) / 1e6
-        ahead_x, ahead_y = self.ahead(time_us)
-        off_x, off_y = across(x - ahead_x, around_mm), y - ahead_y
-        smooth_s = min(max((time_us - self.born_us) / 2e6, SETTLING_S), SMOOTH_S)
-        fade = math.exp(-seconds / smooth_s)
-        self.fx, self.fy = ahead_x + (1 - fade * fade) * off_x, ahead_y + (1 - fade * fade) * off_y
         if seconds > 0:
-            gain = (1 - fade) * (1 - fade) / seconds
-            self.vx += gain * off_x
-            self.vy += gain * off_y
+            self.fx, self.fy = self.ahead(time_us)
+            off_x, off_y = across(x - self.fx, around_mm), y - self.fy
+            self.correct(off_x, off_y, self.known.later(seconds), error_mm2(zone) * max(1.0, SAME_S / seconds))
         self.zone, self.seen_us, self.held = zone, time_us, False
         self.x, self.y = x, y
         if len(self.members) == 1:
             self.members[0].area_mm2 = zone.area_mm2
+
+    def correct(self, off_x: float, off_y: float, known: Known, error: float) -> None:
+        """Take a zone that is so far from where this would be, as well as that was known."""
+        at, both, speed = known
+        gain, turn = at / (at + error), both / (at + error)
+        self.fx, self.fy = self.fx + gain * off_x, self.fy + gain * off_y
+        self.vx, self.vy = self.vx + turn * off_x, self.vy + turn * off_y
+        self.known = Known(at - gain * at, both - gain * both, speed - turn * both)
 
     def center(self) -> None:
         """Shift its contacts so that their barycenter is the zone's."""
@@ -119,6 +148,11 @@ def place(zone: Zone) -> tuple[float, float]:
     assert zone.x_mm is not None
     assert zone.y_mm is not None
     return zone.x_mm, zone.y_mm
+
+
+def error_mm2(zone: Zone) -> float:
+    """Variance of its barycenter along each axis: that of a cell, as it says no more than which cells are closed."""
+    return zone.area_mm2 / (12 * zone.area_cells)
 
 
 def radius_mm(area_mm2: float) -> float:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import PASSING_S, Member, Spot, place, radius_mm
+from contactfpga.tracking.spot import SAME_S, Member, Spot, error_mm2, place, radius_mm
 from contactfpga.tracking.tracks import Event, Kind, Tracks
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
@@ -121,8 +122,8 @@ class Tracker:
         spots = self._spots
         if not spots or not seen:
             return [], list(spots), list(seen)
-        costs = [[self._cost(spot, ahead, zone) for zone in seen] for spot, ahead in self._ahead()]
-        chosen = assign(costs, self._gate_mm * (1 + 1e-9))  # a pair at the gate is one
+        costs = [self._costs(spot, seen) for spot in spots]
+        chosen = assign(costs, SIGMAS**2 * (1 + 1e-9))  # a pair at the gate is one
         pairs = [(spot, seen[column]) for spot, column in zip(spots, chosen) if column is not None]
         lost = [spot for spot, column in zip(spots, chosen) if column is None]
         if len(pairs) == len(seen):
@@ -130,15 +131,20 @@ class Tracker:
         taken = set(chosen)
         return pairs, lost, [zone for column, zone in enumerate(seen) if column not in taken]
 
-    def _ahead(self) -> list[tuple[Spot, tuple[float, float]]]:
-        return [(spot, spot.ahead(self._time_us)) for spot in self._spots]
-
-    def _cost(self, spot: Spot, ahead: tuple[float, float], zone: Zone) -> float:
-        """Distance to where it would be; also one that stopped at once is within the gate."""
-        off = self._distance(ahead[0], ahead[1], zone)
-        if off <= self._gate_mm:
-            return off
-        return self._gate_mm if self._distance(spot.x, spot.y, zone) <= self._gate_mm else math.inf
+    def _costs(self, spot: Spot, seen: list[Zone]) -> list[float]:
+        """Squared Mahalanobis distances from where it would be. One that stopped at once is within the gate, too."""
+        ahead_x, ahead_y = spot.ahead(self._time_us)
+        seconds = (self._time_us - spot.seen_us) / 1e6
+        spread = max((self._gate_mm / SIGMAS) ** 2, spot.known.later(seconds).place)
+        found = []
+        for zone in seen:
+            off = self._distance(ahead_x, ahead_y, zone)
+            if off <= self._gate_mm:
+                found.append(off * off / spread)
+            else:
+                stopped = self._distance(spot.x, spot.y, zone) <= self._gate_mm
+                found.append(SIGMAS**2 if stopped else math.inf)
+        return found
 
     def _distance(self, x: float, y: float, zone: Zone) -> float:
         zone_x, zone_y = place(zone)
@@ -215,8 +221,26 @@ class Tracker:
         self._events.append(Event(kind, name, self._time_us, parents, zone, seen))
 
 
-FASTER = (1.0, 1.5, 2.0)
-"""How many times as fast as measured two may pass each other: a smoothed speed comes after the contact's."""
+SIGMAS = 3.0
+"""How many standard deviations the gate is away from a contact of which least is known."""
+
+GOING_S = 1.0
+"""For how long two that share a zone go on as they came, on average."""
+
+FIRST_S = 0.01
+
+LARGER = 1.0
+"""Standard deviation of the logarithm of how many times as large a contact is after it shared a zone."""
+
+
+class Way(NamedTuple):
+    """How a contact may have come to a zone."""
+
+    off_mm: float
+    """From where it would be."""
+    odd: float
+    """-2 times the logarithm of its density there, in 1/mm^2."""
+
 
 Apart = Callable[[Spot, Zone], float]
 """From where a spot would be to a zone, in mm."""
@@ -240,7 +264,7 @@ def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_
         best, least = None, math.inf
         for other, zone in pairs:
             distance = apart(spot, zone)
-            grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2
+            grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2 or distance <= touch_mm(spot.zone, zone)
             if grown and distance < least and distance <= gate_mm + REACH * radius_mm(zone.area_mm2):
                 best, least = other, distance
         if best is not None:
@@ -296,6 +320,11 @@ def parted(
     return found
 
 
+def touch_mm(one: Zone, other: Zone) -> float:
+    """How close two round contacts come before they have one zone."""
+    return radius_mm(one.area_mm2) + radius_mm(other.area_mm2)
+
+
 def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: float | None) -> None:
     """Put the contacts of all these into this zone, each where it would be."""
     x, y = place(zone)
@@ -304,6 +333,7 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
         for member in one.members:
             member.dx, member.dy = across(ahead_x + member.dx - x, around_mm), ahead_y + member.dy - y
             member.vx, member.vy = member.vx + one.vx, member.vy + one.vy
+            member.known = one.known
     spot.members += [member for other in others for member in other.members]
     spot.members.sort(key=_rank)
     total = spot.area_mm2
@@ -319,51 +349,55 @@ def _rank(member: Member) -> tuple[float, int]:
     return -member.area_mm2, member.id
 
 
-def _ways(spot: Spot, time_us: int) -> tuple[float, ...]:
-    """For how many seconds at their measured speeds its contacts may have gone on against each other: for none, when
-    they came together and went back, or since they came together, when they pass."""
-    passed_s = (time_us - spot.joined_us) / 1e6
-    if len(spot.members) == 1 or not 0 < passed_s <= PASSING_S:
-        return (0.0,)
-    return 0.0, *(passed_s * faster for faster in FASTER)
-
-
-def _off(spot: Spot, member: Member, zone: Zone, seconds: float, time_us: int, around_mm: float | None) -> float:
-    """From where a contact of a spot would be, having gone on for so long, to a zone, in mm."""
+def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[Way, Way]:
+    """How a contact of a spot may have come to a zone: it went on as it came, less surely the longer ago that is; or it
+    stopped, or went back to where it came in."""
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
-    dx, dy = member.dx + member.vx * seconds, member.dy + member.vy * seconds
-    return math.hypot(across(x - ahead_x - dx, around_mm), y - ahead_y - dy)
+    off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy
+    seconds, error = (time_us - spot.joined_us) / 1e6, error_mm2(zone)
+    went = math.hypot(off_x - member.vx * seconds, off_y - member.vy * seconds)
+    far = error + member.known.place + seconds * (2 * member.known.both + seconds * member.known.speed)
+    back = math.hypot(off_x, off_y)
+    near = error + (REACH * radius_mm(member.area_mm2)) ** 2
+    stopped = -math.expm1(-(seconds + FIRST_S) / GOING_S)
+    return (
+        Way(went, went * went / far + 2 * math.log(far) + 2 * seconds / GOING_S),
+        Way(back, back * back / near + 2 * math.log(near) - 2 * math.log(stopped)),
+    )
+
+
+def _larger(member: Member, zone: Zone) -> float:
+    """How odd the area of a zone is for a contact of a spot, likewise."""
+    return (math.log(zone.area_mm2 / member.area_mm2) / LARGER) ** 2
 
 
 def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float) -> bool:
-    """Whether one of several contacts of a spot would be where a zone is new."""
+    """Whether one of several contacts of a spot may be where a zone is new."""
     return len(spot.members) > 1 and any(
-        _off(spot, one, zone, seconds, time_us, around_mm) <= REACH * gate_mm
-        for seconds in _ways(spot, time_us)
-        for one in spot.members
+        way.off_mm <= REACH * gate_mm for one in spot.members for way in _ways(spot, one, zone, time_us, around_mm)
     )
 
 
 def shared_out(
     spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
 ) -> list[tuple[Zone, list[Member]]]:
-    """The zones a spot came apart into, each with its contacts: one each where they would be, the largest with most
-    right to it, the rest where they are nearest; none for a zone that begins a contact."""
-    far = 1 + spot.area_mm2 * REACH * gate_mm  # more than any pairing costs: whoever can have a zone has one
-    ways = []
-    for seconds in _ways(spot, time_us):
-        off = [[_off(spot, one, zone, seconds, time_us, around_mm) for zone in zones] for one in spot.members]
-        costs = [
-            [one.area_mm2 * distance if distance <= REACH * gate_mm else math.inf for distance in line]
-            for one, line in zip(spot.members, off)
+    """The zones a spot came apart into, each with its contacts: one each by place and area, the rest where their places
+    are most likely; none for a zone that begins a contact."""
+    ways = [[_ways(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
+    off = [[min(way.off_mm for way in both) for both in line] for line in ways]
+    odd = [[min(way.odd for way in both) for both in line] for line in ways]
+    # Each zone has one of them. What that costs a contact is how much less likely it is there than where it would go.
+    costs = [
+        [
+            odd[n][m] - min(odd[n]) + _larger(one, zone) if off[n][m] <= REACH * gate_mm else math.inf
+            for m, zone in enumerate(zones)
         ]
-        chosen = assign(costs, far)
-        total = math.fsum(far if column is None else line[column] for line, column in zip(costs, chosen))
-        ways.append((total, off, chosen))
-    _, off, chosen = min(ways, key=lambda way: way[0])
+        for n, one in enumerate(spot.members)
+    ]
+    chosen = assign(costs, 1e6)
     found: list[list[Member]] = [[] for _ in zones]
-    for member, line, column in zip(spot.members, off, chosen):
+    for member, line, column in zip(spot.members, odd, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
     for members in found:
         members.sort(key=_rank)
@@ -377,8 +411,15 @@ def piece(spot: Spot, zone: Zone, members: list[Member], time_us: int, around_mm
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     made = Spot(zone, time_us, members)
-    made.born_us = spot.born_us
-    made.vx, made.vy = spot.vx + members[0].vx, spot.vy + members[0].vy
+    made.vx, made.vy = spot.vx, spot.vy
+    first, seconds = members[0], (time_us - spot.joined_us) / 1e6
+    went, stays = _ways(spot, first, zone, time_us, around_mm)
+    if len(spot.members) > 1 and went.odd <= stays.odd:
+        made.vx, made.vy = spot.vx + first.vx, spot.vy + first.vy
+        off_x = across(x - ahead_x - first.dx - first.vx * seconds, around_mm)
+        off_y = y - ahead_y - first.dy - first.vy * seconds
+        made.fx, made.fy = x - off_x, y - off_y
+        made.correct(off_x, off_y, first.known.later(seconds), error_mm2(zone) * max(1.0, SAME_S / max(seconds, 1e-6)))
     for one in members:
         one.dx, one.dy = across(ahead_x + one.dx - x, around_mm), ahead_y + one.dy - y
     if len(members) == 1:

@@ -193,6 +193,16 @@ _ALL = (
         pictures="tables:draw",
     ),
     Study(
+        "mujoco",
+        title="A sheet beside a momentum observer",
+        page="mujoco.md",
+        minutes=6,
+        sections={
+            "observer": Section("collisions:observer_table"),
+        },
+        extra="mujoco",
+    ),
+    Study(
         "mutants",
         title="Mutants of the netlist that the comparison with the golden model tells",
         page="mutants.md",
@@ -344,12 +354,13 @@ _ALL = (
         "tracking",
         title="Contacts followed over scenes and recordings",
         page="tracking.md",
-        minutes=5,
+        minutes=25,
         sections={
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table", sample="tables:scores_sample"),
+            "scores": Section("tables:scores_table"),
+            "ahead": Section("tables:ahead_table"),
             "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
         },
         pictures="tables:draw",

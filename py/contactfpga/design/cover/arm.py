@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
+from contactfpga.design.cover.answer import CoverError, finite, not_negative, numbers, positive
 from contactfpga.design.cover.numerics import Floats, gauss
 
 GRAVITY = 9.81
@@ -93,12 +93,13 @@ class Arm:
 
     def push_n(self, indentation_m: float) -> float:
         """What motor and gravity press with at the contact, in N."""
+        finite("indentation_m", indentation_m)
         angle = self.angle_rad + indentation_m / self.lever_m
         return (self.torque_nm - self.weight_nm * math.sin(angle)) / self.lever_m
 
     def work_j(self, indentation_m: Floats | float) -> Floats:
         """What motor and gravity have done since the touch, in J."""
-        half = np.asarray(indentation_m, float) / (2 * self.lever_m)
+        half = numbers("indentation_m", indentation_m, "m") / (2 * self.lever_m)
         lifted = 2 * self.weight_nm * np.sin(self.angle_rad + half) * np.sin(half)
         return np.asarray(2 * self.torque_nm * half - lifted)
 
@@ -219,12 +220,17 @@ def course(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, count: 
 
     Nothing is lost in this model, so that the way out mirrors the way in.
     """
+    not_negative("speed_m_s", speed_m_s, "m/s")
+    positive("stiffness", stiffness, "N/m^1.5")
+    positive("depth_m", depth_m, "m")
     phi = np.linspace(0, math.pi / 2, count + 1)
 
     def pace(at: Floats) -> Floats:
         return slowness(arm, speed_m_s, stiffness, depth_m, at)
 
     parts = [gauss(pace, low, high) for low, high in itertools.pairwise(phi.tolist())]
+    if not all(map(math.isfinite, parts)):
+        raise CoverError(f"depth_m is {depth_m:g}; the arm does not come so far")
     time = np.concatenate([[0.0], np.cumsum(parts)])
     depth = depth_m * np.sin(phi) ** 2
     speed = np.sqrt(np.maximum(0, speed2(arm, speed_m_s, stiffness, depth)))

@@ -16,6 +16,7 @@ from contactfpga.design.cover import arm, elastic, impact, sense
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
+from contactfpga.design.cover.region import Pressing, RegionLimits, limits_of
 from contactfpga.design.cover.sense import PaddedSheet, Sense
 from contactfpga.design.cover.task import Foam, Task
 from contactfpga.skin.latency import latency_s
@@ -41,7 +42,8 @@ class Check:
     @property
     def used(self) -> float:
         """How much of the limit is used up: above 1 it is broken."""
-        return self.value / self.limit if self.at_most else self.limit / self.value
+        value, limit = (self.value, self.limit) if self.at_most else (self.limit, self.value)
+        return value / limit if limit else math.inf
 
     @property
     def holds(self) -> bool:
@@ -65,6 +67,8 @@ class FoamDesign:
     pitch_m: float | None = None
     sure: Sense | None = None
     """Force in N that is felt everywhere at that pitch."""
+    regions: tuple[RegionLimits, ...] = ()
+    """Speed and reaction time for each of the task's body regions."""
     checks: tuple[Check, ...] = ()
     no_solution: str | None = None
     notes: tuple[str, ...] = ()
@@ -187,11 +191,26 @@ def _judge(task: Task, foam: Foam, hit: Impact | None) -> FoamDesign:
     mass = None if foam.density_kg_m3 is None else foam.density_kg_m3 * thickness
     if mass is not None and task.mass_kg_m2 is not None:
         checks.append(Check("mass", mass, task.mass_kg_m2, True, f"mass_kg_m2 at least {mass:.4g} kg/m2"))
+    regions = tuple(_regions(task, ball, strain * thickness))
+    checks += [_region_check(task, one) for one in regions]
     notes = ("no plate is as thick as that",) if task.plates_m and thickness not in task.plates_m else ()
     sheet = PaddedSheet(task.switch, thickness, ball if task.contact == "patch" else None)
-    return _sensed(
-        task, FoamDesign(foam, found, by_energy, thickness, mass, checks=tuple(checks), notes=notes), sheet, ball
-    )
+    sofar = FoamDesign(foam, found, by_energy, thickness, mass, regions=regions, checks=tuple(checks), notes=notes)
+    return _sensed(task, sofar, sheet, ball)
+
+
+def _regions(task: Task, ball: Ball, deepest_m: float) -> list[RegionLimits]:
+    """Gravity counts at the angle of the touch; what pulls the arm back is left out until it reacts."""
+    brake = task.brake_nm / task.arm.lever_m
+    pressing = Pressing(task.arm.mass_kg, max(0.0, task.arm.push_n(0.0)), brake, ball, deepest_m)
+    return [limits_of(pressing, region, task.speed_m_s, task.latency_s) for region in task.regions]
+
+
+def _region_check(task: Task, one: RegionLimits) -> Check:
+    relax = f"speed_m_s at most {one.speed_m_s:.4g} m/s by its {one.binding} limits"
+    if 0 < one.reaction_s < task.latency_s:
+        relax += f", or latency_s at most {one.reaction_s:.4g} s for those where it is clamped"
+    return Check(one.region.name, task.speed_m_s, one.speed_m_s, True, f"{one.region.name}: {relax}")
 
 
 def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> FoamDesign:

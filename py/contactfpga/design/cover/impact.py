@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
+from contactfpga.design.cover.answer import SMALLEST, CoverError, NoSolution, not_negative, positive
 from contactfpga.design.cover.arm import Arm, compress, slowness, speed2
 from contactfpga.design.cover.numerics import integral, root
 
@@ -59,8 +59,7 @@ def strike(
     There is no solution where the foam, ``thickness_m`` thick, is pressed flat, where it yields (``yield_m``: the
     indentation at which it does), where nothing presses, and where the arm would turn further than its own lever.
     """
-    not_negative("speed_m_s", speed_m_s, "m/s")
-    positive("stiffness", stiffness, "N/m^1.5")
+    _checked(speed_m_s, stiffness)
     if method not in METHODS:
         raise CoverError(f"method is {method!r}; it must be one of {', '.join(METHODS)}")
     if method == "auto":
@@ -94,7 +93,8 @@ def stiffness_for(
     more than the lever or by ``thickness_m``.
     """
     positive("speed_m_s", speed_m_s, "m/s")
-    positive("seconds", seconds, "s")
+    if positive("seconds", seconds, "s") < SMALLEST:
+        raise CoverError(f"seconds is {seconds:g}; it must be at least {SMALLEST:g} s")
     if arm.free:
         depth = seconds * speed_m_s / COMPRESSION_TIME
         stiff = 1.25 * arm.mass_kg * speed_m_s**2 / depth**2.5
@@ -122,6 +122,7 @@ def compression_m(arm: Arm, speed_m_s: float, stiffness: float) -> float:
     Without gravity the balance is concave and has one root. With it, each step goes to the root of a concave curve
     that lies below the balance, so that none is jumped over.
     """
+    _checked(speed_m_s, stiffness)
     if arm.free:
         return float((1.25 * arm.mass_kg * speed_m_s**2 / stiffness) ** 0.4)
     depth, curve, spring = 0.0, arm.weight_nm / (2 * arm.lever_m**2), 0.4 * stiffness
@@ -154,12 +155,21 @@ def compression_m(arm: Arm, speed_m_s: float, stiffness: float) -> float:
     return depth
 
 
+def _checked(speed_m_s: float, stiffness: float) -> None:
+    positive("stiffness", stiffness, "N/m^1.5")
+    if 0 < not_negative("speed_m_s", speed_m_s, "m/s") < SMALLEST:
+        raise CoverError(f"speed_m_s is {speed_m_s:g}; it must be 0, or at least {SMALLEST:g} m/s")
+
+
 def time_s(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float) -> float | None:
     """t_c in s, (4), to about 1e-13 of it: with delta = delta_c sin^2(phi) both ends are smooth. None: not finite.
 
     In the upper half v^2 is taken as its difference from that at delta_c, 0, with cos^2(phi) divided out by hand, so
     that nothing cancels and an error of delta_c is passed on once, not as its square root.
     """
+    not_negative("speed_m_s", speed_m_s, "m/s")
+    not_negative("stiffness", stiffness, "N/m^1.5")
+    positive("depth_m", depth_m, "m")
     return integral(lambda phi: slowness(arm, speed_m_s, stiffness, depth_m, phi), 0.0, math.pi / 2)
 
 

@@ -18,6 +18,7 @@ from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.elastic import THICKNESS_RULES
 from contactfpga.design.cover.medium import MEDIA
 from contactfpga.design.cover.point import Switch
+from contactfpga.design.cover.region import Region, load_regions
 from contactfpga.design.cover.sense import CONTACTS, TOLERANCE, Model
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown, suggestion
@@ -150,6 +151,7 @@ _KEYS: dict[str, dict[str, Any]] = {
         "pitch_min_m": None,
         "peak_n": None,
         "mass_kg_m2": None,
+        "regions": None,
     },
     "cover": {"foams": None, "free": True, "plates_m": None, "rule": "hertz", "strain": None},
     "sensitivity": {"model": None, "contact": "point", "tolerance": TOLERANCE},
@@ -185,6 +187,8 @@ class Task:
     """The impact's peak force at most, in N."""
     mass_kg_m2: float | None = None
     """The cover's mass per area at most, in kg/m2; a foam of unknown density is not held to it."""
+    regions: tuple[Region, ...] = ()
+    """Of the body, whose limits of force and pressure have to be kept."""
     foams: tuple[Foam, ...] = FOAMS
     free: bool = True
     """Whether the modulus that gives exactly ``time_s`` is a candidate, too."""
@@ -245,6 +249,8 @@ class Task:
             part[name] for name in ("arm", "impact", "limits", "cover", "sensitivity")
         )
         model, skin = sensitivity["model"], part["reaction"]["skin"]
+        if (table := limits.pop("regions")) is not None:
+            limits["regions"] = load_regions(Path(path).parent / table)
         return cls(
             arm=Arm.link(**arm),
             mass_kg=arm["mass_kg"],
@@ -292,7 +298,7 @@ def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 def _fits(path: str | Path, name: str, key: str, value: Any, default: Any) -> None:
     lists: dict[str, tuple[type, ...]] = {"foams": (str,), "plates_m": (int, float)}
-    words = ("skin", "model", "rule", "contact")
+    words = ("skin", "model", "rule", "contact", "regions")
     if value is None:
         return
     if key in lists:

@@ -13,6 +13,7 @@ import numpy as np
 
 from contactfpga import surfaces
 from contactfpga.choices.choice import trusting
+from contactfpga.design.cover import load_cover
 from contactfpga.driver.address import SheetOf, Sim
 from contactfpga.driver.events import longest_pause_s
 from contactfpga.driver.mcap import MAX_NAME
@@ -21,6 +22,7 @@ from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.robot.body.folds import Folds
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.state import BodyError
+from contactfpga.robot.haptics.pressed import Pressed
 from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.surfaces import Cone, CylinderSurface, Mesh, MirroredSurface, PlaneSurface, Surface
@@ -58,6 +60,8 @@ class Plan:
     """From which on the link is silent."""
     folds: Folds | None = None
     """What the folding cover presses."""
+    pressed: Pressed | None = None
+    """Places under the Skin's cover; None where that knows no force."""
     trust: bool = False
     """The Skin files of its port may name modules, as those of :meth:`contactfpga.robot.body.Body.load` could."""
 
@@ -137,8 +141,16 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
         folds=folds,
+        pressed=_pressed(skin, skin_path),
         trust=trusting(),
     )
+
+
+def _pressed(skin: Skin, path: Path) -> Pressed | None:
+    cover = load_cover(path)
+    if cover is None or cover.model == "patch":
+        return None
+    return Pressed(cover, 1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
 
 
 def _port(values: dict[str, Any], skin_path: Path) -> str | None:

@@ -20,6 +20,7 @@ from contactfpga.robot.body.joints import Joints
 from contactfpga.robot.body.kinematics import Kinematics, Pose
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.state import BodyError, LinkState, NoJoints, NoLinkData
+from contactfpga.robot.haptics.pressed import Pressed
 from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.batch import Batch
@@ -67,8 +68,9 @@ class LinkContact:
 
     @property
     def interval_n(self) -> tuple[float, float | None] | None:
-        """Least and largest push that the same readings allow; the second is None where there is no largest one. None
-        as ``force_n``. With three contacts or more it raises :class:`~contactfpga.MissingExtra` without ``haptics``."""
+        """Least and largest push, which hold the push in at least 95 of 100 cases; the second is None where there is no
+        largest one. None as ``force_n``. With three contacts or more it may raise :class:`~contactfpga.MissingExtra`
+        without ``haptics``."""
         return None if self._felt is None else self._felt.interval_n
 
     def moved(self, pose: Pose, frame: str) -> LinkContact:
@@ -142,11 +144,20 @@ def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics
         if zone.x_mm is None or zone.y_mm is None:
             return None
         touches.append(haptics.Touch(*plan.place(zone.x_mm, zone.y_mm), plan.friction, 1e-3 * plan.sigma_mm))
-    found = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
+    wrench = plan.units.wrench(zones.units.readings)
+    found = haptics.contacts(wrench, touches)
+    if plan.pressed is not None:
+        found = haptics.contacts(wrench, [_sharper(plan.pressed, *one) for one in zip(zones, found)])
     ids = {} if tracks is None else {id(track.zone): track.id for track in tracks.active}
     for one, zone in zip(found, zones):
         one.track = ids.get(id(zone))
     return found
+
+
+def _sharper(pressed: Pressed, zone: Zone, found: haptics.Contact) -> haptics.Touch:
+    """The touch, with what the zone's size and the push say of its place."""
+    sigma_m = pressed.sigma_m(zone.area_cells, found.normal_n or 0.0)
+    return found.touch if sigma_m is None else dataclasses.replace(found.touch, point_sigma_m=sigma_m)
 
 
 def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | None) -> float | None:

@@ -45,7 +45,8 @@ def two(
     wrenches: Floats, points: Floats, normals: Floats, friction: float, noise: Noise | None = None
 ) -> tuple[Floats, Floats]:
     """Forces (m, 2, 3) and intervals of the pushes (m, 2, 2) at two known points (m, 2, 3) with outward unit normals
-    (m, 2, 3). No largest push is infinite. NaN where friction allows no forces; :func:`contacts` tells more there."""
+    (m, 2, 3). No largest push is infinite. NaN where friction allows no forces; :func:`contacts` tells more there.
+    The units' noise is not in the intervals."""
     wrenches, points, normals = (np.asarray(each, float) for each in (wrenches, points, normals))
     away = points[:, 0] - points[:, 1]
     along = away / np.linalg.norm(away, axis=1)[:, None]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.robot.haptics.units import COMPONENTS, LoadCells, reduced
-from contactfpga.robot.haptics.values import HapticsError
+from contactfpga.robot.haptics.values import HapticsError, array, number, positive, within
 from contactfpga.surfaces.shapes import Floats
 
 SEEN = 1e-6
@@ -19,12 +19,16 @@ NOISE = 5.0
 """Times its noise that a combination of readings must have varied to count as loaded."""
 
 
+PER_UNIT = 10
+"""Loads for each unit from which on their readings tell the covariance of the units' noise."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Calibration:
     """What known loads say of the units."""
 
     cells: LoadCells
-    """With the matrix and the zeros found."""
+    """With the matrix and the zeros found, and the covariance of noise if there were :data:`PER_UNIT` loads a unit."""
     rank: int
     """Independent loads; 6 are all."""
     missing: tuple[str, ...]
@@ -49,7 +53,7 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     Where the loads leave directions open the matrix keeps what places and axes say there. Raises :class:`HapticsError`
     where there are too few loads.
     """
-    read, known = np.atleast_2d(np.asarray(readings, float)), np.atleast_2d(np.asarray(loads, float))
+    read, known = np.atleast_2d(array("readings", readings)), np.atleast_2d(array("loads", loads))
     count = len(cells.units)
     if read.shape != (len(known), count) or known.shape[1] != 6:
         raise HapticsError(
@@ -68,7 +72,16 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     rank, open_ones = rank_of(known, length)
     missing = tuple(" with ".join(_named(one)) for one in reduced(open_ones))
     off = _rms(after)
-    return Calibration(cells.changed(zeros, matrix), rank, missing, off, _advice(cells, rank, missing, off))
+    noise = _noise_n2(cells, deviations, known) if len(known) >= PER_UNIT * count else cells.noise_n2
+    return Calibration(cells.changed(zeros, matrix, noise), rank, missing, off, _advice(cells, rank, missing, off))
+
+
+def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
+    """(n, n): of what loads and zeros do not explain of the readings."""
+    explains = np.column_stack([loads, np.ones(len(loads))])
+    found, _, rank, _ = np.linalg.lstsq(explains, deviations, rcond=SEEN)
+    rest = (deviations - explains @ found) * np.array([unit.gain_n for unit in cells.units])
+    return np.asarray(rest.T @ rest / (len(loads) - rank))
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
@@ -123,8 +136,9 @@ class DriftWatch:
     """
 
     def __init__(self, cells: LoadCells, limit_n: float | None = None, over_s: float = 10.0):
-        if not over_s > 0:
-            raise HapticsError(f"over_s is {over_s}; it must be above 0 s")
+        positive("over_s", over_s, "s")
+        if limit_n is not None:
+            number("limit_n", limit_n, 0, unit="N")
         self._cells = cells
         gains = np.array([unit.gain_n for unit in cells.units])
         self._gains = gains
@@ -136,13 +150,14 @@ class DriftWatch:
 
     def update(self, time_s: float, readings: Sequence[float] | Floats, zones: int) -> Drift:
         """Take one reading per unit, with the number of zones pressed; returns what is known by now."""
+        within("time_s", (time_s,), "s")
         last, self._last_s = self._last_s, time_s
         if zones or last is None or time_s <= last:
             return self._drift()
         passed = time_s - last
         self._since_s += passed
         share = passed / min(self._over_s, self._since_s) if self._since_s else 1.0
-        deviations = (np.asarray(readings, float) - self._cells.zeros) * self._gains
+        deviations = (array("readings", readings) - self._cells.zeros) * self._gains
         self._mean += min(1.0, share) * (deviations - self._mean)
         return self._drift()
 

@@ -13,10 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.design.cover import medium, sense
-from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.answer import NoSolution, numbers
+from contactfpga.inputs.values import shown
 from contactfpga.robot.haptics import posterior
 from contactfpga.robot.haptics.posterior import Box, Posterior
-from contactfpga.robot.haptics.values import HapticsError
+from contactfpga.robot.haptics.values import HapticsError, number
 from contactfpga.robot.haptics.wrench import Center
 from contactfpga.skin import sheet as sheets
 from contactfpga.surfaces.shapes import Floats
@@ -61,11 +62,13 @@ class Reach:
 
     def closing_n(self, distance_m: Floats) -> Floats:
         """Force in N that closes a switch at each distance; 1e9 where none does."""
+        distance_m = numbers("distance_m", distance_m, "m")
         roots = np.interp(distance_m * distance_m, self._squares, self._roots)
         return np.where(distance_m > self._distances[-1], 1e9, roots * roots * np.sqrt(roots))
 
     def reach_m(self, force_n: float) -> float:
         """How far in m the force closes switches; 0 if it does not even close the one below it."""
+        number("force_n", force_n, unit="N")
         return math.sqrt(np.interp(max(0.0, force_n) ** 0.4, self._roots, self._squares, left=0.0))
 
 
@@ -88,6 +91,9 @@ class Closing:
     row: int
     column: int
     force_n: float
+
+    def __post_init__(self) -> None:
+        number("force_n", self.force_n, unit="N")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -198,7 +204,9 @@ class Locator:
 
     def __init__(self, sheet: sheets.Sheet, reach: Reach, spread: float = 0.0, force_sigma_n: float = 0.0):
         if not (0 <= spread < 1 and 0 <= force_sigma_n < 1e6):
-            raise HapticsError(f"spread is {spread} and force_sigma_n {force_sigma_n}; give 0 to 1, and 0 N or above")
+            raise HapticsError(
+                f"spread is {shown(spread)} and force_sigma_n {shown(force_sigma_n)}; give 0 to 1, and 0 N or above"
+            )
         self._sheet = sheet
         self._pitch_x, self._pitch_y = 1e-3 * sheet.pitch_x_mm, 1e-3 * sheet.pitch_y_mm
         self._reach = reach
@@ -265,6 +273,7 @@ class Locator:
             closings: which of them closed at which push.
             center: from :meth:`center`, if this contact is the only one.
         """
+        number("force_n", force_n, unit="N")
         if not cells:
             raise HapticsError(
                 "there is no pressed cell; a contact that closes no switch has its center of pressure alone"

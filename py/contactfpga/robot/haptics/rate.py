@@ -119,7 +119,7 @@ class Requirements:
         positive("noise", self.noise, "")
         number("mass_kg", self.mass_kg, 0, 1e3, "kg")
         number("acceleration_sigma_m_s2", self.acceleration_sigma_m_s2, 0, 1e3, "m/s2")
-        first, second = self.size_m
+        first, second = (number("size_m", one, unit="m") for one in self.size_m)
         if isinstance(self.surface, Cylinder):
             if not first < second:
                 raise HapticsError(f"the cylinder runs from {first:g} to {second:g} m; the first must be less")

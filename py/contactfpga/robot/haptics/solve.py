@@ -24,7 +24,14 @@ from contactfpga.robot.haptics.contact import (
     Solution,
     Touch,
 )
-from contactfpga.robot.haptics.system import System, along_normals, by_least_squares, distinct, within_cones
+from contactfpga.robot.haptics.system import (
+    System,
+    along_normals,
+    by_least_squares,
+    distinct,
+    intervals_of,
+    within_cones,
+)
 from contactfpga.robot.haptics.values import HapticsError, cross, dot, minus, solve_symmetric
 from contactfpga.robot.haptics.wrench import Surface, Wrench
 from contactfpga.surfaces.shapes import Floats, Vector
@@ -273,14 +280,21 @@ def _solution(
         chi2 = _chi2(wrench, touches, forces)
     freedom = (6 if noise is None else noise.rank) - rank
     covariance = _covariance(wrench, touches, forces)
-    return Solution(
-        PURE_FORCE, forces, lambda: intervals, rank, null, chi2, freedom, touches, wrench, covariance, beyond
-    )
+
+    def with_noise() -> list[Interval]:
+        return intervals if noise is None else intervals_of(_widened(wrench, touches, forces), forces, False, beyond)
+
+    return Solution(PURE_FORCE, forces, with_noise, rank, null, chi2, freedom, touches, wrench, covariance, beyond)
+
+
+def _widened(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> System:
+    system = System(wrench, touches)
+    system.places_widen(np.ravel(forces))
+    return system
 
 
 def _chi2(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> float | None:
-    system = System(wrench, touches)
-    system.places_widen(np.ravel(forces))
+    system = _widened(wrench, touches, forces)
     rest = system.wrench - system.matrix() @ np.ravel(forces)
     return system.chi2(rest)
 
@@ -289,8 +303,7 @@ def _covariance(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) 
     def found() -> Floats | None:
         if wrench.noise is None:
             return None
-        system = System(wrench, touches)
-        system.places_widen(np.ravel(forces))
+        system = _widened(wrench, touches, forces)
         matrix = system.matrix()
         return np.asarray(np.linalg.pinv(matrix.T @ system.weight @ matrix, rcond=1e-12, hermitian=True))
 

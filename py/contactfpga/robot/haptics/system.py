@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra
+from contactfpga.robot.haptics import confidence
 from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution, Touch
 from contactfpga.robot.haptics.values import HapticsError, skew
 from contactfpga.robot.haptics.wrench import ALARM, Wrench
@@ -102,10 +103,11 @@ class System:
             covariance = np.array(self.noise.covariance)
             covariance[3:, 3:] += more
             self.weight = np.asarray(np.linalg.inv(covariance), float)
+            self.root = np.asarray(np.linalg.cholesky(self.weight).T, float)
         else:
             self.noise = self.noise.widened(more)
             self.weight = self.noise.information
-        self.__dict__.pop("root", None)
+            self.root = self.noise.root
         return True
 
     def chi2(self, rest: Floats) -> float | None:
@@ -147,7 +149,16 @@ def by_least_squares(system: System) -> Solution:
         forces = _along_normals(system)
     if _suffice(system, forces):
         return _solution(system, forces, PURE_FORCE_WITH_KNOWN_DIRECTION)
-    return _solution(system, _along_edges(system), PURE_FORCE)
+    forces = _along_edges(system)
+    return _solution(system, forces, PURE_FORCE, beyond=_beyond(system, forces))
+
+
+def _beyond(system: System, forces: Sequence[Vector]) -> bool:
+    """Whether these forces, the best within friction's cones, exert the wrench worse than others at these places."""
+    matrix = system.root @ system.matrix()
+    rest = system.root @ system.wrench - matrix @ np.ravel(forces)
+    more = matrix @ np.linalg.lstsq(matrix, rest, rcond=confidence.KNOWN)[0]
+    return float(more @ more) > SMALL * float(system.wrench @ system.weight @ system.wrench)
 
 
 def within_cones(system: System) -> Solution:
@@ -156,7 +167,8 @@ def within_cones(system: System) -> Solution:
     forces = _nearest(system)
     if system.places_widen(forces):
         forces = _nearest(system)
-    return _solution(system, [vector(force) for force in forces.reshape(-1, 3)], PURE_FORCE)
+    found = [vector(force) for force in forces.reshape(-1, 3)]
+    return _solution(system, found, PURE_FORCE, beyond=_beyond(system, found))
 
 
 def _along_normals(system: System) -> list[Vector]:
@@ -228,13 +240,15 @@ def _least_squares(matrix: Floats, wanted: Floats) -> Floats:
     return np.asarray(nnls(matrix, wanted)[0])
 
 
-def _solution(system: System, forces: list[Vector], model: str, frictionless: bool = False) -> Solution:
+def _solution(
+    system: System, forces: list[Vector], model: str, frictionless: bool = False, beyond: bool = False
+) -> Solution:
     known = model == PURE_FORCE_WITH_KNOWN_DIRECTION
     matrix = system.pushes() if known else system.matrix()
     rank, null = _spaces(system, matrix)
 
     def intervals() -> list[Interval]:
-        return _intervals(system, forces, frictionless)
+        return intervals_of(system, forces, frictionless, beyond)
 
     def covariance() -> Floats | None:
         if system.noise is None:
@@ -249,7 +263,8 @@ def _solution(system: System, forces: list[Vector], model: str, frictionless: bo
 
     chi2, freedom = system.chi2(system.wrench - system.matrix() @ np.ravel(forces)), system.freedom(rank)
     null_space = null.T.tolist()
-    return Solution(model, forces, intervals, rank, null_space, chi2, freedom, system.touches, system.given, covariance)
+    given = (system.touches, system.given, covariance, beyond)
+    return Solution(model, forces, intervals, rank, null_space, chi2, freedom, *given)
 
 
 def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:
@@ -283,7 +298,52 @@ def _frame(normal: Vector) -> Floats:
     return np.stack([inward, first, np.cross(inward, first)], axis=1)
 
 
-def _intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
+def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, beyond: bool) -> list[Interval]:
+    """The least and largest push in N of each contact, which also hold the pushes of ``forces``: with noise 95 % of it
+    (:mod:`contactfpga.robot.haptics.confidence`), without it all that exert exactly the same wrench.
+
+    Args:
+        frictionless: all forces lie along the normals.
+        beyond: ``forces`` do not exert the wrench. With noise friction then bounds nothing.
+    """
+    if system.noise is None:
+        return _exact(system, forces, frictionless)
+    basis, firsts = _basis(system.touches, frictionless)
+    matrix, wanted = system.root @ system.matrix() @ basis, system.root @ system.wrench
+    pushes = [max(0.0, float(one)) for one in (basis.T @ np.ravel(forces))[firsts]]
+    size = max(pushes)
+    if beyond and not frictionless:
+        fit = confidence.of_pushes(matrix[:, firsts], wanted, np.delete(matrix, firsts, axis=1), size)
+        found = _fitted(fit) if fit else [(0.0, None)] * len(firsts)
+    else:
+        found = _fitted(confidence.Fit(matrix, wanted, firsts, _frictions(system.touches, frictionless), size))
+    return [(min(push, low), None if high is None else max(push, high)) for push, (low, high) in zip(pushes, found)]
+
+
+def _fitted(fit: confidence.Fit) -> list[Interval]:
+    """The solver of numpy's takes the more time the more contacts there are, and is for two at most."""
+    return fit.intervals() if fit.contacts <= 2 else fit.intervals(_ends_of_many)
+
+
+def _ends_of_many(fit: confidence.Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float]]:
+    nothing = np.zeros((0, fit.matrix.shape[1]))
+    solver = _Solver(fit.frictions, nothing, np.zeros(fit.matrix.shape[1]))
+    scale = max(1.0, float(np.abs(fit.square).max()))
+    best = solver.solve(fit.square / scale, -(fit.matrix.T @ fit.wanted) / scale)
+    most = math.sqrt(float(fit.misfit(best[None])[0]) + confidence.CHI2_1)
+    bounded = _Solver(fit.frictions, nothing, np.zeros(len(best)), (fit.matrix, fit.wanted, most))
+    found = {}
+    for first in firsts:
+        low, high = bounded.least(first, 1.0), bounded.least(first, -1.0)
+        found[first] = (0.0 if low is None else low, math.inf if high is None else -high)
+    return found
+
+
+def _frictions(touches: Sequence[Touch], frictionless: bool) -> list[float]:
+    return [0.0 if frictionless else touch.friction for touch in touches]
+
+
+def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
     """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
     ``forces``, which lie in them, and so in the interval. None: no largest one."""
     basis, firsts = _basis(system.touches, frictionless)
@@ -299,7 +359,7 @@ def _intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> 
         if float(np.abs(free[first]).max(initial=0.0)) <= DETERMINED:
             found.append((push, push))
             continue
-        solver = solver or _Solver(system.touches, frictionless, fixed, start / size)
+        solver = solver or _Solver(_frictions(system.touches, frictionless), fixed, start / size)
         low, high = solver.least(first, 1.0), solver.least(first, -1.0)
         least = 0.0 if low is None else min(push, max(0.0, float(start[first]) + size * low))
         found.append((least, None if high is None else max(push, float(start[first]) - size * high)))
@@ -318,7 +378,7 @@ def _nearest(system: System) -> Floats:
     size = max(1e-12, float(np.abs(system.wrench[:3]).max()))
     wanted = matrix.T @ (system.root @ system.wrench) / size
     scale = float(np.abs(square).max())
-    solver = _Solver(system.touches, False, np.zeros((0, len(square))), np.zeros(len(square)))
+    solver = _Solver(_frictions(system.touches, False), np.zeros((0, len(square))), np.zeros(len(square)))
     return np.asarray(basis @ (size * solver.solve(square / scale, -wanted / scale)))
 
 
@@ -335,9 +395,20 @@ def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[i
 
 class _Solver:
     """start + y in all cones, where fixed y = 0. So few of its numbers are not 0 that 64 contacts take no longer each
-    than three do; with the null space of ``fixed`` in place of it they take 50 times as long."""
+    than three do; with the null space of ``fixed`` in place of it they take 50 times as long.
 
-    def __init__(self, touches: Sequence[Touch], frictionless: bool, fixed: Floats, start: Floats):
+    Args:
+        frictions: of each contact; 0: a push alone.
+        near: a matrix, what it times y should be, and by how much it may be off.
+    """
+
+    def __init__(
+        self,
+        frictions: Sequence[float],
+        fixed: Floats,
+        start: Floats,
+        near: tuple[Floats, Floats, float] | None = None,
+    ):
         try:
             import clarabel
             from scipy import sparse
@@ -346,12 +417,18 @@ class _Solver:
         self._clarabel, self._sparse = clarabel, sparse
         scales: list[float] = []
         self._cones: list[Any] = [clarabel.ZeroConeT(len(fixed))] if len(fixed) else []
-        for touch in touches:
-            flat = frictionless or not touch.friction
-            scales += [1.0] if flat else [touch.friction, 1.0, 1.0]
-            self._cones.append(clarabel.NonnegativeConeT(1) if flat else clarabel.SecondOrderConeT(3))
-        self._sides = sparse.vstack([sparse.csc_matrix(fixed), -sparse.diags(scales)], format="csc")
-        self._start = np.concatenate([np.zeros(len(fixed)), np.array(scales) * start])
+        for friction in frictions:
+            scales += [friction, 1.0, 1.0] if friction else [1.0]
+            self._cones.append(clarabel.SecondOrderConeT(3) if friction else clarabel.NonnegativeConeT(1))
+        sides = [sparse.csc_matrix(fixed), -sparse.diags(scales)]
+        starts = [np.zeros(len(fixed)), np.array(scales) * start]
+        if near is not None:
+            matrix, wanted, most = near
+            sides += [sparse.csc_matrix((1, matrix.shape[1])), sparse.csc_matrix(matrix)]
+            starts += [np.array([most]), wanted]
+            self._cones.append(clarabel.SecondOrderConeT(1 + len(wanted)))
+        self._sides = sparse.vstack(sides, format="csc")
+        self._start = np.concatenate(starts)
 
     def least(self, at: int, factor: float) -> float | None:
         """The least of ``factor`` times this one of y; None where there is none."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,17 @@ import numpy as np
 
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown, suggestion
-from contactfpga.robot.haptics.values import HapticsError, direction, matrix, number, positive, skew, vector
+from contactfpga.robot.haptics.values import (
+    HapticsError,
+    array,
+    direction,
+    matrix,
+    number,
+    positive,
+    skew,
+    vector,
+    within,
+)
 from contactfpga.robot.haptics.wrench import SURFACES, Bumper, Motion, Noise, Surface, Wrench, read_surface
 from contactfpga.surfaces.shapes import Floats, Vector
 
@@ -37,6 +46,15 @@ class Unit:
     preload_n: float | None = None
     """What a spring presses it with while nothing touches. None: not known, and whether it lifts is not told."""
 
+    def __post_init__(self) -> None:
+        within("point_m", self.point_m, "m")
+        within("axis", self.axis, "")
+        within("zero", (self.zero,), "")
+        positive("gain_n without its sign", abs(self.gain_n), "N")
+        positive("sigma_n", self.sigma_n, "N")
+        if self.preload_n is not None:
+            number("preload_n", self.preload_n, 0, unit="N")
+
 
 COMPONENTS = ("force along x", "force along y", "force along z", "moment about x", "moment about y", "moment about z")
 
@@ -54,8 +72,9 @@ class LoadCells:
         matrix: Floats | None = None,
         surface: Surface | None = None,
         sheet_m: tuple[float, float] = (0.0, 0.0),
+        noise_n2: Floats | None = None,
     ):
-        """Raises :class:`HapticsError` where there is no unit.
+        """Raises :class:`HapticsError` where there is no unit, or ``noise_n2`` is no covariance.
 
         Args:
             frame: name of the link's frame.
@@ -64,6 +83,8 @@ class LoadCells:
             matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
             surface: the bumper's outside.
             sheet_m: where column 0 and row 0 of the sheet lie on the surface laid flat.
+            noise_n2: (n, n) covariance of the units' noise in N2, for units that share a supply or a reference; None:
+                independent, by each unit's ``sigma_n``, which it replaces.
         """
         if not units:
             raise HapticsError("there is no unit; give at least one")
@@ -79,18 +100,29 @@ class LoadCells:
         self.geometry: Floats = np.concatenate([axes.T, np.cross(places, axes).T])
         """(6, n): what each unit exerts on the bumper per newton; about the link's origin."""
         self._gains = np.array([unit.gain_n for unit in self.units])
+        self.noise_n2 = None if noise_n2 is None else covariance("noise_n2", noise_n2, len(self.units))
+        if self.noise_n2 is not None:
+            sigmas = np.sqrt(np.diag(self.noise_n2)).tolist()
+            self.units = tuple(dataclasses.replace(unit, sigma_n=sigma) for unit, sigma in zip(self.units, sigmas))
         # Units act on the bumper and contacts oppose them: this is the one place of that sign.
         self.matrix: Floats = -self.geometry * self._gains if matrix is None else np.asarray(matrix, float)
         """(6, n): what contacts exert on the link per step of each reading."""
         self.zeros: Floats = np.array([unit.zero for unit in self.units])
-        spread = self.matrix * (np.array([unit.sigma_n for unit in self.units]) / np.abs(self._gains))
-        self.noise = Noise(spread @ spread.T)
+        self.noise = Noise(self._spread())
         self._weight = None if bumper is None else bumper.wrench(Motion(zero_gravity_m_s2))
         ranges = [unit.range or (-np.inf, np.inf) for unit in self.units]
         self._low, self._high = (np.array(ends) for ends in zip(*ranges))
         self._ends = any(unit.range for unit in self.units)
         self._springs = any(unit.preload_n is not None for unit in self.units)
         self._preload = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in self.units])
+
+    def _spread(self) -> Floats:
+        """(6, 6): the units' noise as a covariance of the wrench."""
+        per_newton = self.matrix / self._gains
+        if self.noise_n2 is not None:
+            return np.asarray(per_newton @ self.noise_n2 @ per_newton.T)
+        scaled = per_newton * np.array([unit.sigma_n for unit in self.units])
+        return np.asarray(scaled @ scaled.T)
 
     @classmethod
     def load(cls, path: str | Path) -> LoadCells:
@@ -100,7 +132,7 @@ class LoadCells:
     def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
         """What the contacts exert on the link, from one reading per unit. With ``motion`` the bumper's weight and
         inertia are taken out; without, it has to be at rest as when its zeros were read."""
-        read = np.array(readings, float)
+        read = array("readings", readings)
         if read.shape != self.zeros.shape:
             raise HapticsError(
                 f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
@@ -110,8 +142,6 @@ class LoadCells:
         if motion is not None and self.bumper is not None and self._weight is not None:
             values = values + (self.bumper.wrench(motion) - self._weight)
         fx, fy, fz, mx, my, mz = values.tolist()
-        if not math.isfinite(fx + fy + fz + mx + my + mz):
-            raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
         saturated, lifted = self._saturated(read), self._lifted(deviations)
         return Wrench((fx, fy, fz), (mx, my, mz), self.noise, self.frame, saturated, lifted)
 
@@ -130,13 +160,11 @@ class LoadCells:
         return np.asarray((np.atleast_2d(self._read(readings)) - self.zeros) @ self.matrix.T)
 
     def _read(self, readings: Sequence[float] | Floats) -> Floats:
-        read = np.asarray(readings, float)
+        read = array("readings", readings)
         if read.ndim == 0 or read.shape[-1] != len(self.units):
             raise HapticsError(
                 f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
             )
-        if not np.isfinite(read).all():
-            raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
         return read
 
     @functools.cached_property
@@ -214,10 +242,14 @@ class LoadCells:
                 raise HapticsError(
                     f"unit {index} varies by {varies[index]:.3g} N, its noise is {unit.sigma_n:g} N; something moves"
                 )
-        return self.changed(read.mean(axis=0), self.matrix if self.calibrated else None, gravity_m_s2)
+        matrix = self.matrix if self.calibrated else None
+        return self.changed(read.mean(axis=0), matrix, self.noise_n2, gravity_m_s2)
 
-    def changed(self, zeros: Floats, matrix: Floats | None, gravity_m_s2: Vector | None = None) -> LoadCells:
-        """Units with these zeros (n,) in steps and this matrix, (6, n) in N and Nm per step; None: not calibrated."""
+    def changed(
+        self, zeros: Floats, matrix: Floats | None, noise_n2: Floats | None, gravity_m_s2: Vector | None = None
+    ) -> LoadCells:
+        """Units with these zeros (n,) in steps, this matrix, (6, n) in N and Nm per step, or None: not calibrated, and
+        this covariance of noise, (n, n) in N2, or None: independent."""
         return LoadCells(
             [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, zeros)],
             frame=self.frame,
@@ -226,7 +258,18 @@ class LoadCells:
             matrix=matrix,
             surface=self.surface,
             sheet_m=self.sheet_m,
+            noise_n2=noise_n2,
         )
+
+
+def covariance(name: str, values: Any, count: int) -> Floats:
+    """(count, count): what is given, if it is a covariance with no variance of 0. Raises :class:`HapticsError`."""
+    given = matrix(name, values, count, count)
+    if not (np.diag(given) > 0).all():
+        raise HapticsError(f"{name} has a variance of {np.diag(given).min():g}; each unit has some noise, above 0 N2")
+    found = Noise.checked(given)
+    assert found is not None
+    return found.covariance
 
 
 def reduced(rows: Floats) -> Floats:
@@ -253,7 +296,7 @@ def _in_words(wrench: Floats) -> str:
 
 
 MAX_UNITS = 64
-KEYS = ("frame", "zero_gravity_m_s2", "matrix", "surface", "bumper", "unit")
+KEYS = ("frame", "zero_gravity_m_s2", "matrix", "noise_n2", "surface", "bumper", "unit")
 UNIT_KEYS = ("point_m", "axis", "gain_n", "zero", "sigma_n", "range", "preload_n")
 BUMPER_KEYS = ("mass_kg", "center_m", "inertia_kg_m2")
 
@@ -282,7 +325,9 @@ def read(values: dict[str, Any]) -> dict[str, Any]:
     gravity = vector("zero_gravity_m_s2", values.get("zero_gravity_m_s2", (0, 0, 0)), "m/s2")
     found = matrix("matrix", values["matrix"], 6, len(units)) if "matrix" in values else None
     bumper = _bumper(values["bumper"]) if "bumper" in values else None
+    noise = covariance("noise_n2", values["noise_n2"], len(units)) if "noise_n2" in values else None
     made = {"units": units, "frame": frame, "bumper": bumper, "zero_gravity_m_s2": gravity, "matrix": found}
+    made["noise_n2"] = noise
     return made | (_surface(values["surface"]) if "surface" in values else {})
 
 
@@ -352,6 +397,8 @@ def write(cells: LoadCells) -> str:
         lines.append(f"zero_gravity_m_s2 = {json.dumps(list(cells.zero_gravity_m_s2))}")
     if cells.calibrated:
         lines.append(f"matrix = {json.dumps(np.asarray(cells.matrix).tolist())}")
+    if cells.noise_n2 is not None:
+        lines.append(f"noise_n2 = {json.dumps(cells.noise_n2.tolist())}")
     if cells.surface:
         lines += ["", "[surface]", *_written(cells.surface), f"sheet_m = {json.dumps(list(cells.sheet_m))}"]
     if cells.bumper:

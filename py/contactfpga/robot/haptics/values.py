@@ -17,6 +17,10 @@ LARGEST = 1e9
 """Of what a file says in SI units; powers of it are still numbers."""
 
 
+SMALLEST = 1e-9
+"""Of what has to be above 0: divided by, it is still a number."""
+
+
 class HapticsError(ContactFPGAError, ValueError):
     """A value that no bumper, unit or contact can have; the message names it and the limit."""
 
@@ -32,7 +36,29 @@ def positive(name: str, value: Any, unit: str) -> float:
     """``value`` if it is a number above 0; raises :class:`HapticsError`."""
     if not is_finite(value) or not 0 < value <= LARGEST:
         raise HapticsError(f"{name} is {shown(value)}; it must be a number above 0 and at most {LARGEST:g} {unit}")
+    if value < SMALLEST:
+        raise HapticsError(f"{name} is {shown(value)}; it must be at least {SMALLEST:g} {unit}")
     return float(value)
+
+
+def within(name: str, values: Sequence[float], unit: str) -> None:
+    """Raises :class:`HapticsError` unless all of these are numbers with which one can compute."""
+    for value in values:
+        if not -LARGEST <= value <= LARGEST:
+            raise HapticsError(
+                f"{name} has a value of {shown(value)}; each must be a number from {-LARGEST:g} to {LARGEST:g} {unit}"
+            )
+
+
+def array(name: str, values: Any) -> Floats:
+    """An array of such numbers, of any shape; raises :class:`HapticsError`."""
+    try:
+        found = np.asarray(values, float)
+    except OverflowError:  # one of Python's whole numbers
+        found = np.asarray(np.inf)
+    if not (np.abs(found) <= LARGEST).all():
+        raise HapticsError(f"{name} have a value that is no finite number; all must be at most {LARGEST:g} in size")
+    return found
 
 
 def vector(name: str, value: Any, unit: str) -> Vector:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.inputs.values import shown, suggestion
-from contactfpga.robot.haptics.values import HapticsError, number, positive
+from contactfpga.robot.haptics.values import LARGEST, SMALLEST, HapticsError, number, positive, within
 from contactfpga.surfaces import shapes
 from contactfpga.surfaces.shapes import Floats, Vector
 
@@ -108,6 +108,10 @@ class Wrench:
     lifted: tuple[int, ...] = ()
     """Numbers of the units that nothing presses any more: they would have to pull."""
 
+    def __post_init__(self) -> None:
+        within("force_n", self.force_n, "N")
+        within("moment_nm", self.moment_nm, "Nm")
+
     @property
     def covariance(self) -> Floats | None:
         """(6, 6), as :class:`Noise` has it."""
@@ -132,6 +136,10 @@ class Motion:
     turning_rad_s2: Vector = (0.0, 0.0, 0.0)
     """Angular acceleration."""
 
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            within(field.name, getattr(self, field.name), "")
+
 
 @dataclasses.dataclass(frozen=True)
 class Bumper:
@@ -142,6 +150,12 @@ class Bumper:
     """Its center of mass in the link's frame."""
     inertia_kg_m2: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0),) * 3
     """About its center of mass."""
+
+    def __post_init__(self) -> None:
+        number("mass_kg", self.mass_kg, 0, LARGEST, "kg")
+        within("center_m", self.center_m, "m")
+        for row in self.inertia_kg_m2:
+            within("inertia_kg_m2", row, "kg m2")
 
     def wrench(self, motion: Motion) -> Floats:
         """The wrench (6,) in N and Nm that the units must exert on the bumper to move it with the link."""
@@ -187,7 +201,7 @@ class Plane:
     def center(self, wrench: Wrench) -> Center | None:
         """The center of pressure; None where the wrench does not push on the plane."""
         (fx, fy, fz), (mx, my, mz) = wrench.force_n, wrench.moment_nm
-        if not fz < 0:
+        if not fz < -SMALLEST:
             return None
         h = self.height_m
         x, y = (h * fx - my) / fz, (h * fy + mx) / fz
@@ -227,7 +241,7 @@ class Cylinder:
         radius = self.radius_m
         across, square = mz / radius, fx * fx + fy * fy
         inward = square - across * across
-        if not inward > 0:
+        if not inward > SMALLEST**2:
             return None
         push = -math.sqrt(inward)
         angle = math.atan2(fy, fx) - math.atan2(across, push)

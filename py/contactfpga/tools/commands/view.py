@@ -13,8 +13,8 @@ from contactfpga.tools.console import flags, interrupt, numbers
 EXTRA = "view"
 
 WHAT = (
-    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, sim://, a recording's file, or ROBOT.toml (default: "
-    "a virtual sheet to press)."
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, flexitac://DEVICE, sim://, a recording's file, or "
+    "ROBOT.toml (default: a virtual sheet to press)."
 )
 
 
@@ -30,6 +30,12 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
     parser.add_argument("--units", metavar="FILE", help=units)
+    model = "A robot in MuJoCo that wears the sheets of ROBOT.toml and is pushed with the mouse (docs/mujoco.md)."
+    parser.add_argument("--mujoco", metavar="MODEL.xml", help=model)
+    reflex = "Reflexes of that robot, which is Python code and runs, such as examples/arm/reflexes.py."
+    parser.add_argument("--reflex", metavar="FILE.py", help=reflex)
+    gateware = "Zones of that robot by the compiled gateware, slower than real time (default: by the golden model)."
+    parser.add_argument("--gateware", action="store_true", help=gateware)
     host = "Address to listen on (default: 127.0.0.1, which only this computer can reach)."
     parser.add_argument("--host", default="127.0.0.1", help=host)
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
@@ -43,10 +49,22 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.tools.view import opening
     from contactfpga.tools.view.playback import Player
 
+    if args.mujoco is not None:
+        args.extra = "view,mujoco"
     with contextlib.ExitStack() as stack:
         with terminal.reading(args.port or "") as tell:
             named = opening.ViewRequest(
-                args.port, args.skin, args.baud, args.timeout, args.link, args.units, args.flat, tell
+                args.port,
+                args.skin,
+                args.baud,
+                args.timeout,
+                args.link,
+                args.units,
+                args.flat,
+                tell,
+                args.mujoco,
+                args.reflex,
+                args.gateware,
             )
             shown = stack.enter_context(opening.opened(named, args.host, args.http_port))
         stack.enter_context(interrupt.usual_end())

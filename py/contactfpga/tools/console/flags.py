@@ -16,8 +16,9 @@ from contactfpga.skin.several import Several
 from contactfpga.tools.console import numbers
 
 PORT = (
-    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim:// or "
-    "replay://FILE (default: the one supported board that is plugged in; with --skin, the one with that Skin)."
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim://, "
+    "replay://FILE or flexitac://DEVICE (default: the one supported board that is plugged in; with --skin, the one "
+    "with that Skin)."
 )
 SKIN = "Require a board built from this Skin, and use its baud rate."
 

@@ -126,7 +126,7 @@ def table(
 
 
 def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
-    """Of each zone its push in N, and the least and largest one that friction allows."""
+    """Of each zone its push in N, and the least and largest one that it may be (95 of 100)."""
     if contacts is None:
         return [()] * len(zones)
     left, found = iter(contacts), []

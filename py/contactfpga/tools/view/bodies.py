@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -27,10 +27,11 @@ from contactfpga.surfaces import SurfaceError, mesh_file
 from contactfpga.tools.view import contacts, controls, page, picture
 from contactfpga.tools.view.cameras import Cameras, Side
 from contactfpga.tools.view.fingers import Hand, Touchable
-from contactfpga.tools.view.panel import TimelineControls, as_markdown, shortened
+from contactfpga.tools.view.panel import MOST_N, TimelineControls, as_markdown, shortened
 from contactfpga.tools.view.picture import rgb
 from contactfpga.tools.view.playback import Playback
-from contactfpga.tools.view.sources import Moment
+from contactfpga.tools.view.simulated import NO_REFLEX, SimulatedSource, Solid
+from contactfpga.tools.view.sources import KEEPS_UP, Moment
 from contactfpga.tools.view.stage import Stage, light
 from contactfpga.tools.view.tiles import MM, Tiles, quaternions
 from contactfpga.tracking.tracker import Tracker
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
 STEP_S = 0.04
 TOLD_S = 0.25
 TURN_RAD = 3.15
+PUSH_N = 5.0
+"""Of the mouse's finger, at first."""
 
 
 ROBOT_SIDES = {
@@ -109,13 +112,14 @@ class BodyView:
 
     def __init__(self, server: viser.ViserServer, source: RobotSource):
         self._source = source
-        self.stage = RobotStage(server, source.body)
-        self._moved = dict(source.angles)
-        self.stage.move(source.angles)
+        self.stage = RobotStage(server, source.body, source.solids() if isinstance(source, SimulatedSource) else ())
+        self._moved: dict[str, float] | None = None
+        self._move()
         page.dress(server)
         cameras = Cameras(server, ROBOT_SIDES, self.stage.points_m)
         self._trackers = {name: Tracker(gate_mm=40.0, hold_ms=100.0) for name in source.body.links}
         self.hands: dict[str, Hand] = {}
+        self._push_n = PUSH_N
         self._stepped_s = self._told_s = 0.0
         self._rows: list[contacts.Row] = []
         self._table = server.gui.add_html(contacts.table(()))
@@ -123,7 +127,34 @@ class BodyView:
         controls.add(server, cameras, lambda: (f"contactfpga: {shortened(source.title)}", self._rows))
         self._facts = server.gui.add_markdown("")
         self._felt: dict[str, LinkState] = {}
-        self._add_sliders(server)
+        if isinstance(source, SimulatedSource):
+            self._add_pushing(server, source)
+        else:
+            self._add_sliders(server)
+
+    def _add_pushing(self, server: viser.ViserServer, source: SimulatedSource) -> None:
+        """How hard the mouse pushes, which reflex acts, and a new start."""
+        with server.gui.add_folder("Robot"):
+            force = server.gui.add_slider("force, N", 1.0, MOST_N, 0.5, PUSH_N)
+            reflex = server.gui.add_dropdown("reflex", (NO_REFLEX, *source.reflexes), initial_value=source.reflex)
+            again = server.gui.add_button("Start again")
+
+        def resize(_: Any) -> None:
+            self._push_n = force.value
+            for hand in self.hands.values():
+                hand.resize(force_n=force.value)
+
+        def start(_: Any) -> None:
+            for hand in self.hands.values():
+                hand.lift()
+            source.reflex = reflex.value
+            source.restart()
+
+        force.on_update(resize)
+        reflex.on_update(start)
+        again.on_click(start)
+        # Whoever comes first sees it from its start.
+        server.on_client_connect(lambda _: source.restart() if len(server.get_clients()) == 1 else None)
 
     def _add_sliders(self, server: viser.ViserServer) -> None:
         body, angles = self._source.body, self._source.angles
@@ -140,10 +171,8 @@ class BodyView:
         time.sleep(max(0.0, STEP_S - (time.monotonic() - self._stepped_s)))
         self._stepped_s = time.monotonic()
         source = self._source
-        if source.angles != self._moved:
-            self._moved = dict(source.angles)
-            self.stage.move(self._moved)
         states = source.states()
+        self._move()
         self._rows = [row for name, state in states.items() for row in self._show(name, state)]
         if self._stepped_s - self._told_s > TOLD_S:
             self._told_s = self._stepped_s
@@ -152,11 +181,21 @@ class BodyView:
             if self._timeline is not None:
                 self._timeline.write()
 
+    def _move(self) -> None:
+        """Draw the links where they are now."""
+        source = self._source
+        if isinstance(source, SimulatedSource):
+            self.stage.place(source.poses())
+        elif source.angles != self._moved:
+            self._moved = dict(source.angles)
+            self.stage.move(self._moved)
+
     def _show(self, name: str, state: LinkState) -> list[contacts.Row]:
         """Draw a link's newest frame, and return its contacts."""
         stage, virtual, plan = self.stage.stages[name], self._source.virtual.get(name), self._source.body.links[name]
         if virtual is not None and name not in self.hands:
             self.hands[name] = Hand.on(virtual, plan.skin.sheet)
+            self.hands[name].force_n = self._push_n
             stage.press_with(self.hands[name])
         if state.zones is None:
             stage.draw_no_data()
@@ -165,6 +204,8 @@ class BodyView:
         felt = self._measured(plan, state)
         pushed = [(one.zone, one.normal_n) for one in felt or () if one.zone.x_mm is not None]
         arrows = None if felt is None else pushes(plan, felt)
+        if isinstance(self._source, SimulatedSource):
+            arrows = pushes(plan, self._source.sheets[name].touches)
         moment = Moment(state.zones, self._trackers[name].update(state.zones), truth, pushes=pushed, arrows=arrows)
         stage.draw(moment)
         return contacts.rows(moment, name)
@@ -202,7 +243,10 @@ def facts(source: RobotSource, states: dict[str, LinkState], unread: set[str]) -
     for name, state in states.items():
         found = 0 if state.zones is None else len(state.zones)
         zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
-        rows.append((name, f"{state}{zones}"))
+        forces = f"; {source.told(name)}" if isinstance(source, SimulatedSource) else ""
+        rows.append((name, f"{state}{zones}{forces}"))
+    if isinstance(source, SimulatedSource) and source.share <= KEEPS_UP:
+        rows.append(("simulated", f"at {source.share:.0%} of real time"))
     return rows
 
 
@@ -313,7 +357,8 @@ def _path(name: str, folder: Path) -> Path | None:
 class RobotStage:
     """Links as meshes where these can be read, else as lines between joints; and a stage for each sheet."""
 
-    def __init__(self, server: viser.ViserServer, body: Body):
+    def __init__(self, server: viser.ViserServer, body: Body, solids: Sequence[Solid] = ()):
+        """``solids``: what is drawn in the place of the URDF's links."""
         self._server, self._body = server, body
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
@@ -325,12 +370,16 @@ class RobotStage:
         scene = server.scene
         light(server, (1.0, -0.5, 1.0))
         names = [plan.frame for plan in body.links.values()]
-        if body.kinematics is not None:
+        if solids:
+            names += [solid.link for solid in solids]
+        elif body.kinematics is not None:
             names = list(body.kinematics.robot.links)
         for name in dict.fromkeys(names):
             self._frames[name] = scene.add_frame(f"{ROOT}/{name}", show_axes=False)
-        for visual in visuals(body.urdf) if body.urdf is not None else ():
+        for visual in visuals(body.urdf) if body.urdf is not None and not solids else ():
             self._add_mesh(visual)
+        for solid in solids:
+            self._add(solid)
         self.stages = {name: self._add_sheet(plan) for name, plan in body.links.items()}
         self._bones: Any = None
         for name, plan in body.links.items():
@@ -350,16 +399,20 @@ class RobotStage:
             self.unread.add(REST if str(error) == REST else visual.path.suffix)
             return
         mesh.merge_vertices()
-        box = np.array(list(itertools.product(*np.transpose(mesh.bounds)))) * visual.scale
-        self._corners.append((visual.link, visual.pose.apply(box)))
+        vertices, faces = np.asarray(mesh.vertices) * visual.scale, np.asarray(mesh.faces)
+        self._add(Solid(visual.link, visual.pose, vertices, faces, rgb(picture_style.SHEET)))
+
+    def _add(self, solid: Solid) -> None:
+        box = np.array(list(itertools.product(*zip(solid.vertices_m.min(0), solid.vertices_m.max(0)))))
+        self._corners.append((solid.link, solid.pose.apply(box)))
         count = len(self._frames)
-        self._frames[f"{visual.link}#{count}"] = self._server.scene.add_mesh_simple(
-            f"{ROOT}/{visual.link}/mesh{count}",
-            np.asarray(mesh.vertices) * visual.scale,
-            np.asarray(mesh.faces),
-            color=rgb(picture_style.SHEET),
-            wxyz=quaternions(visual.pose.rotation[None])[0],
-            position=visual.pose.point_m,
+        self._frames[f"{solid.link}#{count}"] = self._server.scene.add_mesh_simple(
+            f"{ROOT}/{solid.link}/mesh{count}",
+            solid.vertices_m,
+            solid.faces,
+            color=solid.color,
+            wxyz=quaternions(solid.pose.rotation[None])[0],
+            position=solid.pose.point_m,
             side="double",
             cast_shadow=False,
             receive_shadow=False,
@@ -376,13 +429,8 @@ class RobotStage:
         kinematics = self._body.kinematics
         if kinematics is None:
             return
-        self._poses = poses = kinematics.poses(angles)
-        orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
-        for name, plan in self._body.links.items():
-            mine = poses[plan.frame] @ plan.pose
-            self.stages[name].rotation, self.stages[name].point_m = mine.rotation, mine.point_m
-        for (name, pose), wxyz in zip(poses.items(), orientations):
-            self._frames[name].wxyz, self._frames[name].position = wxyz, pose.point_m
+        poses = kinematics.poses(angles)
+        self.place(poses)
         joints = kinematics.robot.joints.values()
         if not joints:
             return
@@ -392,6 +440,17 @@ class RobotStage:
                 f"{ROOT}/bones", bones, BONE, thickness=2.0, thickness_units="screen"
             )
         self._bones.points = bones.astype(np.float32)
+
+    def place(self, poses: Mapping[str, Pose]) -> None:
+        """Draw the links at these poses."""
+        self._poses = poses
+        orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
+        for name, plan in self._body.links.items():
+            mine = poses[plan.frame] @ plan.pose
+            self.stages[name].rotation, self.stages[name].point_m = mine.rotation, mine.point_m
+        for (name, pose), wxyz in zip(poses.items(), orientations):
+            if (frame := self._frames.get(name)) is not None:
+                frame.wxyz, frame.position = wxyz, pose.point_m
 
     def points_m(self) -> np.ndarray:
         """(n, 3) around all that is drawn, where the joints put it."""

@@ -107,12 +107,13 @@ def add_plate(server: viser.ViserServer, tiles: Tiles, node: str) -> None:
     _add(server, f"{node}/plate", *plate(tiles), PLATE)
 
 
-def revolved(profile: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) in mm and outward faces of a profile (k, 2), radius and z, turned about z."""
-    angles = np.linspace(0, 2 * np.pi, SIDES + 1)
+def revolved(profile: np.ndarray, sides: int = SIDES, first: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and outward faces of a profile (k, 2), radius and z in one unit, turned about z in so many steps
+    from the angle ``first`` in rad on."""
+    angles = first + np.linspace(0, 2 * np.pi, sides + 1)
     radius, height = profile[:, :1], profile[:, 1:]
     rings = np.stack([radius * np.cos(angles), radius * np.sin(angles), height + 0 * angles], -1)
-    return rings.reshape(-1, 3), _grid(len(profile), SIDES + 1)
+    return rings.reshape(-1, 3), _grid(len(profile), sides + 1)
 
 
 def _grid(rows: int, columns: int) -> np.ndarray:

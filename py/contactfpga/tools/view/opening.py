@@ -29,6 +29,7 @@ from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
 from contactfpga.tools.view.replayed import LinkRecording, Reading, is_recording, load, silent
 from contactfpga.tools.view.server import Guard
+from contactfpga.tools.view.simulated import SimulatedSource
 from contactfpga.tools.view.sources import BoardSource, Moment, Source
 from contactfpga.tools.view.stage import Stage
 from contactfpga.tools.view.tiles import Tiles
@@ -85,7 +86,7 @@ class ServedView:
     web: viser.ViserServer
     guard: Guard
     view: View | BodyView
-    source: Source | BodySource | BodyPlayer
+    source: Source | BodySource | BodyPlayer | SimulatedSource
     hand: Hand | None
     """The mouse's, on a virtual board."""
     url: str
@@ -110,6 +111,12 @@ class ViewRequest:
     """With nothing named: a flat sheet in place of the one around a forearm."""
     reading: Reading = silent
     """Told how far a recording is read that has no index."""
+    mujoco: str | None = None
+    """File of a MuJoCo model, which wears the sheets of the robot that :attr:`port` names."""
+    reflex: str | None = None
+    """Python file of reflexes that move it."""
+    gateware: bool = False
+    """With it the compiled gateware, not the golden model."""
 
 
 @contextlib.contextmanager
@@ -124,7 +131,7 @@ def opened(
     try:
         web, guard = server.serve(host, http_port)
         try:
-            if isinstance(source, (BodySource, BodyPlayer)):
+            if isinstance(source, (BodySource, BodyPlayer, SimulatedSource)):
                 view: View | BodyView = BodyView(web, source)
             else:
                 view = View(web, source, hand)
@@ -153,11 +160,17 @@ def _check(named: ViewRequest) -> None:
             raise ContactFPGAError(f"--{name} is for a board; {port} {other}")
     if named.flat and (port is not None or named.skin is not None):
         raise ContactFPGAError("--flat is for the sheet that is shown where nothing is named")
+    if named.mujoco is not None and not is_body:
+        raise ContactFPGAError(f"--mujoco needs ROBOT.toml, whose sheets the model wears, not {port or 'nothing'}")
+    if named.mujoco is None and (named.reflex is not None or named.gateware):
+        raise ContactFPGAError(f"--{'gateware' if named.reflex is None else 'reflex'} is for a robot of --mujoco")
     if named.link is not None and not recorded:
         raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
 
-def _source(named: ViewRequest) -> tuple[Source | BodySource | BodyPlayer, Hand | None]:
+def _source(named: ViewRequest) -> tuple[Source | BodySource | BodyPlayer | SimulatedSource, Hand | None]:
+    if named.mujoco is not None and named.port is not None:
+        return SimulatedSource(named.port, named.mujoco, named.reflex, named.gateware), None
     if names_robot(named.port):
         return BodySource(named.port, named.timeout), None
     if named.port is not None and is_recording(named.port):

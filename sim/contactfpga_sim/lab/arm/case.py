@@ -7,7 +7,8 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from contactfpga.design.cover import Cap, Cover
+from contactfpga.design.cover import Ball, Cap, Cover, elastic
+from contactfpga.design.cover.region import Pressing
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
@@ -72,6 +73,15 @@ class Case:
         foam = self.foam
         known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa, "poisson": foam.poisson}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
+
+    @property
+    def pressing(self) -> Pressing:
+        """The arm on a body region: driven on by what the torque limit lets through, then braked by all its current."""
+        link, motor, foam = self.link, self.motor, self.foam
+        ball = Ball(foam.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, foam.poisson))
+        mass = (link.inertia_kgm2 + motor.inertia_kgm2) / link.lever_m**2
+        brake = motor.current_a * motor.torque_nm_a / link.lever_m
+        return Pressing(mass, self.control.torque_limit_nm / link.lever_m, brake, ball, foam.thickness_m)
 
     def but(self, **changes: Any) -> Case:
         """The same with other values: ``case.but(link={"speed_m_s": 0.4}, touch=({"x_mm": 85.0},))``."""

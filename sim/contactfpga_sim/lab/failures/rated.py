@@ -44,7 +44,7 @@ class Rate:
 
 @dataclasses.dataclass(frozen=True)
 class Rated:
-    """A knob's method that is tried in as many draws as it takes to say whether :data:`LEVEL` of them are right.
+    """A knob's method that is tried in as many draws as it takes to say whether enough of them are right.
 
     A value holds if the interval lies above the level. It does not if the interval lies below, or if it does not leave
     the level within ``most`` draws. The draws of all values begin with the same seed.
@@ -53,6 +53,9 @@ class Rated:
     draws: Draws
     seed: int = 0
     most: int = LOOKS[-1]
+    level: float = LEVEL
+    telling: float = 1.0
+    """The share of wrong draws that have to tell something, else it counts as not noticed."""
 
     def __call__(self, value: float) -> Outcome:
         """The rate at a value. Its words and its sheet are those of a right draw where the value holds, else of a wrong
@@ -63,18 +66,17 @@ class Rated:
             found += self.draws(value, rng, look - len(found))
             rate = Rate(sum(one.right for one in found), len(found))
             low, high = rate.interval
-            if low >= LEVEL or high < LEVEL or look >= self.most:
+            if low >= self.level or high < self.level or look >= self.most:
                 break
-        return _together(found, rate)
+        return _together(found, rate, low >= self.level, self.telling)
 
 
-def _together(found: Sequence[Outcome], rate: Rate) -> Outcome:
+def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:
     """One outcome of all. Where the value holds, it tells what half of the draws do. Where it does not, it tells what
-    its wrong draws do, and nothing if one of them tells nothing."""
+    its wrong draws do, and nothing if fewer than ``telling`` of them tell anything."""
     wrong = [one for one in found if not one.right]
-    holds = rate.interval[0] >= LEVEL
     each = [{re.sub(r"\d+", "N", word) for word in one.told} for one in (found if holds else wrong)]
-    told = set() if not all(each) and not holds else set().union(*each)
+    told = set().union(*each) if holds or sum(map(bool, each)) >= telling * len(each) else set()
     if holds:
         told = {word for word in told if 2 * sum(word in words for words in each) >= len(each)}
     right = (one for one in found if one.right)

@@ -19,7 +19,7 @@ from contactfpga.robot.body import Body, BodyError, JointHistory, Snapshot
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import States
 from contactfpga.surfaces.shapes import Floats
-from contactfpga_sim.lab.mujoco.touch import SheetTouch, of_solver, on_sheet
+from contactfpga_sim.lab.mujoco.touch import SheetTouch, by_finger, of_solver, on_sheet
 from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
 from contactfpga_sim.lab.usb import BridgeSettings
 
@@ -77,7 +77,7 @@ class Sheets(Mapping[str, WornSheet]):
         self._bodies = [_body(model, plan) for plan in self.body.links.values()]
         self._owner = _owners(model, self.body, self._bodies)
         self._springs = [elastic.stiffness(worn.ball) for worn in self._worn.values()] if foam else []
-        self._pushed: Floats = np.zeros(model.nv)  # what the foam added to qfrc_applied
+        self._pushed: Floats = np.zeros(model.nv)  # what foam and fingers added to qfrc_applied
         self._steps = 0
         self._joints, self._history = _joints(model, self.body), JointHistory()
         self._every = max(1, round(1e-3 / model.opt.timestep))
@@ -103,9 +103,13 @@ class Sheets(Mapping[str, WornSheet]):
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         self._note_joints()
-        found = self._push() if self._springs else {}
+        pushed = np.zeros(model.nv)
+        foam = self._push(pushed) if self._springs else {}
+        fingers = [self._point(number, pushed) for number in range(len(self._bodies))]
+        data.qfrc_applied += pushed - self._pushed
+        self._pushed = pushed
         mujoco.mj_step2(model, data)
-        self._press(found)
+        self._press(foam, fingers)
         self._steps += 1
         for worn in self._worn.values():
             worn.run(self.clock())
@@ -115,10 +119,10 @@ class Sheets(Mapping[str, WornSheet]):
         mujoco.mj_resetData(self.model, self.data)
         self._pushed[:] = 0.0
 
-    def _press(self, foam: Mapping[tuple[int, int], Floats]) -> None:
-        """Let what touches in this step press; ``foam``: by contact and link its force in N on the link."""
+    def _press(self, foam: Mapping[tuple[int, int], Floats], touches: list[list[SheetTouch]]) -> None:
+        """Let what touches in this step press, and ``touches``, the fingers of each link; ``foam``: by contact and link
+        its force in N on the link."""
         data, plans = self.data, list(self.body.links.values())
-        touches: list[list[SheetTouch]] = [[] for _ in plans]
         for number, second, owner in self._contacts():
             one = of_solver(self.model, data, number, second)
             one = one._replace(force_n=one.force_n + foam.get((number, owner), 0.0))
@@ -135,9 +139,20 @@ class Sheets(Mapping[str, WornSheet]):
             for number, side in np.argwhere(owners >= 0).tolist():
                 yield number, side == 1, int(owners[number, side])
 
-    def _push(self) -> dict[tuple[int, int], Floats]:
-        """Have the foam push bodies apart; its force in N on the link, by contact and link."""
-        model, data, pushed = self.model, self.data, np.zeros(self.model.nv)
+    def _point(self, owner: int, pushed: Floats) -> list[SheetTouch]:
+        """Have the fingers on a link push its body; adds to (nv,) ``pushed``."""
+        worn, number, found = list(self._worn.values())[owner], self._bodies[owner], []
+        position, rotation = self.data.xpos[number], self.data.xmat[number].reshape(3, 3)
+        for one in worn.fingers:
+            touch = by_finger(worn.plan, one)
+            force, point = rotation @ touch.force_n, position + rotation @ touch.point_m
+            mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, number, pushed)
+            found.append(touch)
+        return found
+
+    def _push(self, pushed: Floats) -> dict[tuple[int, int], Floats]:
+        """Have the foam push bodies apart; adds to (nv,) ``pushed``. Its force in N by contact and link."""
+        model, data = self.model, self.data
         found: dict[tuple[int, int], Floats] = {}
         for number, second, owner in self._contacts():
             contact = data.contact[number]
@@ -149,8 +164,6 @@ class Sheets(Mapping[str, WornSheet]):
                 mujoco.mj_applyFT(
                     model, data, sign * force, np.zeros(3), contact.pos, int(model.geom_bodyid[geom]), pushed
                 )
-        data.qfrc_applied += pushed - self._pushed
-        self._pushed = pushed
         return found
 
     def _note_joints(self) -> None:

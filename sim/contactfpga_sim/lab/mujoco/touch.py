@@ -9,6 +9,7 @@ import numpy as np
 
 from contactfpga.robot.body.plan import Plan
 from contactfpga.surfaces.shapes import Floats, Vector, vector
+from contactfpga.tools.view.fingers import Finger
 
 SLANT = 0.5
 """Cosine of the angle between the contact's and the sheet's normals, below which the cover is not pressed: a box is
@@ -19,7 +20,7 @@ class SheetTouch(NamedTuple):
     """A contact point of MuJoCo on a link that wears a sheet."""
 
     contact: int
-    """Its place in ``data.contact``."""
+    """Its place in ``data.contact``; -1 for a finger."""
     point_m: Vector
     """In the link's frame."""
     force_n: Vector
@@ -55,6 +56,13 @@ def on_sheet(plan: Plan, position_m: Floats, rotation: Floats, one: ContactForce
     push = float(one.force_n @ one.inward)
     place = _place(plan, point, rotation.T @ one.inward)
     return SheetTouch(one.contact, vector(point), vector(force), push, *(place or (None, None)))
+
+
+def by_finger(plan: Plan, finger: Finger) -> SheetTouch:
+    """A finger that pushes the link along the sheet's normal."""
+    point, normal = plan.place(finger.x_mm, finger.y_mm)
+    force = vector(-finger.force_n * np.array(normal))
+    return SheetTouch(-1, vector(np.array(point)), force, finger.force_n, finger.x_mm, finger.y_mm)
 
 
 def _place(plan: Plan, point_m: Floats, inward: Floats) -> tuple[float, float] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from contactfpga.errors import ContactFPGAError, ReadTimeout
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import LinkMemory
 from contactfpga.surfaces.shapes import Floats
+from contactfpga.tools.view.fingers import Finger
 from contactfpga.tracking.tracker import Tracker
 from contactfpga_sim.lab.arm.parts import Usb
 from contactfpga_sim.lab.mujoco.golden import GoldenBoard
@@ -42,6 +43,8 @@ class WornSheet:
         self.ball = Ball(radius_m, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson))
         self.touches: list[SheetTouch] = []
         """What touches it now."""
+        self.fingers: tuple[Finger, ...] = ()
+        """What pushes it and its link from outside MuJoCo."""
         self.contact = False
         """The level of the board's ``contact`` pin."""
         self.dead = False
@@ -65,6 +68,26 @@ class WornSheet:
         self._coming: collections.deque[tuple[float, bytes]] = collections.deque()
         self._tracker, self._known = Tracker(), LinkMemory(opened=True, open_s=0.0)
         self._load()
+
+    def cut(self, rows: Mapping[int, int] | None = None, columns: Mapping[int, int] | None = None) -> None:
+        """From now on these lines of the sheet are cut, as by
+        :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises ContactFPGAError for golden zones."""
+        if isinstance(self._device, GoldenBoard):
+            raise ContactFPGAError("golden zones come from cells and know no lines: take the gateware")
+        self._device.cut(rows or {}, columns or {})
+
+    # ---- fingers, as the view presses a :class:`contactfpga.tools.view.fingers.Touchable`
+
+    by_force = True
+
+    def touch(self, fingers: Sequence[Finger]) -> None:
+        """From MuJoCo's next step on these push the link, each with its force along the normal; from any thread."""
+        self.fingers = tuple(fingers)
+
+    @property
+    def pressed(self) -> np.ndarray:
+        """As :attr:`closed`."""
+        return self.closed
 
     # ---- what MuJoCo does to it
 

@@ -1,5 +1,5 @@
-"""Fingers that slide, cross, meet and tap: each with a number of its own, which is the truth about it; and frames of
-them at a rate, by the zones of the golden model.
+"""Fingers that slide, cross, meet, tap, stop, follow and enter: each with a number of its own, which is the truth about
+it; and frames of them at a rate, by the zones of the golden model.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ BOUNCE_S = 0.003
 """For how long the switches bounce after a touch and before a lift, 1 ms open and 1 ms closed."""
 
 Random = np.random.Generator
+Place = tuple[float, float]
+"""x and y in mm."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,11 +101,14 @@ def meeting(rng: Random) -> Played:
     return tuple(_along(apart, angle + turn) for turn in (0.0, math.pi))
 
 
-def _along(apart: Callable[[float], float], angle: float) -> Finger:
-    def place(seconds: float, share: float) -> float:
-        return MIDDLE_MM + share * apart(seconds)
+def _along(far: Callable[[float], float], angle: float, x_mm: float = MIDDLE_MM, y_mm: float = MIDDLE_MM) -> Finger:
+    """A finger that goes so far from a place, in this direction."""
 
-    return _finger(functools.partial(place, share=math.cos(angle)), functools.partial(place, share=math.sin(angle)))
+    def place(seconds: float, middle: float, share: float) -> float:
+        return middle + share * far(seconds)
+
+    x = functools.partial(place, middle=x_mm, share=math.cos(angle))
+    return _finger(x, functools.partial(place, middle=y_mm, share=math.sin(angle)))
 
 
 def tapping(rng: Random) -> Played:
@@ -119,14 +124,75 @@ def tapping(rng: Random) -> Played:
     return tuple(found)
 
 
+def angles(rng: Random) -> Played:
+    """Two fingers that swing through the middle on lines at any angle, at up to 300 to 1500 mm/s each; one comes up to
+    20 mm after the other."""
+    turn, between, speed = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(300, 1500)
+    hertz, phase = speed / (2 * math.pi * 55), rng.uniform(0, 2 * math.pi)
+    late = rng.uniform(-20, 20) / 55
+    return (
+        _along(Swing(0.0, 55, hertz, phase), turn),
+        _along(Swing(0.0, 55, hertz, phase + late), turn + between),
+    )
+
+
+def stopping(rng: Random) -> Played:
+    """Three fingers that go somewhere at 100 to 1000 mm/s, stop there for 20 to 300 ms, and go on elsewhere; where they
+    meet is left to chance."""
+    return tuple(_finger(*_stop_and_go(rng)) for _ in range(3))
+
+
+def _stop_and_go(rng: Random) -> tuple[Track, Track]:
+    here, now = rng.uniform(30, 120, 2), 0.0
+    times, places = [now], [here]
+    while now < SECONDS:
+        there = rng.uniform(30, 120, 2)
+        for place, pause in ((there, math.dist(here, there) / rng.uniform(100, 1000)), (there, rng.uniform(0.02, 0.3))):
+            now += pause
+            times.append(now)
+            places.append(place)
+        here = there
+    return tuple(Track(tuple(times), tuple(float(place[axis]) for place in places)) for axis in (0, 1))  # type: ignore[return-value]
+
+
+def row(rng: Random) -> Played:
+    """Three fingers in a row, 22 to 30 mm apart, that swing together along a line at any angle to it, at up to 200 to
+    1500 mm/s."""
+    turn, way, apart = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(22, 30)
+    hertz, phase = rng.uniform(200, 1500) / (2 * math.pi * 35), rng.uniform(0, 2 * math.pi)
+    swing = Swing(0.0, 35, hertz, phase)
+    return tuple(
+        _along(swing, way, MIDDLE_MM + step * math.cos(turn), MIDDLE_MM + step * math.sin(turn))
+        for step in (-apart, 0.0, apart)
+    )
+
+
+def entering(rng: Random) -> Played:
+    """Fingers that slide in over any edge and out over any other at 200 to 1500 mm/s, two or three at a time; each
+    that comes is a new contact."""
+    found = []
+    for _ in range(3):
+        now = rng.uniform(0, 0.2)
+        while now < SECONDS:
+            first, last = rng.permutation(4)[:2]
+            ends = [_outside(int(edge), rng) for edge in (first, last)]
+            times = (now, now + math.dist(*ends) / rng.uniform(200, 1500))
+            x, y = (Track(times, (ends[0][axis], ends[1][axis])) for axis in (0, 1))
+            found.append(_finger(x, y, begins_s=times[0], ends_s=times[1]))
+            now = times[1] + rng.uniform(0.02, 0.2)
+    return tuple(found)
+
+
+def _outside(edge: int, rng: Random) -> Place:
+    """A place off the sheet from which a finger comes in."""
+    beyond, along = (-FINGER_MM, 2 * MIDDLE_MM + FINGER_MM)[edge % 2], rng.uniform(0, 2 * MIDDLE_MM)
+    return (beyond, along) if edge < 2 else (along, beyond)
+
+
 FAMILIES: dict[str, Callable[[Random], Played]] = {
-    family.__name__: family for family in (sliding, crossing, meeting, tapping)
+    family.__name__: family for family in (sliding, crossing, meeting, tapping, angles, stopping, row, entering)
 }
 """Every family by its name."""
-
-
-Place = tuple[float, float]
-"""x and y in mm."""
 
 
 @dataclasses.dataclass(frozen=True)

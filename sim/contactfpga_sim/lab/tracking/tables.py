@@ -12,7 +12,6 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import tables as failures_tables
 from contactfpga_sim.lab.performance.scans import RECORDINGS
 from contactfpga_sim.lab.speed.driver import frame, greeting
 from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
@@ -67,26 +66,42 @@ def _rate(work: Callable[[], object], count: int) -> float:
 
 
 HEAD = ("tracker", "MOTA, %", "IDF1, %", "id switches per 1,000 frames")
-LOOKS = {"`Tracker`": (style.BLUE, "solid"), "nearest zone": (style.VERMILLION, style.DASHES[1])}
+LOOKS = {
+    "`Tracker`": (style.BLUE, "solid"),
+    "nearest zone": (style.VERMILLION, style.DASHES[1]),
+    "constant velocity": (style.GREEN, style.DASHES[2]),
+    "Norfair": (style.ORANGE, style.DASHES[3]),
+}
 
 
 def scores_table() -> str:
     """Random scenes."""
-    rows: list[tuple[str, ...]] = [("scenes", "frames per second", *HEAD)]
-    for (family, rate), found in scores.all_scenes().items():
-        rows += _scores(family, rate, found)
+    found = scores.all_scenes()
+    heads = tuple(f"{name}: IDF1, %" for name in scores.TRACKERS)
+    rows = [("scenes", "frames per second", *heads, "`Tracker`: MOTA, %", "id switches per 1,000 frames")]
+    rows += [_scores(family, rate, one) for (family, rate), one in found.items()]
+    for rate in scores.RATES_HZ:
+        each = [one for (_, other), one in found.items() if other == rate]
+        means = (f"**{sum(100 * one[name].idf1 for one in each) / len(each):.1f}**" for name in scores.TRACKERS)
+        rows.append(("mean of all", f"{rate:,g}", *means, "", ""))
     return writer.table_of(rows)
 
 
-def scores_sample() -> str:
-    """Two rows of :func:`scores_table`."""
-    return "\n".join(map(writer.line, _scores("meeting", 50.0, scores.of_family("meeting", 50.0))))
+def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
+    each = (f"{100 * one.idf1:.1f} ± {100 * one.half:.1f}" for one in found.values())
+    ours = found["`Tracker`"]
+    return f"`{family}`", f"{rate:,g}", *each, f"{100 * ours.mota:.1f}", f"{ours.switches_per_1000:.1f}"
 
 
-def _scores(family: str, rate: float, found: scores.Scores) -> Iterator[tuple[str, ...]]:
-    for number, (tracker, score) in enumerate(found.items()):
-        first = (f"`{family}`", f"{rate:,g}") if number == 0 else ("", "")
-        yield (*first, tracker, *score.cells)
+def ahead_table() -> str:
+    """By how much the tracker is ahead of each other one, where it may be behind."""
+    names = [name for name in scores.TRACKERS if name != "`Tracker`"]
+    rows = [("scenes", "frames per second", *(f"ahead of {name}, %" for name in names))]
+    for (family, rate), found in scores.all_scenes().items():
+        gained = [scores.ahead(found["`Tracker`"], found[name]) for name in names]
+        if rate in scores.JUDGED_RATES:
+            rows.append((f"`{family}`", f"{rate:,g}", *(f"{100 * one:.1f} ± {100 * half:.1f}" for one, half in gained)))
+    return writer.table_of(rows)
 
 
 def recorded_table() -> str:
@@ -101,10 +116,24 @@ def recorded_table() -> str:
     return writer.table_of(rows)
 
 
+BREAKS = ("knob", "method", "right in 95 % up to", "right there", "right at the next", "closed form", "what helps")
+
+
 def breaks_table() -> str:
     """Where ids are lost."""
-    lines = [line for knob in breaks.KNOBS.values() for line in failures_tables.rows(knob, knob.sweep(), False)]
-    return writer.table(failures_tables.HEAD, lines)
+    return writer.table_of([BREAKS, *(row for knob in breaks.KNOBS.values() for row in break_rows(knob))])
+
+
+def break_rows(knob: breaks.Knob) -> Iterator[tuple[str, ...]]:
+    """A knob's lines; what they have in common is said in the first one."""
+    for number, method in enumerate(knob.methods):
+        rates = knob.sweep(method)
+        held = [rate for rate in rates if rate.holds]
+        until = f"**{held[-1].value:g}**" if held else "nowhere"
+        until = until if len(held) < len(rates) else f"{until}, all there are"
+        after = f"{rates[-1].value:g}: {rates[-1]}" if len(held) < len(rates) else ""
+        first = (f"{knob.title}: {knob.axis}", knob.helps) if number == 0 else ("", "")
+        yield first[0], method, until, str(held[-1]) if held else "", after, knob.closed.get(method, ""), first[1]
 
 
 def speed_table() -> str:
@@ -126,18 +155,19 @@ def draw(folder: Path) -> Path:
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(3.1)
-        panels = figure.subplots(1, len(scenes.FAMILIES), sharey=True)
-        for axes, family in zip(panels, scenes.FAMILIES):
+        figure = style.new(5.2)
+        panels = figure.subplots(2, len(scenes.FAMILIES) // 2, sharex=True, sharey=True)
+        for axes, family in zip(panels.flat, scenes.FAMILIES):
             for tracker, (color, dashes) in LOOKS.items():
                 values = [100 * scores.of_family(family, rate)[tracker].idf1 for rate in scores.RATES_HZ]
                 name = tracker.replace("`", "")
                 axes.plot(scores.RATES_HZ, values, color=color, ls=dashes, marker="o", ms=4, label=name)
-            axes.set(title=family, xscale="log", ylim=(0, 105), xticks=[30, 100, 300, 1000])
-            axes.set_xticklabels(["30", "", "300", ""])
+            axes.set(title=family, xscale="log", ylim=(0, 105), xticks=[100, 1000, 10_000])
+            axes.set_xticklabels(["100", "1k", "10k"])
             axes.minorticks_off()
             axes.grid(True)
-        panels[0].set_ylabel("IDF1, %")
+        for axes in panels[:, 0]:
+            axes.set_ylabel("IDF1, %")
         figure.supxlabel("frames per second", fontsize=style.NORMAL)
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
         return style.save(figure, folder / "tracking.svg")

@@ -76,18 +76,20 @@ class Visitor:
         page.evaluate(WATCH)
         page.wait_for_timeout(500)
 
-    def place(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        """Where a place of the sheet is on the canvas, as shares of its width and height."""
+    def place(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
+        """Where a place of the sheet is on the canvas, as shares of its width and height; ``link``: of a robot."""
         camera = next(iter(self._shown.web.get_clients().values())).camera
-        assert isinstance(self._shown.view, View)
-        point, _ = self._shown.view.stage.tiles.surface.place(x_mm, y_mm)
-        x, y, z = turned(camera.wxyz, np.array(point) * MM - camera.position)
+        view = self._shown.view
+        stage = view.stage if isinstance(view, View) else view.stage.stages[link]
+        point, _ = stage.tiles.surface.place(x_mm, y_mm)
+        world = stage.rotation @ np.array(point) * MM + stage.point_m
+        x, y, z = turned(camera.wxyz, world - camera.position)
         scale = 0.5 / np.tan(camera.fov / 2) / z
         return 0.5 + x * scale / camera.aspect, 0.5 + y * scale
 
-    def click(self, x_mm: float, y_mm: float) -> None:
+    def click(self, x_mm: float, y_mm: float, link: str = "") -> None:
         """With the mouse, as a user does."""
-        x, y = self._pixel(x_mm, y_mm)
+        x, y = self._pixel(x_mm, y_mm, link)
         self.page.mouse.move(x, y)
         self.page.wait_for_timeout(100)
         self.page.mouse.down()
@@ -112,8 +114,8 @@ class Visitor:
         clicked, drawn = self.page.evaluate("[window.clicked_ms, window.drawn_ms]")
         return clicked / 1e3, drawn / 1e3
 
-    def _pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        x, y = self.place(x_mm, y_mm)
+    def _pixel(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
+        x, y = self.place(x_mm, y_mm, link)
         left, top, width, height = self.page.evaluate("window.box()")
         return left + x * width, top + y * height
 

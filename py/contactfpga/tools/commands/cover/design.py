@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 from typing import Any
 
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.design import Design, FoamDesign, Thin, design, margin
+from contactfpga.design.cover.region import RegionLimits
 from contactfpga.design.cover.sense import Sense
 from contactfpga.design.cover.task import Task
 from contactfpga.errors import UNSOLVED
@@ -17,6 +19,16 @@ from contactfpga.tools.commands.cover import KPA, MM, notes, say, table
 EXTRA = "sim"
 
 HEADS = ("foam", "E kPa", "pressed mm", "for ms", "peak N", "thick mm", "kg/m2", "least N", "pitch mm", "binds")
+REGION_HEADS = (
+    "body region",
+    "free N",
+    "free m/s",
+    "clamped N",
+    "clamped m/s",
+    "reaction ms",
+    "both m/s",
+    "binds",
+)
 THIN_HEADS = (
     "reaction after ms",
     "E kPa",
@@ -61,6 +73,9 @@ def run(args: argparse.Namespace) -> int:
         for one in found.relax:
             print(f"  {one}")
     notes(list(first.notes))
+    if first.regions:
+        print()
+        columns([REGION_HEADS, *map(region_row, first.regions)])
     print()
     columns([THIN_HEADS, *(_thin_row(one) for one in found.thinning)])
     print(f"the sheet itself: {MM * found.sheet_s:.4g} ms at worst from touch to last byte")
@@ -81,6 +96,36 @@ def _row(one: FoamDesign) -> tuple[str, ...]:
         f"{MM * one.pitch_m:.4g}" if one.pitch_m else "",
         one.no_solution or (f"{bound.name}, {margin(bound)}" if bound else ""),
     )
+
+
+def region_row(one: RegionLimits) -> tuple[str, ...]:
+    """A body region's line."""
+    reaction = "any" if math.isinf(one.reaction_s) else f"{MM * one.reaction_s:.4g}" if one.reaction_s else "none"
+    clamped = "none" if isinstance(one.clamped_m_s, NoSolution) else f"{one.clamped_m_s:.4g}"
+    return (
+        one.region.name,
+        f"{one.transient_n:.4g}",
+        f"{one.transient_m_s:.4g}",
+        f"{one.quasistatic_n:.4g}",
+        clamped,
+        reaction,
+        f"{one.speed_m_s:.4g}",
+        one.binding,
+    )
+
+
+def region_plain(one: RegionLimits) -> dict[str, Any]:
+    """The same for JSON; null: no such speed, or any reaction time."""
+    return {
+        "region": one.region.name,
+        "transient_n": one.transient_n,
+        "transient_m_s": one.transient_m_s,
+        "quasistatic_n": one.quasistatic_n,
+        "clamped_m_s": None if isinstance(one.clamped_m_s, NoSolution) else one.clamped_m_s,
+        "reaction_s": None if math.isinf(one.reaction_s) else one.reaction_s,
+        "speed_m_s": one.speed_m_s,
+        "binding": one.binding,
+    }
 
 
 def _thin_row(one: Thin) -> tuple[str, ...]:
@@ -135,6 +180,7 @@ def _candidate(one: FoamDesign) -> dict[str, Any]:
         "model": str(one.least.model) if one.least else None,
         "fits": one.fits,
         "binding": bound.name if bound else None,
+        "regions": [region_plain(region) for region in one.regions],
         "checks": [
             {"name": check.name, "value": check.value, "limit": check.limit, "used": check.used, "holds": check.holds}
             for check in one.checks

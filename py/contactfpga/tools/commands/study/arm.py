@@ -40,6 +40,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
     charts = "Draw force, safe speed and thickness against latency instead."
     parser.add_argument("--charts", action="store_true", help=charts)
+    regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
+    parser.add_argument("--regions", metavar="FILE.toml", help=regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
     parser.add_argument("--force-threshold", action="store_true", help=force)
     flags.workers(parser)
@@ -51,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_sim.lab.arm.case import Case
 
     case = Case.load(args.case)
+    if args.regions:
+        return _regions(args, case)
     if args.charts:
         return _charts(args, case)
     if args.force_threshold:
@@ -107,6 +111,21 @@ def _units(args: argparse.Namespace, case: Case) -> int:
         print(json.dumps([dict(zip(lines[0], line)) for line in lines[1:]], indent=2))
         return 0
     tables.show(lines, title=f"Case {args.case}: {case.link.speed_m_s:g} m/s")
+    return 0
+
+
+def _regions(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga.design.cover.region import limits_of, load_regions
+    from contactfpga.tools.commands.cover.design import REGION_HEADS, region_plain, region_row
+    from contactfpga.tools.console import tables
+
+    late = 1e-6 * args.latency_us
+    found = [limits_of(case.pressing, one, case.link.speed_m_s, late) for one in load_regions(args.regions)]
+    if args.json:
+        print(json.dumps([region_plain(one) for one in found], indent=2))
+        return 0
+    title = f"Case {args.case}: {case.link.speed_m_s:g} m/s, reaction after {1e3 * late:g} ms"
+    tables.show([REGION_HEADS, *map(region_row, found)], title=title)
     return 0
 
 

@@ -1,0 +1,43 @@
+"""A Skin's gateware as a part of another design."""
+
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.top import Top
+
+STREAM = {"m_axis_tdata": Out(8), "m_axis_tvalid": Out(1), "m_axis_tready": In(1), "m_axis_tlast": Out(1)}
+
+
+class Core(wiring.Component):
+    """A Skin's gateware between the pins of the sheet and a stream of bytes, in one clock domain.
+
+    The pins of the sheet, ``rx``, ``contact`` and the pins that options add are those of :class:`Top`. ``rx`` takes
+    requests and commands; where it stays high, the board sends what it does by itself.
+    m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): the packets of docs/protocol.md as an
+    AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A frame that is ready
+    while another one waits takes its place, so the reader may take its time and gets the newest one.
+
+    A Skin with ``dual`` has none: its two copies are compared at the transmit pin.
+    """
+
+    def __init__(self, skin: Skin):
+        self._top = Top(skin, streams=True)
+        ports = {name: member for name, member in self._top.signature.members.items() if name != "bytes"}
+        super().__init__({**ports, **STREAM})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.top = top = self._top
+        for name, member in top.signature.members.items():
+            if name != "bytes":
+                inside, outside = getattr(top, name), getattr(self, name)
+                m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
+        m.d.comb += [
+            self.m_axis_tdata.eq(top.bytes.payload),
+            self.m_axis_tvalid.eq(top.bytes.valid),
+            self.m_axis_tlast.eq(top.bytes.payload == 0),
+            top.bytes.ready.eq(self.m_axis_tready),
+        ]
+        return m

@@ -1,0 +1,220 @@
+"""A body region that the arm runs into: which speed and which reaction time keep its limits, after a table that the
+user fills in from the standard.
+
+The quantities are those of ISO/TS 15066:2016, annex A, and ISO 10218-2:2025: a region's effective mass and spring
+constant, and the most force and pressure that it may feel in a transient contact, which it can recoil from, and in a
+quasi-static one, where it is clamped. None of the numbers is ours.
+
+The foam, F = K_s delta^1.5 (Hertz), lies in series with the region's spring, F = k y. Together they are pressed by
+x(F) = (F/K_s)^(2/3) + F/k, and hold W(F) = 2/5 F (F/K_s)^(2/3) + F^2/(2 k).
+
+*Transient*, as the standard has it: two free masses, mu = 1/(1/m_arm + 1/m_region), no drive: mu v^2/2 = W(F).
+
+*Quasi-static*: the region is clamped on its far side, and the arm presses on with u until it reacts, at x_r, and brakes
+with b from then on: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), which is solved for x_r at the limit's F. The time to x_r
+follows by quadrature.
+
+Pressure is the largest under a Hertz patch, 3/2 of its mean: p^3 = 6 F E*^2/(pi^3 R*^2).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+
+from contactfpga.design.cover.answer import LARGEST, SMALLEST, CoverError, NoSolution, not_negative, positive
+from contactfpga.design.cover.elastic import stiffness
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.numerics import Floats, integral, root
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+
+MAX_REGIONS = 100
+
+
+@dataclasses.dataclass(frozen=True)
+class Region:
+    """A row of the table."""
+
+    name: str
+    mass_kg: float
+    """Effective mass."""
+    spring_n_m: float
+    """Effective spring constant, in N/m."""
+    transient_n: float
+    """The most force in a transient contact."""
+    transient_pa: float
+    """The most pressure in it, in Pa: 100 N/cm2 are 1e6."""
+    quasistatic_n: float
+    """The most force where the region is clamped."""
+    quasistatic_pa: float
+    """The most pressure there, in Pa."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
+            raise CoverError(f"name is {shown(self.name)}; it must be a text that can be printed, on one line")
+        for field in dataclasses.fields(self)[1:]:
+            unit = {"kg": "kg", "m": "N/m", "n": "N", "pa": "Pa"}[field.name.rsplit("_", 1)[1]]
+            value = positive(field.name, getattr(self, field.name), unit)
+            if not SMALLEST <= value <= LARGEST:
+                raise CoverError(f"{field.name} is {value:g}; it must lie from {SMALLEST:g} to {LARGEST:g} {unit}")
+
+
+def load_regions(path: str | Path) -> tuple[Region, ...]:
+    """The tables `[[region]]` of a TOML file. Raises :class:`CoverError`, OSError."""
+    values = tomlfile.load(path, CoverError)
+    rows = values.get("region")
+    if set(values) - {"region"} or not isinstance(rows, list) or not rows:
+        raise CoverError(f"{path}: it must hold tables [[region]] alone, one at least")
+    if len(rows) > MAX_REGIONS:
+        raise CoverError(f"{path}: there are {len(rows)} regions; at most {MAX_REGIONS} are read")
+    found = []
+    for number, row in enumerate(rows):
+        name = f"{path}: region[{number}]"
+        given = dict(tomlfile.fields_of(Region, name, row, CoverError))
+        for field in dataclasses.fields(Region):
+            if field.name not in given:
+                raise CoverError(f"{name}: {field.name} is missing; take it from the standard")
+        found.append(Region(**given))
+    return tuple(found)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pressing:
+    """An arm under its cover."""
+
+    mass_kg: float
+    """What the contact feels of it: J/d^2."""
+    push_n: float
+    """What drives it on until it reacts."""
+    brake_n: float
+    """What slows it from then on."""
+    ball: Ball
+    """R* and E* of the foam on the region."""
+    deepest_m: float
+    """How far the foam may be pressed in."""
+
+    def __post_init__(self) -> None:
+        positive("mass_kg", self.mass_kg, "kg")
+        not_negative("push_n", self.push_n, "N")
+        not_negative("brake_n", self.brake_n, "N")
+        positive("deepest_m", self.deepest_m, "m")
+
+    def most_n(self, force_n: float, pressure_pa: float) -> float:
+        """The most force that keeps both limits and does not press the foam flat."""
+        by_pressure = (math.pi * pressure_pa) ** 3 * self.ball.radius_m**2 / (6 * self.ball.modulus_pa**2)
+        return float(min(force_n, by_pressure, stiffness(self.ball) * self.deepest_m**1.5))
+
+
+@dataclasses.dataclass(frozen=True)
+class RegionLimits:
+    """What keeps the limits of one region."""
+
+    region: Region
+    transient_n: float
+    """The most force in a transient contact: by force, pressure and foam."""
+    transient_m_s: float
+    """The speed that exerts it."""
+    quasistatic_n: float
+    """The same where the region is clamped."""
+    reaction_s: float
+    """The longest time from the touch to the reaction, at the speed that was asked, which keeps it; infinite where the
+    arm stops without any, 0 where even the earliest is too late."""
+    clamped_m_s: float | NoSolution
+    """The largest speed that keeps it with the reaction time that was asked."""
+
+    @property
+    def speed_m_s(self) -> float:
+        """The largest speed that keeps both, with the reaction time that was asked; 0: none does."""
+        return 0.0 if isinstance(self.clamped_m_s, NoSolution) else min(self.transient_m_s, self.clamped_m_s)
+
+    @property
+    def binding(self) -> str:
+        """Which contact allows the smaller speed."""
+        return "transient" if self.speed_m_s == self.transient_m_s else "quasi-static"
+
+
+def limits_of(pressing: Pressing, region: Region, speed_m_s: float, reaction_s: float) -> RegionLimits:
+    """Speed and reaction time for one region."""
+    positive("speed_m_s", speed_m_s, "m/s")
+    not_negative("reaction_s", reaction_s, "s")
+    pair = _Pair(pressing, region)
+    transient = pressing.most_n(region.transient_n, region.transient_pa)
+    clamped = pressing.most_n(region.quasistatic_n, region.quasistatic_pa)
+    reduced = 1 / (1 / pressing.mass_kg + 1 / region.mass_kg)
+    return RegionLimits(
+        region,
+        transient,
+        math.sqrt(2 * pair.stored_j(transient) / reduced),
+        clamped,
+        pair.reaction_s(clamped, speed_m_s),
+        _speed(pair, clamped, reaction_s),
+    )
+
+
+def _speed(pair: _Pair, force_n: float, reaction_s: float) -> float | NoSolution:
+    """The largest at which ``reaction_s`` is soon enough: the more speed the less time."""
+    fastest = pair.fastest_m_s(force_n)
+    if reaction_s == 0:
+        return fastest
+    slowest = 1e-9 * fastest
+    longest = pair.reaction_s(force_n, slowest)
+    if longest < reaction_s:
+        return NoSolution(
+            f"the drive alone presses with more than {force_n:.4g} N within {1e3 * longest:.4g} ms of the touch"
+        )
+
+    def short_of(speed: float) -> float:
+        return min(pair.reaction_s(force_n, speed), 2 * reaction_s + 1) - reaction_s
+
+    return root(short_of, slowest, fastest)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Pair:
+    """Foam and region in series, under an arm."""
+
+    pressing: Pressing
+    region: Region
+
+    def pressed_m(self, force_n: float) -> float:
+        """x(F)."""
+        return float((force_n / stiffness(self.pressing.ball)) ** (2 / 3) + force_n / self.region.spring_n_m)
+
+    def stored_j(self, force_n: float) -> float:
+        """W(F)."""
+        foam = 0.4 * force_n * (force_n / stiffness(self.pressing.ball)) ** (2 / 3)
+        return float(foam + force_n**2 / (2 * self.region.spring_n_m))
+
+    def fastest_m_s(self, force_n: float) -> float:
+        """With which a reaction at the touch itself keeps the force."""
+        braked = self.stored_j(force_n) + self.pressing.brake_n * self.pressed_m(force_n)
+        return math.sqrt(2 * braked / self.pressing.mass_kg)
+
+    def reaction_s(self, force_n: float, speed_m_s: float) -> float:
+        """The longest time to the reaction with which the force is never exceeded."""
+        arm, depth = self.pressing, self.pressed_m(force_n)
+        left = self.stored_j(force_n) - arm.mass_kg * speed_m_s**2 / 2
+        if left >= arm.push_n * depth:
+            return math.inf
+        if left + arm.brake_n * depth <= 0:
+            return 0.0
+        at_m = (left + arm.brake_n * depth) / (arm.push_n + arm.brake_n)
+        force = root(lambda force: self.pressed_m(force) - at_m, 0.0, force_n)
+        seconds = integral(lambda share: self._slowness(share, force, speed_m_s), 0.0, 1.0, 1e-12)
+        assert seconds is not None
+        return seconds
+
+    def _slowness(self, share: Floats, force_n: float, speed_m_s: float) -> Floats:
+        """dt/dshare in s at F = ``force_n`` share^3, by which everything is smooth from the touch on."""
+        arm, force = self.pressing, force_n * share**3
+        foam = (force_n / stiffness(arm.ball)) ** (2 / 3) * share**2
+        pressed = foam + force / self.region.spring_n_m
+        stored = 0.4 * force * foam + force**2 / (2 * self.region.spring_n_m)
+        square = speed_m_s**2 + 2 / arm.mass_kg * (arm.push_n * pressed - stored)
+        slope = 2 * (force_n / stiffness(arm.ball)) ** (2 / 3) * share
+        slope = slope + 3 * force_n / self.region.spring_n_m * share**2
+        return np.asarray(slope / np.sqrt(square))

@@ -1,0 +1,179 @@
+"""A FlexiTac sheet at a serial port: what its microcontroller sends, as the packets of a board.
+
+FlexiTac is an open sheet of 16x32 resistive cells (https://flexitac.github.io). Its firmware sends, without end and at
+2,000,000 baud, the bytes AA 55 and a reading from 0 to 255 of each cell, row by row, about 100 times per second. There
+are no numbers, times or checks among them. So a frame counts only if the next one's AA 55 follows it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from contactfpga.driver.address import Flexitac
+from contactfpga.driver.transport import SerialTransport
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
+from contactfpga.wire import framing
+from contactfpga.wire.framing import DELIMITER, KINDS, PacketError
+from contactfpga.wire.protocol import HEARD_DIGITS, KIND_REQUEST, REQUEST_HELLO, check_prefix, encode_hello
+
+MARK = b"\xaa\x55"
+"""Begins a frame."""
+BITS_PER_BYTE = 10
+"""On the line: with start and stop."""
+DAMAGED = b"\x01\x00"
+"""In place of bytes that are no frame: a packet that is counted as damaged."""
+
+
+class Framer:
+    """Cuts bytes into frames of ``size`` readings. It keeps no more than two frames of bytes."""
+
+    def __init__(self, size: int):
+        self._size = size + len(MARK)
+        self._rest = b""
+
+    def take(self, data: bytes) -> list[bytes | None]:
+        """The readings of all frames that ``data`` completes; None in place of bytes that are no frame."""
+        data = self._rest + data
+        found: list[bytes | None] = []
+        while len(data) >= self._size + len(MARK):
+            if data.startswith(MARK) and data.startswith(MARK, self._size):
+                found.append(data[len(MARK) : self._size])
+                data = data[self._size :]
+                continue
+            if not found or found[-1] is not None:
+                found.append(None)
+            begins = data.find(MARK, 1)
+            data = data[begins:] if begins > 0 else data[-1:]
+        self._rest = data
+        return found
+
+
+class Cells:
+    """Thresholds readings: a cell is pressed while it reads ``margin`` or more above its own rest, which is the median
+    of the first frames."""
+
+    def __init__(self, shape: tuple[int, int], frames: int, margin: int):
+        self._shape, self._frames, self._margin = shape, frames, margin
+        self._first: list[np.ndarray] = []
+        self._from: np.ndarray | None = None
+
+    def take(self, readings: bytes) -> np.ndarray | None:
+        """(rows, columns) bool; None as long as the rest is not known."""
+        values = np.frombuffer(readings, np.uint8).reshape(self._shape)
+        if self._from is None:
+            self._first.append(values)
+            if len(self._first) == self._frames:
+                self._from = np.median(self._first, axis=0) + self._margin
+                self._first = []
+            return None
+        pressed: np.ndarray = values >= self._from
+        return pressed
+
+
+@dataclasses.dataclass
+class Heard:
+    """The last request, and how many more frames may have begun before it came."""
+
+    number: int = 0
+    older: int = 0
+    shown: int = 0
+    """The number that frames carry."""
+
+
+class FlexitacPort:
+    """The port ``flexitac://PORT``. Raises what a serial port raises, and :class:`AddressError`."""
+
+    live = threaded = True
+
+    def __init__(self, name: str):
+        address = Flexitac.parse(name)
+        shape = address.rows, address.columns
+        self.name = name
+        self._skin = Skin(
+            rows=address.rows,
+            columns=address.columns,
+            pitch_x_mm=address.pitch_mm,
+            pitch_y_mm=address.pitch_mm,
+            report="cells",
+            baud=address.baud,
+        )
+        self._widths = Widths(self._skin.sheet)
+        self._framer = Framer(address.rows * address.columns)
+        self._cells = Cells(shape, address.frames, address.margin)
+        self._frame_s = (address.rows * address.columns + len(MARK)) * BITS_PER_BYTE / address.baud
+        self._heard = Heard()
+        self._sent = 0
+        self._out = bytearray()
+        self._port = SerialTransport(address.device, address.baud)
+        self._begun_s = self._port.clock()
+        self._time_us = 0
+
+    def read(self, timeout_s: float) -> bytes:
+        """Packets of the frames that came by then."""
+        data = self._port.read(0.0 if self._out else timeout_s)
+        frames = self._framer.take(data) if data else []
+        now_us = int((self._port.clock() - self._begun_s) * 1e6)
+        for number, readings in enumerate(frames):
+            later = (len(frames) - number) * self._frame_s
+            self._take(readings, max(self._time_us + 1, now_us - int(later * 1e6)))
+        found = bytes(self._out)
+        self._out.clear()
+        return found
+
+    def _take(self, readings: bytes | None, time_us: int) -> None:
+        if readings is None:
+            self._out += DAMAGED
+            return
+        cells = self._cells.take(readings)
+        self._heard.older -= 1
+        if self._heard.older == 0:
+            self._heard.shown = self._heard.number
+        self._time_us = time_us
+        if cells is not None:
+            self._out += self._packet(cells)
+            self._sent += 1
+
+    def write(self, data: bytes) -> None:
+        """Take requests of the host; the sheet itself gets nothing."""
+        for packet in data.split(bytes([DELIMITER])):
+            try:
+                plain = framing.unseal(packet, b"")
+            except PacketError:
+                continue  # the same request as pulses, or a command
+            if framing.kind_of(plain) != KIND_REQUEST:
+                continue
+            # Of the frames that come next one is on its way already, and one may wait in the adapter.
+            self._heard = Heard(framing.number(plain[:HEARD_DIGITS]), 3, self._heard.shown)
+            if plain[-1] & REQUEST_HELLO:
+                epoch = int((self._port.clock() - self._begun_s) * 1e6) >> EPOCH_BITS
+                self._out += encode_hello(self._skin, self._sent, epoch, self._heard.number)
+
+    def _packet(self, cells: np.ndarray) -> bytes:
+        """A frame of these cells, as on the wire."""
+        widths = self._widths
+        room = np.zeros((len(cells), 8 * widths.bitmap_row_bytes), bool)
+        room[:, : cells.shape[1]] = cells
+        word, low = 0, 0
+        fields = (
+            (self._time_us, TIME_BITS),
+            (self._sent, SEQUENCE_BITS),
+            (self._heard.shown, HEARD_BITS),
+            (int(cells.sum()), widths.area_bits),
+        )
+        for value, bits in fields:
+            word |= (value & (1 << bits) - 1) << low
+            low += bits
+        body = np.packbits(room, axis=1, bitorder="little").tobytes()
+        body += word.to_bytes(widths.trailer_bytes - 1, "little") + bytes([framing.last_byte(KINDS["cells"])])
+        return framing.seal(body, check_prefix(self._skin))
+
+    def clock(self) -> float:
+        """Of the computer."""
+        return self._port.clock()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._port.close()

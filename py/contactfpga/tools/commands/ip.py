@@ -1,0 +1,27 @@
+"""`contactfpga ip`: a Skin's gateware as Verilog for another design."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga import terminal
+from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, outputs
+
+EXTRA = "sim"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    flags.sheet(parser, "Skin of the core (default: the reference Skin).")
+    parser.add_argument("-o", "--output", metavar="DIR", default="build/ip", help="Folder (default: %(default)s).")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.verify import ip
+
+    file = flags.sheet_file(args)
+    for path in ip.write(Skin.load(file) if file else Skin(), outputs.folder(args.output)):
+        terminal.say(str(path))
+    return 0

@@ -1,0 +1,68 @@
+"""A FlexiTac sheet behind a pseudo-terminal: the bytes that its firmware sends of a scene, some lost and some wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+import tty
+from collections.abc import Callable
+
+import numpy as np
+
+ROWS, COLUMNS = 16, 32
+MARK = b"\xaa\x55"
+
+
+class FlexitacSheet:
+    """Sends ``hz`` frames per second to :attr:`port` inside ``with FlexitacSheet(scene) as sheet:``.
+
+    ``scene``: of the time in s, the (16, 32) force at each cell, from 0 to 1. A cell reads its own rest, up to 40, a
+    noise of 2, and 150 at force 1. ``lost``, ``wrong``: part of the bytes that do not come, or come as another one.
+    """
+
+    def __init__(
+        self,
+        scene: Callable[[float], np.ndarray],
+        hz: float = 100.0,
+        lost: float = 0.0,
+        wrong: float = 0.0,
+        seed: int = 0,
+    ):
+        self._scene, self._hz, self._lost, self._wrong = scene, hz, lost, wrong
+        self._rng = np.random.default_rng(seed)
+        self._rest = self._rng.integers(0, 40, (ROWS, COLUMNS))
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="FlexiTac", daemon=True)
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        """Path of the serial port."""
+        self.seconds = 0.0
+        """Time of the scene."""
+
+    def frame(self, seconds: float) -> bytes:
+        """What is sent of one frame; bytes are lost and wrong by chance."""
+        noise = self._rng.normal(0, 2, (ROWS, COLUMNS))
+        readings = np.clip(self._rest + noise + 150 * self._scene(seconds), 0, 255).astype(np.uint8)
+        sent = np.frombuffer(MARK + readings.tobytes(), np.uint8)
+        odd = self._rng.random(len(sent)) < self._wrong
+        sent = np.where(odd, self._rng.integers(0, 256, len(sent)), sent).astype(np.uint8)
+        return sent[self._rng.random(len(sent)) >= self._lost].tobytes()
+
+    def __enter__(self) -> FlexitacSheet:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        os.close(self._master)
+        os.close(self._slave)
+
+    def _run(self) -> None:
+        while not self._stopping.wait(1 / self._hz):
+            with contextlib.suppress(BlockingIOError):  # nobody reads
+                os.write(self._master, self.frame(self.seconds))
+            self.seconds += 1 / self._hz

@@ -1,0 +1,188 @@
+"""The foreign sheet FlexiTac: its bytes as zones, and what becomes of bytes that are lost or wrong."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+import contactfpga
+from contactfpga import Tracker
+from contactfpga.driver.address import Flexitac, parse
+from contactfpga.driver.flexitac import Cells, Framer
+from contactfpga.errors import AddressError, PortNotFound
+from contactfpga_sim.model.board.flexitac import MARK, FlexitacSheet
+
+PITCH_MM = 3.0
+
+
+class Touch:
+    """Discs of radius 2 cells at (row, column), from :meth:`begin` on."""
+
+    def __init__(self, *places, columns_per_s=0.0):
+        self.places, self.columns_per_s, self.since = places, columns_per_s, math.inf
+
+    def __call__(self, seconds):
+        rows, columns = np.mgrid[:16, :32]
+        force = np.zeros((16, 32))
+        for row, column in self.places if seconds >= self.since else ():
+            now = column + self.columns_per_s * (seconds - self.since)
+            force[(rows - row) ** 2 + (columns - now) ** 2 <= 4] = 1.0
+        return force
+
+
+def address_of(sheet):
+    return f"flexitac://{sheet.port}?frames=10"
+
+
+def frames_of(board, sheet, touch, count):
+    """The frame before a touch, and so many from then on."""
+    frames = [board.next(3.0)]
+    started = time.monotonic()
+    touch.since = sheet.seconds
+    frames += [board.next(3.0) for _ in range(count)]
+    assert (frames[-1].time_us - frames[0].time_us) / 1e6 == pytest.approx(time.monotonic() - started, abs=0.1)
+    return frames
+
+
+def test_two_touches_are_two_zones_where_they_are():
+    touch = Touch((4, 6), (10, 25))
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet)) as board:
+        assert (board.sheet.rows, board.sheet.columns, board.sheet.pitch_x_mm) == (16, 32, PITCH_MM)
+        frames, stats = frames_of(board, sheet, touch, 20), board.stats
+    assert len(frames[0]) == 0
+    assert [(zone.x_mm, zone.y_mm, zone.area_cells) for zone in frames[-1]] == [
+        (6 * PITCH_MM, 4 * PITCH_MM, 13),
+        (25 * PITCH_MM, 10 * PITCH_MM, 13),
+    ]
+    assert (stats.lost, sum(stats.damaged.values()), stats.unexplained) == (0, 0, 0)
+
+
+def test_zones_are_those_of_another_labeller_on_random_frames():
+    """Thresholds of each cell, and scipy's zones, by arithmetic that shares no code."""
+    rng = np.random.default_rng(1)
+    rest = rng.integers(0, 60, (16, 32))
+    cells = Cells((16, 32), frames=5, margin=15)
+    for _ in range(4):
+        assert cells.take(rest.astype(np.uint8).tobytes()) is None
+    assert cells.take(np.full((16, 32), 255, np.uint8).tobytes()) is None  # one odd frame moves no median
+    for _ in range(20):
+        pressed = rng.random((16, 32)) < 0.3
+        found = cells.take((rest + np.where(pressed, 15, 14)).astype(np.uint8).tobytes())
+        assert (found == pressed).all()
+        assert ndimage.label(found, np.ones((3, 3)))[1] == ndimage.label(pressed, np.ones((3, 3)))[1]
+
+
+def test_a_request_is_answered_by_a_frame_that_began_later():
+    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet)) as board:
+        board.next(3.0)
+        for _ in range(3):
+            asked = board.clock()
+            zones = board.read(2.0)
+            assert board.clock() - asked > 0.01  # a frame that was on its way is no answer
+        assert zones.time_us > 0
+
+
+def test_a_touch_that_slides_is_one_track():
+    tracker = Tracker()
+    touch = Touch((8, 4), columns_per_s=20.0)
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet)) as board:
+        frames = frames_of(board, sheet, touch, 50)
+    events = [(event.kind, event.id) for frame in frames for event in tracker.update(frame).events]
+    assert [event for event in events if event[0] != "move"] == [("down", 1)]
+    assert events.count(("move", 1)) > 3
+
+
+def test_a_recording_of_it_gives_the_same_zones(tmp_path):
+    file = tmp_path / "flexitac.rec"
+    touch = Touch((4, 6))
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file) as board:
+        seen = frames_of(board, sheet, touch, 20)
+    with contactfpga.open(f"replay://{file}") as board:
+        again = {zones.frame.sequence: zones.records.tolist() for zones in board}
+    assert {zones.frame.sequence: zones.records.tolist() for zones in seen}.items() <= again.items()
+    assert any(len(zones) for zones in seen)
+
+
+def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
+    """Of frames with 514 bytes, 1 of 2,000 bytes lost damages one in four."""
+    touch = Touch((8, 16))
+    with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet)) as board:
+        frames, stats = frames_of(board, sheet, touch, 60), board.stats
+    touched = [frame for frame in frames if len(frame)]
+    assert len(touched) > 40
+    assert all([(zone.x_mm, zone.y_mm) for zone in frame] == [(48.0, 24.0)] for frame in touched)
+    assert 5 < sum(stats.damaged.values()) < 40
+
+
+def test_a_wrong_byte_is_one_cell_of_one_frame_or_costs_the_frame():
+    framer, sheet = Framer(512), FlexitacSheet(Touch(), seed=3)
+    whole = [sheet.frame(0.0) for _ in range(200)]
+    stream = bytearray(b"".join(whole) + MARK)
+    rng = np.random.default_rng(2)
+    places = sorted(rng.choice(len(whole) * 514, 60, replace=False).tolist())
+    for place in places:
+        stream[place] ^= 0xFF
+    found = framer.take(bytes(stream))
+    kept = {frame for frame in found if frame is not None}
+    hit = {place // 514: place % 514 for place in places}
+    for number, frame in enumerate(whole):
+        if number not in hit and hit.get(number + 1, 2) >= 2:
+            assert frame[2:] in kept
+    marks = sum(place % 514 < 2 for place in places)
+    assert len(kept) >= 200 - 2 * marks - 1
+
+
+@pytest.mark.parametrize("size", [1, 7, 513, 514, 515, 4096])
+def test_frames_do_not_depend_on_how_bytes_are_cut(size):
+    sheet = FlexitacSheet(Touch(), lost=1 / 1500, seed=5)
+    stream = b"".join(sheet.frame(0.0) for _ in range(30))
+    whole = Framer(512).take(stream)
+    framer = Framer(512)
+    cut = [frame for at in range(0, len(stream), size) for frame in framer.take(stream[at : at + size])]
+    assert [one for one in cut if one is not None] == [one for one in whole if one is not None]
+    assert 5 < sum(one is not None for one in whole) < 30
+
+
+def test_noise_costs_bounded_memory_and_time():
+    framer, started = Framer(512), time.process_time()
+    for seed in range(20):
+        framer.take(np.random.default_rng(seed).integers(0, 256, 65_536, dtype=np.uint8).tobytes())
+        assert len(framer._rest) < 3 * 514
+    framer.take(MARK * 30_000)
+    assert time.process_time() - started < 5.0
+
+
+@pytest.mark.parametrize(
+    ("address", "meant"),
+    [
+        ("flexitac:///dev/ttyUSB0", Flexitac("/dev/ttyUSB0")),
+        ("flexitac://COM3?margin=20&pitch=2.5", Flexitac("COM3", margin=20, pitch_mm=2.5)),
+        ("flexitac:///dev/x?rows=12&frames=10&columns=32&baud=1000000", Flexitac("/dev/x", 15, 10, 3.0, 12, 32, 10**6)),
+    ],
+)
+def test_an_address_has_one_reading(address, meant):
+    assert parse(address) == meant
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("flexitac://", "it names no device"),
+        ("flexitac:///dev/x?marge=3", "'marge=3' is no option"),
+        ("flexitac:///dev/x?margin=0", "margin is '0'; it must be a whole number from 1 to 255"),
+        ("flexitac:///dev/x?margin=1.5", "margin is '1.5'; it must be a whole number"),
+        ("flexitac:///dev/x?pitch=nan", "pitch is 'nan'; it must be a number from 0.1 to 100"),
+        ("flexitac:///dev/x?rows=999", "rows is '999'; it must be a whole number from 1 to 64"),
+    ],
+)
+def test_what_is_no_address_is_told(address, message):
+    with pytest.raises(AddressError) as caught:
+        parse(address)
+    assert message in str(caught.value)
+
+
+def test_a_port_that_is_not_there_is_told():
+    with pytest.raises(PortNotFound, match="/dev/nowhere"):
+        contactfpga.open("flexitac:///dev/nowhere")
