@@ -126,8 +126,8 @@ MOVING = Knob(
         "`adaptive`": Rated(functools.partial(_moving, adaptive_skin(16, 16)), most=480),
     },
     helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time, `adaptive`",
-    unnoticed="a zone one pitch from its finger looks like one in its place; only where faster motion tears a frame is it "
-    "flagged",
+    unnoticed="a zone one pitch from its finger looks like one in its place; only where faster motion tears a frame is "
+    "it flagged",
 )
 
 DEBOUNCE_SCANS = 4
