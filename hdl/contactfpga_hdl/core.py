@@ -1,13 +1,30 @@
 """A Skin's gateware as a part of another design."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Module
-from amaranth.lib import wiring
+from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.top import Top
+from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.request import RequestReader
+from contactfpga_hdl.top import Top, receiver_of
 
 STREAM = {"m_axis_tdata": Out(8), "m_axis_tvalid": Out(1), "m_axis_tready": In(1), "m_axis_tlast": Out(1)}
+
+
+class StreamTop(Top):
+    """A Skin's gateware with ``bytes`` (out), a stream, in place of the transmit pin."""
+
+    LINE: ClassVar = {"bytes": Out(stream.Signature(8)), "rx": In(1, init=1)}
+
+    def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
+        receiver = self._put(m, "receiver", receiver_of(self.derived))
+        self._put(m, "request", request)
+        wiring.connect(m, link.bytes, wiring.flipped(self.bytes))
+        wiring.connect(m, receiver.bits, request.bits)
+        m.d.comb += receiver.pin.eq(self.rx)
 
 
 class Core(wiring.Component):
@@ -23,7 +40,7 @@ class Core(wiring.Component):
     """
 
     def __init__(self, skin: Skin):
-        self._top = Top(skin, streams=True)
+        self._top = StreamTop(skin)
         ports = {name: member for name, member in self._top.signature.members.items() if name != "bytes"}
         super().__init__({**ports, **STREAM})
 

@@ -1,6 +1,6 @@
 """The whole chain for one Skin; wiring only."""
 
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from amaranth.hdl import Module, Mux, ResetInserter, Signal, Value
 from amaranth.lib import data, stream, wiring
@@ -20,11 +20,8 @@ from contactfpga_hdl.scan.pins import column_pins, connect_pins, moves_sample, r
 
 _Stage = TypeVar("_Stage", bound=wiring.Component)
 
-_UART = {"tx": Out(1, init=1), "rx": In(1, init=1)}
-_STREAM = {"bytes": Out(stream.Signature(8)), "rx": In(1, init=1)}
-"""In its place in another design."""
 _SHARED = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "grant": In(1), "holds": Out(1)}
-"""In its place where several sheets share a UART."""
+"""In the place of :attr:`Top.LINE` where several sheets share it."""
 
 
 class Top(wiring.Component):
@@ -49,21 +46,14 @@ class Top(wiring.Component):
     is not from a register with ``fail_safe``.
 
     With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the
-    UART it has ``bits`` (in), ``bytes`` (out), and ``grant`` (in) and ``holds`` (out) of its link. With ``streams`` it
-    is a part of another design (:class:`~contactfpga_hdl.core.Core`): in place of tx it has ``bytes`` (out).
+    UART it has ``bits`` (in), ``bytes`` (out), and ``grant`` (in) and ``holds`` (out) of its link.
     """
 
-    def __init__(
-        self,
-        skin: Skin,
-        probes: bool = False,
-        copy: bool = False,
-        place: SheetPlace | None = None,
-        streams: bool = False,
-    ):
+    LINE: ClassVar = {"tx": Out(1, init=1), "rx": In(1, init=1)}
+
+    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False, place: SheetPlace | None = None):
         self.skin = skin
         self.place = place
-        self.streams = streams
         self.probes = probes
         self.copy = copy
         self._restarts = Signal(name="restarts")
@@ -72,7 +62,7 @@ class Top(wiring.Component):
             **row_pins(skin),
             **column_pins(skin),
             **_unit_pins(skin),
-            **(_STREAM if streams else _UART if place is None else _SHARED),
+            **(self.LINE if place is None else _SHARED),
             "contact": Out(1),
             **({"alive": Out(1)} if skin.alive else {}),
         }
@@ -139,16 +129,12 @@ class Top(wiring.Component):
     def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
         """Add what reads requests, and the UART, if it is this sheet's alone."""
         if self.place is None:
-            transmitter = None if self.streams else Transmitter(self.derived.bit_clocks)
-            if transmitter:
-                m.submodules.transmitter = transmitter
+            m.submodules.transmitter = transmitter = Transmitter(self.derived.bit_clocks)
             receiver = self._put(m, "receiver", receiver_of(self.derived))
             self._put(m, "request", request)
-            wiring.connect(m, link.bytes, transmitter.bytes if transmitter else wiring.flipped(self.bytes))
+            wiring.connect(m, link.bytes, transmitter.bytes)
             wiring.connect(m, receiver.bits, request.bits)
-            if transmitter:
-                m.d.comb += self.tx.eq(transmitter.pin)
-            m.d.comb += receiver.pin.eq(self.rx)
+            m.d.comb += [self.tx.eq(transmitter.pin), receiver.pin.eq(self.rx)]
             return
         self._put(m, "request", request)
         wiring.connect(m, link.bytes, wiring.flipped(self.bytes))
