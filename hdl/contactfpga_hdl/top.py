@@ -20,8 +20,7 @@ from contactfpga_hdl.scan.pins import column_pins, connect_pins, moves_sample, r
 
 _Stage = TypeVar("_Stage", bound=wiring.Component)
 
-_SHARED = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "grant": In(1), "holds": Out(1)}
-"""In the place of :attr:`Top.LINE` where several sheets share it."""
+_SHARED_LINE = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "grant": In(1), "holds": Out(1)}
 
 
 class Top(wiring.Component):
@@ -62,7 +61,7 @@ class Top(wiring.Component):
             **row_pins(skin),
             **column_pins(skin),
             **_unit_pins(skin),
-            **(self.LINE if place is None else _SHARED),
+            **(self.LINE if place is None else _SHARED_LINE),
             "contact": Out(1),
             **({"alive": Out(1)} if skin.alive else {}),
         }
