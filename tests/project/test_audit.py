@@ -47,8 +47,8 @@ def test_a_table_that_is_not_what_it_would_be_today_is_seen(project):
     assert (found.said, found.wrong) == ("differs", True)
 
 
-@pytest.mark.parametrize(("alive", "wrong"), [(0, 0), (2, 0), (3, 3)])
-def test_mutants_that_are_left_are_listed_and_more_than_two_are_wrong(monkeypatch, alive, wrong):
+@pytest.mark.parametrize(("alive", "wrong"), [(0, 0), (4, 0), (5, 5)])
+def test_mutants_that_are_left_are_listed_and_more_than_four_are_wrong(monkeypatch, alive, wrong):
     def examine(name, count, seed, long_s):
         fates = ["alive"] * alive + ["killed"] * (count - alive)
         mutant = Mutant(**{field.name: 0 if field.type == "int" else "x" for field in dataclasses.fields(Mutant)})
