@@ -77,7 +77,7 @@ def judged(claim: dict, results: dict[str, verification.Outcome]) -> Finding:
 
 
 def tables(rng: random.Random) -> list[Finding]:
-    """Parts of the pages' tables, made anew."""
+    """Compare parts of tables with what their commands give today."""
     every = [(study, name) for study in STUDIES.values() for name, section in study.sections.items() if section.sample]
     return [table(study, name) for study, name in rng.sample(every, DRAWN)]
 

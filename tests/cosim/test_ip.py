@@ -126,7 +126,10 @@ def test_yosys_reads_it_and_finds_nothing_wrong(written, name):
 
     folder = written(name)
     files = "read_verilog contactfpga_core.v example.v; read_verilog -sv -formal contactfpga_core_sva.sv"
-    native.yosys(f"{files}; hierarchy -check -top contactfpga_peripheral; proc; check -assert", folder)
+    native.yosys(
+        f"{files}; hierarchy -check -top contactfpga_peripheral; proc; check -assert; tee -o stat.txt stat", folder
+    )
+    assert "contactfpga_core" in (folder / "stat.txt").read_text()
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ class RegionLimits:
     transient_m_s: float
     """The speed that exerts it."""
     quasistatic_n: float
-    """The same where the region is clamped."""
+    """The most force where the region is clamped: by force, pressure and foam."""
     reaction_s: float
     """The longest time from the touch to the reaction, at the speed that was asked, which keeps it; infinite where the
     arm stops without any, 0 where even the earliest is too late."""

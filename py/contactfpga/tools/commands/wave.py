@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     for title, what in (
         ("waveform", f"{vcd}, {(touch.ends - touch.begins) * us:,.1f} us of a sheet of {skin.rows}x{skin.columns}"),
         ("touched", f"at {(touch.touched - touch.begins) * us:,.1f} us"),
-        ("frame is sent", f"at {(touch.ends - touch.begins) * us:,.1f} us, with {len(touch.zones)} zone(s)"),
+        ("frame is sent", f"at {(touch.ends - touch.begins) * us:,.1f} us, with {touch.zones.pressed} pressed cells"),
         ("golden model", f"the same in each of {touch.ends:,} clocks ({time.monotonic() - started:.0f} s)"),
         ("open it", f"gtkwave {vcd} {gtkw}"),
         ("or", f"surfer {vcd} --command-file {surfer}"),

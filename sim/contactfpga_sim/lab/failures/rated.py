@@ -22,7 +22,7 @@ SHARE = "share of draws that are right"
 """What :attr:`contactfpga_sim.lab.failures.knob.Outcome.amount` is here."""
 
 Draws = Callable[[float, np.random.Generator, int], Sequence[Outcome]]
-"""What comes out at a value of the knob for so many places, phases or whatever else is left to chance."""
+"""A function of the knob's value, random numbers and a count: it gives the outcomes of that many draws."""
 
 
 @dataclasses.dataclass(frozen=True)
