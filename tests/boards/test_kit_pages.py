@@ -5,6 +5,7 @@ import datetime
 import random
 import re
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +116,19 @@ def test_the_newest_entry_counts(tmp_path):
         predictions.added(text, {"settle_us": dataclasses.replace(ONE, value=1.5)})
     )
     assert predictions.load(kit)["settle_us"].value == 1.5
+
+
+def test_the_tutorial_lists_the_parts_of_the_starter_kit():
+    page = Path("docs/starter.md").read_text(encoding="utf-8")
+    kit = kits.kit("starter")
+    placed = lay_out(kit.skin, load_circuit(kit.skin_path)).drawing.placed
+    counted = Counter((one.part.order.split(",")[0], one.value) for one in placed)
+    wanted = sorted((count, float(value) if value.isdigit() else 0.0) for (_, value), count in counted.items())
+    rows = re.findall(r"^\| (\d+) \| [^|]* \| (?:(\d+) (k?)Ω )?\|$", page, re.MULTILINE)
+    assert sorted((int(count), float(ohm or 0) * (1000 if kilo else 1)) for count, ohm, kilo in rows) == wanted
+    beside = re.findall(r"^\| (\d+) \| ([^|]*) \|$", page, re.MULTILINE)
+    assert [int(count) for count, _ in beside] == [part.count for part in kit.parts]
+    assert all(part.number in what for part, (_, what) in zip(kit.parts, beside, strict=True))
 
 
 def test_the_pages_name_both_kits():

@@ -16,11 +16,12 @@ from contactfpga.tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ALL_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if ">>>" in page.read_text(encoding="utf-8"))
+EXAMPLE = re.compile(r"^ *(?:>>> |\$ contactfpga .*\n *\S)", re.MULTILINE)
+PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if EXAMPLE.search(page.read_text(encoding="utf-8")))
 
 
 def test_the_pages_have_examples():
-    assert {"README.md", "docs/use.md", "docs/skin.md"} <= set(PAGES)
+    assert {"README.md", "docs/use.md", "docs/skin.md", "docs/starter.md"} <= set(PAGES)
 
 
 SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/watch.md"}
@@ -51,6 +52,7 @@ def examples_of(page: Path) -> doctest.TestResults:
 def test_examples_print_what_they_say(page, tmp_path, monkeypatch):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
     results = examples_of(ROOT / page)
     assert results.attempted > 0
     assert results.failed == 0
