@@ -106,12 +106,14 @@ class Stage:
         self._draw_labels(moment)
         self._draw_arrows(self._forces(moment))
 
-    def draw_no_data(self) -> None:
-        """Dark cells and nothing on them: nobody knows what touches."""
+    def draw_no_data(self, arrows: np.ndarray | None = None) -> None:
+        """Dark cells and nothing on them but these forces: nobody knows what touches."""
         self._color(np.tile(np.array(picture.UNKNOWN, np.uint8), (len(self.tiles.points_mm), 1)))
         for handle in (*self._lines.values(), self._points, *self._labels, self._arrows):
             if handle is not None:
                 handle.visible = False
+        if arrows is not None:
+            self._draw_arrows(arrows)
 
     def _color(self, colors: np.ndarray) -> None:
         if self._colors is None or not np.array_equal(colors, self._colors):
