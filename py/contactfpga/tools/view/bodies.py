@@ -39,10 +39,11 @@ STEP_S = 0.04
 TOLD_S = 0.25
 TURN_RAD = 3.15
 
+OVERVIEW = "overview"
 ROBOT_SIDES = {
     name: Side(np.array(toward), np.array([0.0, 0.0, 1.0]))
     for name, toward in {
-        "overview": (0.85, 0.35, 0.35),
+        OVERVIEW: (0.85, 0.35, 0.35),
         "front": (1.0, 0.0, 0.1),
         "side": (0.0, 1.0, 0.1),
         "back": (-1.0, 0.0, 0.1),
@@ -151,7 +152,7 @@ class RobotView(abc.ABC):
         """``points``: (n, 3) in m, what cameras are to hold."""
         page.dress(server)
         light(server, (1.0, -0.5, 1.0))
-        self.cameras = Cameras(server, ROBOT_SIDES, points)
+        self.cameras = Cameras(server, dict(ROBOT_SIDES), points)
         self._stepped_s = self._told_s = 0.0
         self._rows: list[contacts.Row] = []
         self._table = server.gui.add_html(contacts.table(()))

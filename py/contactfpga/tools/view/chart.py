@@ -41,7 +41,7 @@ def chart(strip: Strip) -> str:
 def force_chart(forces_n: np.ndarray, seconds: float, curves: Sequence[tuple[int, str]]) -> str:
     """SVG of (curves, n) forces in N over so many seconds from a touch on, nan where nothing is known yet; ``curves``:
     of each the number of its color and dashes in :data:`FORCES`, and its name."""
-    most = top(np.nan_to_num(forces_n), 5)
+    most = top(np.nan_to_num(forces_n), 5, (1, 2, 3, 4, 6, 8, 10))
     shift = LEGEND * len(curves) - TOP + 18
     parts = []
     for line, (style, name) in enumerate(curves):
@@ -66,11 +66,11 @@ def _svg(parts: Sequence[str], height: float, label: str) -> str:
     )
 
 
-def top(values: np.ndarray, least: int) -> int:
-    """1, 2 or 5 times a power of ten, at least the largest value: the axis changes seldom."""
+def top(values: np.ndarray, least: int, steps: Sequence[int] = (1, 2, 5, 10)) -> int:
+    """One of the steps times a power of ten, at least the largest value: the axis changes seldom."""
     wanted = max(least, math.ceil(values.max(initial=0.0)))
     power = int(10 ** (len(str(wanted)) - 1))
-    return next(times * power for times in (1, 2, 5, 10) if times * power >= wanted)
+    return next(times * power for times in steps if times * power >= wanted)
 
 
 def _signed(number: float) -> str:

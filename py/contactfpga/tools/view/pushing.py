@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga.tools.view import chart, contacts, obstacle
-from contactfpga.tools.view.bodies import DrawnRobot, RobotView, pushes, told
+from contactfpga.tools.view.bodies import OVERVIEW, ROBOT_SIDES, DrawnRobot, RobotView, pushes, told
 from contactfpga.tools.view.cameras import Side
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import MOST_N, shortened
@@ -23,6 +23,10 @@ PUSH_N = 5.0
 """Of the mouse's finger, at first."""
 APART = 2.3
 """From one copy to the next, in radii of a robot as it starts."""
+ABOVE = 0.1
+"""A copy's name over it, in the same."""
+ABREAST = Side(np.array([1.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]))
+"""Where one looks from at several."""
 
 
 class SimulatedView(RobotView):
@@ -65,12 +69,14 @@ class SimulatedView(RobotView):
         for number, (stage, copy) in enumerate(zip(self._stages, copies)):
             stage.shift(np.array([0.0, APART * radius * (number - (len(copies) - 1) / 2), 0.0]))
             stage.place(copy.poses())
+            self._names[number].position = (0.0, 0.0, float(self.stage.points_m()[:, 2].max()) + ABOVE * radius)
+            self._names[number].visible = len(copies) > 1
 
     def _add_stage(self) -> None:
         node = f"{ROOT}{len(self._stages)}"
         stage = RobotStage(self._server, self._source.body, self._source.solids(), node)
         self._stages.append(stage)
-        self._names.append(self._server.scene.add_label(f"{node}/skin", "", font_screen_scale=0.9))
+        self._names.append(self._server.scene.add_label(f"{node}/skin", "", anchor="bottom-center", font_screen_scale=0.9))
         for name, hand in self.hands.items():
             stage.stages[name].press_with(hand)
         for kind in (obstacle.BALL, obstacle.HAND):
@@ -100,17 +106,17 @@ class SimulatedView(RobotView):
         return [row for number in range(len(self._drawn)) for row in self._draw(number)]
 
     def _look_again(self) -> None:
-        """Cameras hold all copies, from where they looked."""
+        """Cameras hold all copies."""
+        sides = self.cameras.sides
+        sides[OVERVIEW] = ROBOT_SIDES[OVERVIEW] if len(self._drawn) == 1 else ABREAST
         for client in self._server.get_clients().values():
-            camera = client.camera
-            self.cameras.look(camera, Side(camera.position - camera.look_at, camera.up_direction))
+            self.cameras.show(client, OVERVIEW)
 
     def _draw(self, number: int) -> list[contacts.Row]:
         """One of the copies."""
         copy, robot, name = self._drawn[number], self._robots[number], self._names[number]
         robot.stage.place(copy.poses())
         several = len(self._drawn) > 1
-        name.visible = several
         if several:
             name.text = f"{copy.skin}: at most {max(copy.most_n.values()):.1f} N"
         rows = []
@@ -162,6 +168,9 @@ class SimulatedView(RobotView):
         self._source.obstacle.put(kind, obstacle.AWAY_M if kind == obstacle.NOTHING else ahead)
         for stage in self._stages:
             self._show_obstacle(stage)
+            stage.place(self._source.copies[0].poses())
+        for client in self._server.get_clients().values():
+            self.cameras.fit(client.camera)
 
     def tell(self) -> None:
         super().tell()

@@ -168,8 +168,9 @@ class SimulatedSource:
         """As :attr:`skin` says; new ones after each start."""
         self.links = {name: SharedLink() for name in self.body.links}
         self.obstacle = obstacle.Obstacle()
-        self._simulated_s = 0.0
-        self.pace = SimulatedPace(self._simulated_s)
+        self.simulated_s = 0.0
+        """In all, over all starts."""
+        self.pace = SimulatedPace(self.simulated_s)
         self._restart()
 
     def restart(self) -> None:
@@ -203,12 +204,12 @@ class SimulatedSource:
         if self._stale:
             self._restart()
         pace = self.pace
-        began_s, began = self._simulated_s, time.monotonic()
+        began_s, began = self.simulated_s, time.monotonic()
         until_s = began_s + min(pace.due(began_s), pace.most_s)
-        while self._simulated_s < until_s - 1e-9:
+        while self.simulated_s < until_s - 1e-9:
             self._step()
-        if self._simulated_s > began_s:
-            pace.ran(self._simulated_s - began_s, time.monotonic() - began)
+        if self.simulated_s > began_s:
+            pace.ran(self.simulated_s - began_s, time.monotonic() - began)
 
     def _step(self) -> None:
         """All copies feel the same fingers and the same obstacle."""
@@ -218,8 +219,8 @@ class SimulatedSource:
         for copy in self.copies:
             self.obstacle.place(self._model, copy.sheets.data)
             copy.step(fingers)
-        self._simulated_s += step_s
-        self.sweep.add(self._simulated_s, [max(map(copy.force_n, copy.sheets)) for copy in self.copies])
+        self.simulated_s += step_s
+        self.sweep.add(self.simulated_s, [max(map(copy.force_n, copy.sheets)) for copy in self.copies])
 
     @property
     def share(self) -> float:
