@@ -1,17 +1,18 @@
 """The entry point of the command `contactfpga`, also as ``python -m contactfpga``."""
 
-import sys
+from typing import NoReturn
 
 from contactfpga.tools.console import signals
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Run the command; a signal ends it quietly also while it is still being loaded."""
     signals.end_all_at_once()
     from contactfpga.tools import cli
+    from contactfpga.tools.console import interrupt
 
-    return cli.main()
+    interrupt.leave(cli.main())
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

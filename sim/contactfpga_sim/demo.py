@@ -242,4 +242,4 @@ def _available(engine: str) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

@@ -16,7 +16,7 @@ from contactfpga.tools import cli
 from contactfpga_sim.lab import latency
 from contactfpga_sim.lab.finger import host, stages
 from contactfpga_sim.lab.finger.host import HostShare
-from contactfpga_sim.lab.spread import Times
+from contactfpga_sim.lab.spread import MixedTimes
 from contactfpga_sim.lab.usb import BridgeSettings
 
 FILE = str(examples() / "fast.toml")
@@ -174,7 +174,7 @@ def test_touches_that_were_not_played_in_time_are_left_out(monkeypatch):
 
 def test_all_rows_and_the_picture(run, tmp_path, monkeypatch):
     """With a host whose times are known."""
-    times = Times.of([100.0, 300.0])
+    times = MixedTimes.of([100.0, 300.0])
     share = HostShare(times.spread(), 2, 1, "a machine, 2 cores", times)
     monkeypatch.setattr(host, "measured", lambda *_: share)
     picture = tmp_path / "stages.svg"

@@ -85,12 +85,35 @@ def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
     assert process.returncode in {STATUSES[number]} | at_their_end, errors
 
 
+CUTS_OFF = """
+import importlib.abc, importlib.machinery, os, sys
+class Finder(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name != "LIBRARY":
+            return None
+        spec = importlib.machinery.PathFinder.find_spec(name, path)
+        spec.loader.exec_module = lambda module: [os.kill(os.getpid(), NUMBER), *range(100)]
+        return spec
+sys.meta_path.insert(0, Finder())
+"""
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("library", ["matplotlib.ft2font", "matplotlib._path"])
+def test_a_signal_while_a_library_of_c_plus_plus_loads(library, number, tmp_path):
+    """At the end of Python, ft2font's destructors would abort the process."""
+    (tmp_path / "sitecustomize.py").write_text(CUTS_OFF.replace("LIBRARY", library).replace("NUMBER", str(int(number))))
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, "-m", "contactfpga", "plot", "nothing.mcap"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(PYTHONPATH=path))
+    assert (done.returncode, done.stderr) == (STATUSES[number], "")
+
+
 STARTS = """
-import sys
 from contactfpga.tools.console import interrupt, signals
 WORK
 signals.end_all_at_once()
-sys.exit(interrupt.guarded(body))
+interrupt.leave(interrupt.guarded(body))
 """
 BROKEN = {
     "dropped": """

@@ -446,7 +446,7 @@ def test_walls_and_rivals_are_drawn_as_such():
     floor = Interval(0.77, 0.7, 0.8, 400)
     points = [dataclasses.replace(one, least_mm=floor) if one.task.method == build else one for one in points]
     found = {name: Interval(0.1, 0.05, 0.2, 400) for name in errors.METRICS}
-    rival = beside.Rival("analog array", "fingers", errors.Quantile(7e3, 6e3, 8e3, 200), found)
+    rival = beside.RivalMethod("analog array", "fingers", errors.Quantile(7e3, 6e3, 8e3, 200), found)
     count, place = front_picture.picture(points, [rival]).axes
     assert "analog array, model" in {text.get_text() for text in count.texts}
     bits = beside.bits_us([one for one in points if one.task.family == "fingers"])

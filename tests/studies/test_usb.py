@@ -10,7 +10,7 @@ from bridge_oracle import brute
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import Bridge
-from contactfpga_sim.lab.spread import Spread, Times, summed
+from contactfpga_sim.lab.spread import MixedTimes, Spread, summed
 from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings, ByteStream, delivered
 
 MHZ = 12
@@ -188,20 +188,20 @@ def test_what_cannot_be_told_is_refused():
 
 
 def test_quantiles_of_single_times_and_of_spread_ones():
-    assert Times.of([4.0, 1.0, 2.0, 3.0]).spread() == Spread(2.5, 4.0, 4.0)
-    assert Times.of([5.0]).spread() == Spread(5.0, 5.0, 5.0)
-    even = Times(np.array([0.0, 10.0]), np.array([2.0, 10.0]), np.array([0.5, 0.5]))
+    assert MixedTimes.of([4.0, 1.0, 2.0, 3.0]).spread() == Spread(2.5, 4.0, 4.0)
+    assert MixedTimes.of([5.0]).spread() == Spread(5.0, 5.0, 5.0)
+    even = MixedTimes(np.array([0.0, 10.0]), np.array([2.0, 10.0]), np.array([0.5, 0.5]))
     assert even.quantile(0.25) == pytest.approx(1.0)
     assert even.quantile(0.5) == pytest.approx(6.0), "the middle of the gap"
     assert even.quantile(0.51) == 10.0
     assert even.share(np.array([-1.0, 1.0, 5.0, 10.0, 11.0])).tolist() == pytest.approx([0, 0.25, 0.5, 1, 1])
-    both = Times.mixed([even, Times.of([20.0])])
+    both = MixedTimes.mixed([even, MixedTimes.of([20.0])])
     assert both.weight.sum() == pytest.approx(1)
     assert both.worst == 20.0
 
 
 def test_a_sum_is_that_of_all_pairs():
-    one, other = Times(np.array([0.0]), np.array([8.0]), np.array([1.0])), Times.of([1.0, 3.0])
+    one, other = MixedTimes(np.array([0.0]), np.array([8.0]), np.array([1.0])), MixedTimes.of([1.0, 3.0])
     places = np.add.outer((np.arange(20_000) + 0.5) / 2500, [1.0, 3.0])
     for share in (0.1, 0.5, 0.99):
         assert summed(one, other, share) == pytest.approx(np.quantile(places, share), abs=1e-3)

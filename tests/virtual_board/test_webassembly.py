@@ -46,7 +46,7 @@ def both():
         if webassembly.file(compiled.carried_key(skin)) is None:
             pytest.skip("the package carries no board of these sources: python -m contactfpga_sim.carried")
         made.extend((CompiledBoard(skin, CAPTURABLE), CompiledBoard(skin, CAPTURABLE, model_of(skin))))
-        assert [type(board._library) for board in made] == [webassembly.Library, native.Library]
+        assert [type(board._library) for board in made] == [webassembly.WebAssemblyLibrary, native.Library]
         return tuple(made)
 
     yield make
@@ -305,7 +305,7 @@ def test_the_c_header_decodes_as_python_does(both):
     received = board.take("received")["data"].astype(np.uint8).tobytes()
     arrived = (one for one in Conversation("replay", live=False).receive(received, 0.0) if isinstance(one, Arrival))
     python = [[(zone.area_cells, zone.x_mm, zone.y_mm) for zone in one.zones] for one in arrived]
-    decoder = webassembly.Library(webassembly.path_of(carried.DECODER))
+    decoder = webassembly.WebAssemblyLibrary(webassembly.path_of(carried.DECODER))
     decoder.zone_x_mm.restype = decoder.zone_y_mm.restype = ctypes.c_double
     decoder.decode_init()
     found = []

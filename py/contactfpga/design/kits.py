@@ -20,7 +20,7 @@ class KitError(ContactFPGAError, ValueError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Part:
+class KitPart:
     """Something to buy that is not on the sheet's own board."""
 
     count: int
@@ -37,7 +37,7 @@ class Kit:
     name: str
     title: str
     board: BoardSpec
-    parts: tuple[Part, ...]
+    parts: tuple[KitPart, ...]
     folder: Path
 
     @property
@@ -67,5 +67,5 @@ def kit(name: str) -> Kit:
         raise KitError(f"{shown(name)} is no kit; take one of {', '.join(names())}")
     folder = examples() / "kits" / name
     values = tomlfile.load(folder / "kit.toml", KitError)
-    parts = tuple(Part(**tomlfile.fields_of(Part, "part", part, KitError)) for part in values.get("part", ()))
+    parts = tuple(KitPart(**tomlfile.fields_of(KitPart, "part", part, KitError)) for part in values.get("part", ()))
     return Kit(name, values["title"], find(values["board"]), parts, folder)

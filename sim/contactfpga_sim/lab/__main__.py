@@ -133,4 +133,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

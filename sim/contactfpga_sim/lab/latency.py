@@ -10,7 +10,7 @@ import numpy as np
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.spread import Spread, Times
+from contactfpga_sim.lab.spread import MixedTimes, Spread
 from contactfpga_sim.lab.usb import ByteStream
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import ReceivedFrame, Receiver
@@ -128,7 +128,7 @@ def measure(
 
 
 def _spread(clocks: list[int], skin: Skin) -> Spread:
-    return Times.of([count / (skin.clock_hz / 1e6) for count in clocks]).spread()
+    return MixedTimes.of([count / (skin.clock_hz / 1e6) for count in clocks]).spread()
 
 
 class Bench:

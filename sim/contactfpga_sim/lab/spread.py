@@ -21,7 +21,7 @@ class Spread:
     worst: float
 
 
-class Times:
+class MixedTimes:
     """A mixture of times in us, each spread evenly from ``low`` to ``high`` (the same: exactly then), with weights
     whose sum is 1."""
 
@@ -29,13 +29,13 @@ class Times:
         self.low, self.high, self.weight = low, high, weight
 
     @classmethod
-    def of(cls, times: Sequence[float]) -> Times:
+    def of(cls, times: Sequence[float]) -> MixedTimes:
         """Single times, each as likely as the others."""
         found = np.array(times, float)
         return cls(found, found, np.full(len(found), 1 / len(found)))
 
     @classmethod
-    def mixed(cls, parts: Iterable[Times]) -> Times:
+    def mixed(cls, parts: Iterable[MixedTimes]) -> MixedTimes:
         """Each of the parts, as likely as the others."""
         parts = list(parts)
         low, high, weight = (
@@ -43,9 +43,9 @@ class Times:
         )
         return cls(low, high, weight / len(parts))
 
-    def later(self, us: float) -> Times:
+    def later(self, us: float) -> MixedTimes:
         """The same, all later by this."""
-        return Times(self.low + us, self.high + us, self.weight)
+        return MixedTimes(self.low + us, self.high + us, self.weight)
 
     def share(self, us: np.ndarray) -> np.ndarray:
         """The share of times that are at most each of these."""
@@ -96,7 +96,7 @@ class Times:
         return edges, right - jumps, right
 
 
-def summed(one: Times, other: Times, share: float) -> float:
+def summed(one: MixedTimes, other: MixedTimes, share: float) -> float:
     """The quantile of a sum of two times that do not depend on each other; ``other`` are single times."""
     low, high = float(one.low.min() + other.low.min()), one.worst + other.worst
     while high - low > 1e-6:

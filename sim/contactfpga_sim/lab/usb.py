@@ -26,7 +26,7 @@ import numpy as np
 
 from contactfpga.boards.spec import Bridge
 from contactfpga.driver.health import EVENT_CHAR, LATENCY_MS
-from contactfpga_sim.lab.spread import Times
+from contactfpga_sim.lab.spread import MixedTimes
 
 STATUS_BYTES = 2
 """At the beginning of each packet (AN232B-04)."""
@@ -122,7 +122,7 @@ class ByteStream(NamedTuple):
     """and not later than this."""
 
 
-def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte: int) -> Times:
+def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte: int) -> MixedTimes:
     """When the byte with this number is with the host, in us from the stream's origin, over all phases of the chip
     against the board, each as likely as the others.
 
@@ -134,7 +134,7 @@ def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte:
     sent, bus_us = phases.sent(byte)
     us_per_tick = 1e6 / (clock_hz * _TICKS_PER_CLOCK)
     middles, half = sent * us_per_tick + bus_us, phases.widths * us_per_tick / 2
-    return Times(middles - half, middles + half, phases.widths / phases.widths.sum())
+    return MixedTimes(middles - half, middles + half, phases.widths / phases.widths.sum())
 
 
 class _Phases:

@@ -36,7 +36,7 @@ class WaveError(ContactFPGAError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Touch:
+class SimulatedTouch:
     """A touch that was simulated, in clocks from power-up."""
 
     begins: int
@@ -59,7 +59,7 @@ def finger(skin: Skin) -> np.ndarray:
     return cells
 
 
-def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> Touch:
+def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> SimulatedTouch:
     """Press these (rows, columns) bool cells in the middle of a scan, once the board has said hello; write the
     waveform.
 
@@ -81,7 +81,7 @@ def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> Touch:
         begins = touched - scan - scan // 2
         with whole.open(encoding="ascii") as lines:
             write_text(vcd, "".join(cut(lines, begins * FS // skin.clock_hz)))
-    return Touch(begins, touched, ends, zones, trace)
+    return SimulatedTouch(begins, touched, ends, zones, trace)
 
 
 def _hello(skin: Skin) -> int:

@@ -146,7 +146,7 @@ _C = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 _ERROR = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 
 
-class Step(NamedTuple):
+class CompressionStep(NamedTuple):
     """A moment of a compression."""
 
     time_s: float
@@ -170,7 +170,7 @@ def compress(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -
     return last.indentation_m, last.time_s
 
 
-def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> list[Step]:
+def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> list[CompressionStep]:
     """Every accepted step from the touch to the end of the compression, where the speed is 0."""
     positive("stiffness", stiffness, "N/m^1.5")
     if not 1e-13 <= rtol <= 1e-2:
@@ -195,23 +195,23 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
     if push < 0:
         length = min(length, -arm.mass_kg * speed**2 / (2 * push))
     pace = max(speed, math.sqrt(max(push, 0.0) * length / arm.mass_kg))
-    found = [Step(0.0, 0.0, speed)]
+    found = [CompressionStep(0.0, 0.0, speed)]
     for time, state in _walk(over_time, 0.0, (0.0, speed), length / pace / 50, rtol, (length, pace)):
         if state[1] <= 0:
             break
-        found.append(Step(time, *state))
+        found.append(CompressionStep(time, *state))
     last = found[-1]
     # At the start of that step the arm may still be pushed on; only where it is slowed, v can be what time is told by.
     while pull(last.indentation_m) >= -1e-3 * abs(pull(state[0])):
         short = (time - last.time_s) / 8
         state = _one(over_time, last.time_s, (last.indentation_m, last.speed_m_s), short)[0]
-        last = Step(last.time_s + short, *state)
+        last = CompressionStep(last.time_s + short, *state)
         found.append(last)
     at = last.indentation_m, last.time_s
     left = -last.speed_m_s / pull(last.indentation_m)
     scale = last.indentation_m + left * last.speed_m_s, last.time_s + left
     for slower, (depth, seconds) in _walk(over_speed, last.speed_m_s, at, -last.speed_m_s, rtol, scale, 0.0):
-        found.append(Step(seconds, depth, slower))
+        found.append(CompressionStep(seconds, depth, slower))
     return found
 
 

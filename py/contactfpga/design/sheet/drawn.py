@@ -44,7 +44,7 @@ def rounded(value: float) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class Placed:
+class PlacedPart:
     """A part on the board."""
 
     reference: str
@@ -72,7 +72,7 @@ class Placed:
 
 
 @dataclasses.dataclass(frozen=True)
-class Track:
+class CopperTrack:
     """A straight piece of copper with round ends."""
 
     x1: float
@@ -123,8 +123,8 @@ class Drawing:
     files."""
 
     def __init__(self) -> None:
-        self.placed: list[Placed] = []
-        self.tracks: list[Track] = []
+        self.placed: list[PlacedPart] = []
+        self.tracks: list[CopperTrack] = []
         self.vias: list[Via] = []
         self.strokes: list[Stroke] = []
         self.holes: list[Hole] = []
@@ -141,10 +141,10 @@ class Drawing:
         nets: dict[str, str],
         turn: int = 0,
         back: bool = True,
-    ) -> Placed:
+    ) -> PlacedPart:
         """Add a part; its reference is the letter with the next number."""
         self._counts[letter] = number = self._counts.get(letter, 0) + 1
-        one = Placed(f"{letter}{number}", part, value, rounded(place[0]), rounded(place[1]), turn, back, nets)
+        one = PlacedPart(f"{letter}{number}", part, value, rounded(place[0]), rounded(place[1]), turn, back, nets)
         self.placed.append(one)
         for x1, y1, x2, y2 in part.marks:
             self.stroke(*one.spot(x1, y1), *one.spot(x2, y2), "B" if back else "F")
@@ -155,7 +155,7 @@ class Drawing:
         spots = [(rounded(x), rounded(y)) for x, y in points]
         for a, b in itertools.pairwise(spots):
             if a != b:
-                self.tracks.append(Track(*a, *b, layer, net, width))
+                self.tracks.append(CopperTrack(*a, *b, layer, net, width))
 
     def via(self, net: str, x: float, y: float) -> None:
         """Add a via."""

@@ -16,7 +16,7 @@ from contactfpga.design.sheet.drawn import (
     VIA_MM,
     Drawing,
     Layer,
-    Placed,
+    PlacedPart,
 )
 from contactfpga.design.sheet.parts import Pad
 
@@ -43,7 +43,7 @@ def files(drawing: Drawing, name: str) -> dict[str, str]:
     return found
 
 
-def on_layer(pad: Pad, one: Placed, layer: Layer) -> bool:
+def on_layer(pad: Pad, one: PlacedPart, layer: Layer) -> bool:
     """Whether a pad has copper there."""
     return bool(pad.drill) or one.back == (layer == "B")
 
@@ -78,7 +78,7 @@ class _Plot:
             lines += [f"D{code}*", *self.drawn[shape]]
         return "\n".join([*lines, "M02*"]) + "\n"
 
-    def _pad(self, one: Placed, pad: Pad, grown: float) -> None:
+    def _pad(self, one: PlacedPart, pad: Pad, grown: float) -> None:
         w, h = (size + 2 * grown for size in one.size(pad))
         self.flash(f"C,{w:.6f}" if pad.round else f"R,{w:.6f}X{h:.6f}", *one.spot(pad.x, pad.y))
 

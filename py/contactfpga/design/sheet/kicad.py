@@ -21,7 +21,7 @@ from contactfpga.design.sheet.drawn import (
     VIA_DRILL_MM,
     VIA_MM,
     Drawing,
-    Placed,
+    PlacedPart,
     rounded,
 )
 
@@ -89,7 +89,7 @@ class _Writer:
         yield from self._graphics()
         yield ")"
 
-    def _footprint(self, one: Placed) -> Iterator[str]:
+    def _footprint(self, one: PlacedPart) -> Iterator[str]:
         side = "B" if one.back else "F"
         name, stamp = one.reference, self.stamp
         at = _form("at", _mm(one.x + self.dx), _mm(one.y + self.dy), one.turn)

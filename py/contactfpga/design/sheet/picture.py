@@ -6,7 +6,7 @@ import collections
 from collections.abc import Iterable, Iterator, Sequence
 
 from contactfpga import picture_style
-from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, Drawing, Layer, Stroke, Track
+from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, CopperTrack, Drawing, Layer, Stroke
 from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
@@ -74,7 +74,7 @@ def _dots(dots: Iterable[tuple[float, float, float]], color: str) -> Iterator[st
         yield f'<path stroke="{color}" stroke-width="{diameter:g}" d="{"".join(words)}"/>'
 
 
-def _path(lines: Sequence[Track | Stroke]) -> str:
+def _path(lines: Sequence[CopperTrack | Stroke]) -> str:
     """Joins lines that follow on each other."""
     words, last = [], None
     for line in lines:

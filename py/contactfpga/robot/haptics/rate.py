@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Layout:
+class UnitLayout:
     """Units with a name."""
 
     name: str
@@ -61,28 +61,28 @@ TILTS = tuple(range(30, 80, 5))
 """Degrees that :func:`on_cylinder` scans."""
 
 
-def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[Layout]:
+def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[UnitLayout]:
     """Arrangements on rings of this radius, in m, in a cylinder that is touched from z = ``low_m`` to ``high_m``."""
     middle, quarter = (low_m + high_m) / 2, (high_m - low_m) / 4
     found = []
     for degrees in TILTS:
         tilt = math.radians(degrees)
         found += [
-            Layout(f"hexapod at mid-length, {degrees} degrees", hexapod(radius_m, tilt, middle)),
-            Layout(f"hexapod at one end, {degrees} degrees", hexapod(radius_m, tilt, low_m)),
-            Layout(
+            UnitLayout(f"hexapod at mid-length, {degrees} degrees", hexapod(radius_m, tilt, middle)),
+            UnitLayout(f"hexapod at one end, {degrees} degrees", hexapod(radius_m, tilt, low_m)),
+            UnitLayout(
                 f"two rings at the quarters, {degrees} degrees",
                 two_rings(radius_m, tilt, middle - quarter, middle + quarter),
             ),
-            Layout(f"two rings at the ends, {degrees} degrees", two_rings(radius_m, tilt, low_m, high_m)),
+            UnitLayout(f"two rings at the ends, {degrees} degrees", two_rings(radius_m, tilt, low_m, high_m)),
         ]
     return found
 
 
-def on_plane(radius_m: float, height_m: float) -> list[Layout]:
+def on_plane(radius_m: float, height_m: float) -> list[UnitLayout]:
     """Arrangements on a ring of this radius, in m, under a flat bumper whose outside is at z = ``height_m``."""
-    tilts = [Layout(f"hexapod, {degrees} degrees", hexapod(radius_m, math.radians(degrees))) for degrees in TILTS]
-    return [Layout("3 on a plane", tripod(radius_m)), *tilts]
+    tilts = [UnitLayout(f"hexapod, {degrees} degrees", hexapod(radius_m, math.radians(degrees))) for degrees in TILTS]
+    return [UnitLayout("3 on a plane", tripod(radius_m)), *tilts]
 
 
 AROUND = 24
@@ -163,7 +163,7 @@ class Requirements:
 class Rating:
     """Figures of an arrangement, each for the worst place unless it says otherwise."""
 
-    layout: Layout
+    layout: UnitLayout
     bears_n: float
     """What a single unit must bear."""
     sigma_n: float
@@ -191,7 +191,7 @@ def compared(needs: Requirements, radius_m: float) -> list[Rating]:
     return sorted(found, key=lambda rating: rating.place_m)
 
 
-def rate(needs: Requirements, layout: Layout) -> Rating | None:
+def rate(needs: Requirements, layout: UnitLayout) -> Rating | None:
     """The rating of an arrangement; None where the units cannot hold the loads."""
     cells = layout.cells
     sees_friction = cells.rank == 6

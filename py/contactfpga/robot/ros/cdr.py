@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from contactfpga.robot.ros.types import PRIMITIVES, Field, message_type
+from contactfpga.robot.ros.types import PRIMITIVES, MessageField, message_type
 
 HEAD = b"\x00\x01\x00\x00"
 """What the bytes are: plain CDR, lowest byte first."""
@@ -44,9 +44,9 @@ def _puts(name: str) -> tuple[_Put, ...]:
     return tuple(puts)
 
 
-def _leaves(name: str, path: _Path) -> list[tuple[_Path, Field | None]]:
+def _leaves(name: str, path: _Path) -> list[tuple[_Path, MessageField | None]]:
     """Fields in order, with those of nested messages in their place."""
-    found: list[tuple[_Path, Field | None]] = []
+    found: list[tuple[_Path, MessageField | None]] = []
     for field in message_type(name).fields:
         where = (*path, field.name)
         found += _leaves(field.type, where) if field.nested and field.count is None else [(where, field)]
@@ -74,7 +74,7 @@ def _aligned(letters: str, offset: int) -> struct.Struct:
     return struct.Struct(form)
 
 
-def _put_field(path: _Path, field: Field, out: bytearray, message: Message) -> None:
+def _put_field(path: _Path, field: MessageField, out: bytearray, message: Message) -> None:
     value = _at(message, path)
     if field.count is None:
         _put_string(out, value)
@@ -92,7 +92,7 @@ def _put_count(out: bytearray, count: int) -> None:
     out += _aligned("I", len(out) % 4).pack(count)
 
 
-def _put_array(out: bytearray, field: Field, values: Any) -> None:
+def _put_array(out: bytearray, field: MessageField, values: Any) -> None:
     if not field.count:
         _put_count(out, len(values))
     elif len(values) != field.count:

@@ -15,7 +15,7 @@ from contactfpga.errors import BoardClosed, MissingExtra
 from contactfpga.inputs.values import shown, whole
 from contactfpga.robot.ros import MAX_DOMAIN
 from contactfpga.robot.ros.settings import TOPICS, Topic
-from contactfpga.robot.ros.types import Field, message_type, type_hash
+from contactfpga.robot.ros.types import MessageField, message_type, type_hash
 
 _Made = TypeVar("_Made")
 
@@ -150,7 +150,7 @@ def idl_type(name: str) -> Any:
     return make_idl_struct(short, f"{package}.msg.dds_.{short}_", fields)
 
 
-def _idl_field(field: Field) -> Any:
+def _idl_field(field: MessageField) -> Any:
     from cyclonedds.idl import types
 
     plain: dict[str, Any] = {"string": str, "bool": bool, "byte": types.uint8}

@@ -88,7 +88,7 @@ def messages() -> Path:
 
 
 @dataclasses.dataclass(frozen=True)
-class Field:
+class MessageField:
     """A field of a message."""
 
     name: str
@@ -109,7 +109,7 @@ class MessageType:
 
     name: str
     """Package and type: ``contactfpga_msgs/Zones``."""
-    fields: tuple[Field, ...]
+    fields: tuple[MessageField, ...]
     constants: tuple[tuple[str, int], ...]
     """Numbers that fields may have."""
     text: str
@@ -165,11 +165,11 @@ def _parsed(name: str, text: str) -> MessageType:
     return MessageType(name, tuple(fields), tuple(constants), text)
 
 
-def _field(package: str, kind: str, name: str) -> Field:
+def _field(package: str, kind: str, name: str) -> MessageField:
     kind, bracket, size = kind.partition("[")
     if kind not in PRIMITIVES and kind != "string" and "/" not in kind:
         kind = f"{package}/{kind}"
-    return Field(name, kind, int(size.rstrip("]") or 0) if bracket else None)
+    return MessageField(name, kind, int(size.rstrip("]") or 0) if bracket else None)
 
 
 _NUMBERS = {
@@ -205,7 +205,7 @@ def _described(kind: MessageType) -> dict[str, Any]:
     return {"type_name": _full(kind.name), "fields": [_described_field(field) for field in kind.fields]}
 
 
-def _described_field(field: Field) -> dict[str, Any]:
+def _described_field(field: MessageField) -> dict[str, Any]:
     number = _NESTED if field.nested else _NUMBERS[field.type]
     if field.count is not None:
         number += _FIXED_ARRAY if field.count else _ANY_ARRAY

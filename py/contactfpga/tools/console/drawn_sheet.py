@@ -53,7 +53,7 @@ class Marks:
 
 
 @dataclasses.dataclass(frozen=True)
-class Drawing:
+class SheetDrawing:
     """Characters, what each of them shows, and a line that says how to read them."""
 
     characters: np.ndarray
@@ -81,7 +81,7 @@ def size(zones: Zones, scale: int) -> tuple[int, int]:
 
 def draw(
     zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask = (), marks: Marks | None = None
-) -> Drawing:
+) -> SheetDrawing:
     """The sheet of one frame: its pressed cells if the board sends them, else its zones' barycenters and sizes.
     ``mask``: the (row, column) of switches that are known to be absent; ``marks``: of a board that sends cells."""
     wide, high = size(zones, scale)
@@ -111,7 +111,7 @@ def draw(
     if zones.cells is None:
         for x, y in _centers(zones, scale):
             characters[y, x], kinds[y, x] = signs[CENTER], CENTER
-    return Drawing(characters, kinds, _legend(zones.cells is None, bool(masked.any()), scale, unicode, marks))
+    return SheetDrawing(characters, kinds, _legend(zones.cells is None, bool(masked.any()), scale, unicode, marks))
 
 
 def _masked(zones: Zones, mask: Mask) -> np.ndarray:

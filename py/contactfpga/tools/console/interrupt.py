@@ -6,13 +6,16 @@ The signal TERM, which stops services, does what Ctrl-C does, with a status of i
 from __future__ import annotations
 
 import _thread
+import atexit
 import contextlib
 import errno
+import os
 import signal
 import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
+from typing import NoReturn
 
 from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
@@ -51,6 +54,21 @@ def guarded(body: Callable[[], int | None]) -> int:
         # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by
         # SIGINT, whatever the status, unless another text is run to its end.
         exec("")
+
+
+def leave(status: int) -> NoReturn:
+    """End the process with a status of :func:`guarded`.
+
+    After a signal the process skips the destructors of C++ libraries: a library that the signal cut off while it
+    loaded may crash in them, as matplotlib 3.10 does. Functions of :mod:`atexit` run all the same.
+    """
+    if status in map(signals.status, SIGNALS):
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):  # nobody reads it any more, or it is closed
+                stream.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 def _status(body: Callable[[], int | None]) -> int:

@@ -159,7 +159,7 @@ def _mask(board: Board) -> drawn_sheet.Mask:
         return ()
 
 
-def styled(drawing: drawn_sheet.Drawing) -> Text:
+def styled(drawing: drawn_sheet.SheetDrawing) -> Text:
     """A drawing with its colors."""
     text = Text(no_wrap=True)
     for number, (characters, kinds) in enumerate(zip(drawing.characters, drawing.kinds.tolist())):

@@ -51,7 +51,7 @@ class Socket:
         """What a reader opens."""
         if self.board is None:
             raise contactfpga.PortNotFound("no such port")
-        return contactfpga.open(Port(self), plan.skin, timeout=0.2)
+        return contactfpga.open(HeldPort(self), plan.skin, timeout=0.2)
 
     def pass_(self, seconds: float) -> bytes:
         """What comes in this time at most."""
@@ -67,7 +67,7 @@ class Socket:
         return due
 
 
-class Port:
+class HeldPort:
     """The port as long as what was behind it is."""
 
     def __init__(self, socket: Socket):

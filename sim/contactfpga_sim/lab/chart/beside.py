@@ -26,7 +26,7 @@ TOUCHES = 50
 
 
 @dataclasses.dataclass(frozen=True)
-class Rival:
+class RivalMethod:
     """A modeled way to read contacts that is not one of the chart's methods."""
 
     name: str
@@ -54,7 +54,7 @@ def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
     return [dataclasses.replace(point, least_mm=value) for point, value in zip(points, least, strict=True)]
 
 
-def rivals(families: Sequence[str], count: int, seed: int) -> list[Rival]:
+def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
     """Each other way to read a sheet, on each family, under tiles of :data:`PITCH_MM`; drawn with the word "model"."""
     lines, cover = round(EXTENT_MM / PITCH_MM), COVERS["tiles"](PITCH_MM)
     skin = Skin(rows=lines, columns=lines, pitch_x_mm=PITCH_MM, pitch_y_mm=PITCH_MM, connectivity=4)
@@ -64,7 +64,7 @@ def rivals(families: Sequence[str], count: int, seed: int) -> list[Rival]:
         each = [rival.errors(scene, skin, cover) for scene in scenes]
         times = [rival.time_us(scene, skin, cover, rng) for scene in scenes]
         means = {metric: errors.interval([float(getattr(one, metric)) for one in each]) for metric in errors.METRICS}
-        found.append(Rival(name, family, errors.quantile(times, 0.5), means))
+        found.append(RivalMethod(name, family, errors.quantile(times, 0.5), means))
     return found
 
 

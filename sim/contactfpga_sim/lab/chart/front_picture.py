@@ -14,19 +14,19 @@ from matplotlib.figure import Figure
 
 from contactfpga import picture_style as style
 from contactfpga_sim.lab.chart import picture as chart
-from contactfpga_sim.lab.chart.beside import Rival
+from contactfpga_sim.lab.chart.beside import RivalMethod
 from contactfpga_sim.lab.chart.compute import Point, reached_us, to_build
 
 FAMILY = "fingers"
 
 
-def save(points: Sequence[Point], path: Path, rivals: Sequence[Rival] = ()) -> Path:
+def save(points: Sequence[Point], path: Path, rivals: Sequence[RivalMethod] = ()) -> Path:
     """Draw the points of :data:`FAMILY`; what to build goes by all families. The same points give the same file."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture(points, rivals), path)
 
 
-def picture(points: Sequence[Point], rivals: Sequence[Rival] = ()) -> Figure:
+def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figure:
     """Scenes miscounted, and the error of the barycenter, over the time from the first touch of the foam."""
     figure = style.new(4.3)
     method = to_build(points)

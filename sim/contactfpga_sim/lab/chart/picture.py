@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga_sim.lab.chart.beside import Rival, bits_us
+from contactfpga_sim.lab.chart.beside import RivalMethod, bits_us
 from contactfpga_sim.lab.chart.compute import Point, covered, front, reached_us, to_build
 from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
@@ -84,7 +84,7 @@ METRICS = (
 )
 
 
-def save(points: Sequence[Point], folder: Path, rivals: Sequence[Rival] = ()) -> None:
+def save(points: Sequence[Point], folder: Path, rivals: Sequence[RivalMethod] = ()) -> None:
     """``chart.png`` and ``chart.svg`` in a folder; the same points give the same files."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = picture(points, rivals)
@@ -92,7 +92,7 @@ def save(points: Sequence[Point], folder: Path, rivals: Sequence[Rival] = ()) ->
             style.save(figure, folder / f"chart.{suffix}")
 
 
-def picture(points: Sequence[Point], rivals: Sequence[Rival] = ()) -> Figure:
+def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figure:
     """All points, a row of panels for each family."""
     families = list(dict.fromkeys(point.task.family for point in points))
     figure = style.new(2.2 * len(families) + 1.3)
@@ -105,7 +105,7 @@ def picture(points: Sequence[Point], rivals: Sequence[Rival] = ()) -> Figure:
     return figure
 
 
-def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[Rival]) -> None:
+def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[RivalMethod]) -> None:
     """One error of one family, on axes that hold all points."""
     _axes(panel, points, metric)
     panel.set_xlabel(ALONG)
@@ -203,7 +203,7 @@ def _mark(panel: Any, point: Point, place: tuple[float, float], shapes: dict[flo
     )
 
 
-def legend(points: Sequence[Point], rivals: Sequence[Rival]) -> tuple[list[Line2D], list[str]]:
+def legend(points: Sequence[Point], rivals: Sequence[RivalMethod]) -> tuple[list[Line2D], list[str]]:
     """Lines and words for what is drawn."""
     mark: dict[str, Any] = {"linestyle": "", "markersize": 6}
     used = {cover_of(point.task.method) for point in points} | ({"model"} if rivals else set())

@@ -24,7 +24,7 @@ import contactfpga
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import pool
 from contactfpga_sim.lab.latency import GOLDEN, Bench, RecordedTouch
-from contactfpga_sim.lab.spread import Spread, Times
+from contactfpga_sim.lab.spread import MixedTimes, Spread
 from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
 
 TOUCHES = 100
@@ -62,7 +62,7 @@ class HostShare:
     """Touches that were not written in time, because the machine was busy (:data:`LATE_S`)."""
     machine: str
     """Where it was measured."""
-    times: Times = dataclasses.field(repr=False, compare=False)
+    times: MixedTimes = dataclasses.field(repr=False, compare=False)
     """Each of them, in us."""
 
 
@@ -98,7 +98,7 @@ def measured(
         player.close()
     if not found:
         return None
-    times = Times.of(found)
+    times = MixedTimes.of(found)
     return HostShare(times.spread(), len(found), left_out, machine(), times)
 
 

@@ -13,7 +13,7 @@ from contactfpga_sim.lab.arm.parts import Usb
 from contactfpga_sim.lab.finger import host
 from contactfpga_sim.lab.finger.host import HostShare
 from contactfpga_sim.lab.latency import Latency
-from contactfpga_sim.lab.spread import MEDIAN, MOST, Spread, Times, summed
+from contactfpga_sim.lab.spread import MEDIAN, MOST, MixedTimes, Spread, summed
 from contactfpga_sim.lab.usb import BridgeSettings, delivered
 
 PAPER_US = 6000.0
@@ -93,8 +93,8 @@ def measure(
     board = latency.measure(skin, cells, touches, step, around_us=(2 * period + frame, period + 2 * frame))
     us = skin.clock_hz / 1e6
     late = [delivered(settings, skin.clock_hz, one.stream, one.byte) for one in board.recorded]
-    usb = Times.mixed(late)
-    bridge = Times.mixed(times.later(-one.last / us) for times, one in zip(late, board.recorded, strict=True))
+    usb = MixedTimes.mixed(late)
+    bridge = MixedTimes.mixed(times.later(-one.last / us) for times, one in zip(late, board.recorded, strict=True))
     share = host.measured(skin, settings, latency.places(skin, *cells), host_touches, step) if host_touches else None
     code = None
     if share is not None:

@@ -33,7 +33,7 @@ from contactfpga.driver import health
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.finger import stages
-from contactfpga_sim.lab.spread import Times
+from contactfpga_sim.lab.spread import MixedTimes
 from contactfpga_sim.lab.usb import BridgeSettings, delivered
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
@@ -76,8 +76,8 @@ def _times(kit: Kit) -> Iterator[Prediction]:
     bridge = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
     found = stages.measure(kit.skin, bridge, host_touches=0)
     board, us = found.board, kit.skin.clock_hz / 1e6
-    usb = Times.mixed(delivered(bridge, kit.skin.clock_hz, one.stream, one.byte) for one in board.recorded)
-    pin, last = (Times.of([getattr(one, name) / us for one in board.recorded]) for name in ("pin", "last"))
+    usb = MixedTimes.mixed(delivered(bridge, kit.skin.clock_hz, one.stream, one.byte) for one in board.recorded)
+    pin, last = (MixedTimes.of([getattr(one, name) / us for one in board.recorded]) for name in ("pin", "last"))
     broken, here = reported(kit.skin), f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
     each = {
         "contact": ("touch to the pin `contact`", "touches", "gateware", pin, command),
@@ -105,14 +105,14 @@ def _times(kit: Kit) -> Iterator[Prediction]:
     )
 
 
-def reported(skin: Skin) -> Times:
+def reported(skin: Skin) -> MixedTimes:
     """From a row or column of an untouched sheet that breaks at the board until `contact` tells it, as `fail_safe`
     does: the first of each, at any instant between two checks."""
     with CompiledBoard(skin, ["contact"]) as board:
-        return Times.mixed([_between_checks(board, {0: 0}, {}), _between_checks(board, {}, {0: 0})])
+        return MixedTimes.mixed([_between_checks(board, {0: 0}, {}), _between_checks(board, {}, {0: 0})])
 
 
-def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[int, int]) -> Times:
+def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[int, int]) -> MixedTimes:
     """From the latest break that a check still finds to the earliest that it misses, to the clock."""
 
     def told(start: int) -> int:
@@ -131,7 +131,7 @@ def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[in
         middle = (found + missed) // 2
         found, missed = (middle, missed) if told(middle) == check else (found, middle)
     us = np.array([check - found, told(missed) - missed]) / clocks
-    return Times(us[:1], us[1:], np.ones(1))
+    return MixedTimes(us[:1], us[1:], np.ones(1))
 
 
 def _near(rng: np.random.Generator, share: float) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import sys
 
 from contactfpga.tools.console import interrupt, numbers
 from contactfpga_sim.lab.mutants.tables import EACH, GROUPS, JOBS, listed, run, table
@@ -32,4 +31,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

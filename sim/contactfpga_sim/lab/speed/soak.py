@@ -136,4 +136,4 @@ def _descriptors() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

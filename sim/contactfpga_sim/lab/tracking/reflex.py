@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib.util
 import statistics
-import sys
 import time
 from types import ModuleType
 from typing import NamedTuple
@@ -90,4 +89,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

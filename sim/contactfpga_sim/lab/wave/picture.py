@@ -35,7 +35,7 @@ def draw(folder: Path) -> list[Path]:
         return [style.save(figure, folder / "wave.svg")]
 
 
-def _lanes(axes: Any, skin: Skin, touch: wave.Touch) -> None:
+def _lanes(axes: Any, skin: Skin, touch: wave.SimulatedTouch) -> None:
     def us(cycle: float) -> float:
         return (cycle - touch.begins) * 1e6 / skin.clock_hz
 

@@ -26,7 +26,7 @@ wire, the byte, the level or the driven lines, the 65th of which is the mark; an
 last, for a record or an item whether it is the end mark."""
 
 
-Library = native.Library | webassembly.Library
+Library = native.Library | webassembly.WebAssemblyLibrary
 
 
 class CompiledModel:

@@ -46,7 +46,7 @@ _FLAGS = (
 _C_FLAGS = (*_TARGET, "-std=c99", "-Os")
 
 
-class Library:
+class WebAssemblyLibrary:
     """A board in memory of its own, used as a library of ctypes is: its functions take bytes and ctypes' numbers, and
     return what their ``restype`` says."""
 
@@ -131,14 +131,14 @@ class _Function:
             raise Trap._from_ptr(trap)
 
 
-def load(key: str) -> Library | None:
+def load(key: str) -> WebAssemblyLibrary | None:
     """The board with a key, if it is carried; None, too, where the user asks for native code by :data:`NATIVE`."""
     if os.environ.get(NATIVE) or importlib.util.find_spec("wasmtime") is None:
         return None
     found = file(key)
     if found:
         _tell()
-    return Library(found) if found else None
+    return WebAssemblyLibrary(found) if found else None
 
 
 @functools.cache

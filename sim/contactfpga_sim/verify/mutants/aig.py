@@ -194,8 +194,7 @@ end
 # First nodes that are equal in every state that comes, found by induction, are merged; then property-directed
 # reachability. What ABC prints is lost in a Yosys that runs as WebAssembly, hence files.
 _SCRIPT = (
-    "backup; read_aiger asked.aig; scorr; write_aiger merged.aig; pdr -T {most}; write_status said.txt; "
-    "restore; strash"
+    "backup; read_aiger asked.aig; scorr; write_aiger merged.aig; pdr -T {most}; write_status said.txt; restore; strash"
 )
 # The limit is the processor's time, so that a busy machine proves as much as an idle one; Windows has none. What the
 # first run of Yosys on a machine compiles is not counted.

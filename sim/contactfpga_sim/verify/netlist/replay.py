@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import itertools
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -205,4 +204,4 @@ def _report(board: BoardSpec, skin: Skin, frames: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

@@ -102,4 +102,4 @@ def _progress(text: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    interrupt.leave(interrupt.guarded(main))

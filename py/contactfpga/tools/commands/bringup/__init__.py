@@ -30,7 +30,7 @@ from contactfpga.inputs.values import number_in
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup import steps
 from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
-from contactfpga.tools.commands.bringup.report import Report, graded
+from contactfpga.tools.commands.bringup.report import BringUpReport, graded
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
 
 EXTRA = None
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     _check_names(args.measured, predicted)
     when = datetime.date.today()
     path = outputs.file(args.output or f"bringup-{kit.name}-{when.isoformat()}.md")
-    report = Report(kit, skin, when)
+    report = BringUpReport(kit, skin, when)
     report.force = _force(kit, predicted, args.measured)
     with interrupt.usual_end():
         _lead(args, kit, report)
@@ -151,7 +151,7 @@ def _force(
     return fit_force(cover.switch.force_n, pairs, math.sqrt(PROBABILITY))
 
 
-def _lead(args: argparse.Namespace, kit: Kit, report: Report) -> None:
+def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
     """Through all steps that can be made."""
     try:
         board, person = _opened(args, kit, report.skin)
@@ -241,7 +241,7 @@ class _Reader:
         return self._args.seconds or SECONDS
 
 
-def _add(args: argparse.Namespace, report: Report, step: Step, port: str) -> None:
+def _add(args: argparse.Namespace, report: BringUpReport, step: Step, port: str) -> None:
     """Take down a step, without the port's name, and show it."""
     if not args.json:
         terminal.say(f"{len(report.steps) + 1}. {step.name}")
@@ -255,7 +255,7 @@ def _add(args: argparse.Namespace, report: Report, step: Step, port: str) -> Non
     report.steps.append(Step(step.name, plain, step.measured, step.stop))
 
 
-def _show_end(report: Report, path: str) -> None:
+def _show_end(report: BringUpReport, path: str) -> None:
     for one in report.grades:
         said = one.prediction
         measured = f"{said.name} = {one.measured:.4g} {said.unit}, predicted {said.low:g} to {said.high:g}"

@@ -51,7 +51,7 @@ def graded(predictions: Mapping[str, Prediction], measured: Mapping[str, float])
     ]
 
 
-class Report:
+class BringUpReport:
     """What was found so far."""
 
     def __init__(self, kit: Kit, skin: Skin, when: datetime.date):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
-from contactfpga.robot.haptics.rate import Layout, Rating, Requirements, compared, draw, rate
+from contactfpga.robot.haptics.rate import Rating, Requirements, UnitLayout, compared, draw, rate
 from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Surface
 from contactfpga.tools.console import numbers, outputs
@@ -94,7 +94,7 @@ def _picture(path: str | None) -> Path | None:
 
 
 def _own(needs: Requirements, path: str) -> Rating:
-    rating = rate(needs, Layout(Path(path).name, LoadCells.load(path)))
+    rating = rate(needs, UnitLayout(Path(path).name, LoadCells.load(path)))
     if rating is None:
         raise HapticsError(f"{path}: these units cannot hold the loads; they see too few components of a wrench")
     return rating

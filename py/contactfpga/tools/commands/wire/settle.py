@@ -18,7 +18,7 @@ from contactfpga.instruments.settling import Settling
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
 from contactfpga.tools.console import interrupt, live
-from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
+from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Mask, SheetDrawing
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
@@ -221,7 +221,9 @@ def _view(found: Settling, skin: Skin, room: live.Room) -> RenderableType:
     return Group(views.styled(drawing), Text(terminal.wrapped(below, room.width)))
 
 
-def drawn(found: Settling, clocks_per_us: int, mask: Mask = (), wide: bool = True, unicode: bool = True) -> Drawing:
+def drawn(
+    found: Settling, clocks_per_us: int, mask: Mask = (), wide: bool = True, unicode: bool = True
+) -> SheetDrawing:
     """The sheet, row 0 on top, with a digit for each cell.
 
     The digit d: a cell reads pressed after d to d + 1 tenths of the settle time. Slow ones have the kind STUCK.
@@ -243,4 +245,4 @@ def drawn(found: Settling, clocks_per_us: int, mask: Mask = (), wide: bool = Tru
         f"d: reads pressed after d to d + 1 tenths of the settle time of {found.settle} clocks "
         f"({found.settle / clocks_per_us:g} us); {free} not measured"
     )
-    return Drawing(shown, kinds, legend + ("; blank: no switch" if tuple(mask) else ""))
+    return SheetDrawing(shown, kinds, legend + ("; blank: no switch" if tuple(mask) else ""))
