@@ -40,6 +40,8 @@ class SimulatedView(RobotView):
         for hand in self.hands.values():
             hand.force_n = PUSH_N
         self._grips: dict[int, obstacle.Grip] = {}
+        self._put_s = np.inf
+        """When an obstacle was chosen that is not drawn yet."""
         self._drawn: list[RobotCopy] = []
         self._robots: list[DrawnRobot] = []
         self._arrange()
@@ -76,7 +78,8 @@ class SimulatedView(RobotView):
         node = f"{ROOT}{len(self._stages)}"
         stage = RobotStage(self._server, self._source.body, self._source.solids(), node)
         self._stages.append(stage)
-        self._names.append(self._server.scene.add_label(f"{node}/skin", "", anchor="bottom-center", font_screen_scale=0.9))
+        add_label = self._server.scene.add_label
+        self._names.append(add_label(f"{node}/skin", "", anchor="bottom-center", font_screen_scale=0.9))
         for name, hand in self.hands.items():
             stage.stages[name].press_with(hand)
         for kind in (obstacle.BALL, obstacle.HAND):
@@ -103,7 +106,14 @@ class SimulatedView(RobotView):
             self._arrange()
             if len(self._drawn) != before:
                 self._look_again()
-        return [row for number in range(len(self._drawn)) for row in self._draw(number)]
+        rows = [row for number in range(len(self._drawn)) for row in self._draw(number)]
+        if source.simulated_s > self._put_s:  # MuJoCo knows where it is
+            self._put_s = np.inf
+            for stage in self._stages:
+                self._show_obstacle(stage)
+            for client in self._server.get_clients().values():
+                self.cameras.fit(client.camera)
+        return rows
 
     def _look_again(self) -> None:
         """Cameras hold all copies."""
@@ -166,11 +176,7 @@ class SimulatedView(RobotView):
         low, high = points.min(0), points.max(0)
         ahead = np.array([high[0] + obstacle.AHEAD_M, *((low + high) / 2)[1:]])
         self._source.obstacle.put(kind, obstacle.AWAY_M if kind == obstacle.NOTHING else ahead)
-        for stage in self._stages:
-            self._show_obstacle(stage)
-            stage.place(self._source.copies[0].poses())
-        for client in self._server.get_clients().values():
-            self.cameras.fit(client.camera)
+        self._put_s = self._source.simulated_s
 
     def tell(self) -> None:
         super().tell()

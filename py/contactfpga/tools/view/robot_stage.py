@@ -84,7 +84,8 @@ class RobotStage:
         """``solids``: what is drawn in the place of the URDF's links."""
         self._server, self._body, self._node = server, body, node
         self._root = server.scene.add_frame(node, show_axes=False)
-        self._at_m = np.zeros(3)
+        self.at_m = np.zeros(3)
+        """Where the robot's base is drawn."""
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
         """Kinds of mesh files that could not be read."""
@@ -172,14 +173,14 @@ class RobotStage:
         orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
         for name, plan in self._body.links.items():
             mine = poses[plan.frame] @ plan.pose
-            self.stages[name].rotation, self.stages[name].point_m = mine.rotation, mine.point_m + self._at_m
+            self.stages[name].rotation, self.stages[name].point_m = mine.rotation, mine.point_m + self.at_m
         for (name, pose), wxyz in zip(poses.items(), orientations):
             if (frame := self._frames.get(name)) is not None:
                 frame.wxyz, frame.position = wxyz, pose.point_m
 
     def shift(self, at_m: np.ndarray) -> None:
         """Draw the robot's base at (3,) ``at_m`` from now on; takes effect with the next poses."""
-        self._at_m = at_m
+        self.at_m = at_m
         self._root.position = at_m
 
     def show(self, visible: bool = True, link: str | None = None) -> None:
@@ -198,5 +199,5 @@ class RobotStage:
         """(n, 3) around all that is drawn, where the joints put it."""
         sheets = [stage.tiles.points_mm * MM @ stage.rotation.T + stage.point_m for stage in self.stages.values()]
         seen = [(link, corners) for link, corners in self._corners if link not in self._hidden]
-        meshes = [self._poses[link].apply(corners) + self._at_m for link, corners in seen]
+        meshes = [self._poses[link].apply(corners) + self.at_m for link, corners in seen]
         return np.concatenate([*sheets, *meshes])
