@@ -104,7 +104,7 @@ def test_copies_differ_by_when_their_reflex_knows_and_by_nothing_else():
     for skin, when_s in acted_s.items():
         depth_m = 0.8 * 0.24 * (when_s - touched_s)
         assert 0.7 * FOAM_N * depth_m**1.5 < most[skin] < 2.5 * FOAM_N * depth_m**1.5
-    assert source.sweep.forces_n.shape == (3, 200)
+    assert source.sweep.forces_n.shape == (3, 100)
     drawn = np.nanmax(source.sweep.forces_n, axis=1)
     assert drawn == pytest.approx(list(most.values())), "the chart misses no peak"
 
@@ -138,13 +138,13 @@ def test_a_sweep_begins_with_a_touch_and_stands_until_the_next_after_its_end():
 
 
 def test_the_chart_names_its_curves_and_units():
-    forces = np.full((3, 200), np.nan)
-    forces[:, :100] = np.array([[23.7], [7.2], [3.6]])
+    forces = np.full((3, 100), np.nan)
+    forces[:, :50] = np.array([[23.7], [7.2], [3.6]])
     drawn = chart.force_chart(forces, SWEEP_S, [(0, "bare"), (1, "late"), (2, "kit")])
-    for text in (">N<", ">30<", ">200<", "ms since the touch", ">bare<", ">late<", ">kit<"):
+    for text in (">N<", ">30<", ">100<", "ms since the touch", ">bare<", ">late<", ">kit<"):
         assert text in drawn
     curves = [line.partition('"')[0].split() for line in drawn.split('<polyline points="')[1:]]
-    assert [len(curve) for curve in curves] == [100] * 3, "what is not known yet is not drawn"
+    assert [len(curve) for curve in curves] == [50] * 3, "what is not known yet is not drawn"
     heights = [float(curve[0].partition(",")[2]) for curve in curves]
     assert heights[0] < heights[1] < heights[2]
 
@@ -273,15 +273,6 @@ def test_a_click_in_a_browser_stops_the_arm():
         until(visitor, lambda: command() == 0.8 and not source.links["arm"].fingers)
 
 
-def choose(visitor, before, now):
-    """In the list of the panel that shows ``before``."""
-    page = visitor.page
-    lists = page.locator("input[aria-haspopup=listbox]")
-    (number,) = [one for one in range(lists.count()) if lists.nth(one).input_value() == before]
-    lists.nth(number).click()
-    page.get_by_role("option", name=now, exact=True).click()
-
-
 @pytest.mark.slow  # 40 s
 @pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed")
 def test_a_ball_is_dragged_in_the_way_of_three_arms():
@@ -290,9 +281,9 @@ def test_a_ball_is_dragged_in_the_way_of_three_arms():
     with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
         source = shown.source
         browser.tidy(visitor)
-        choose(visitor, KIT, ALL)
+        visitor.choose(KIT, ALL)
         until(visitor, lambda: len(source.copies) == 3)
-        choose(visitor, obstacle.NOTHING, obstacle.BALL)
+        visitor.choose(obstacle.NOTHING, obstacle.BALL)
         until(visitor, lambda: source.obstacle.kind == obstacle.BALL)
         visitor.page.wait_for_timeout(2000)
         before = source.obstacle.at_m

@@ -30,7 +30,7 @@ BARE, LATE, KIT = SKINS = ("without skin", "6 ms late", "with the kit")
 ALL = "side by side"
 LATE_S = 6e-3
 """From the sheet's scan to the reflex; what the paper takes for screening the sensors and computing (section IV A)."""
-SWEEP_S, SWEEP_STEPS = 0.2, 200
+SWEEP_S, SWEEP_STEPS = 0.1, 100
 """Of forces from a touch on."""
 
 Reflex = Callable[[Snapshot, float], float]

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
+import math
 from pathlib import Path
+
+import numpy as np
 
 import contactfpga
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.opening import ServedView
-from contactfpga.tools.view.simulated import ALL, SKINS, SimulatedSource
+from contactfpga.tools.view.simulated import ALL, KIT, SKINS, SimulatedSource
 from contactfpga.tools.view.sources import SimulatedPace
 from contactfpga_sim.lab.view import browser
 from contactfpga_sim.lab.writer import table_of
 
 ARM = contactfpga.examples() / "arm"
 ROBOT, SCENE, REFLEXES = (str(ARM / name) for name in ("pushed.toml", "scene.xml", "reflexes.py"))
-ENDS_S = 2.7
-"""All have touched the bar, and all but one have let go."""
-SHOWN = ("Stop", "BackOff")
-"""Reflexes that run into the bar."""
-COMES_S, TOUCHES_S = (1.4, 2.2), (2.2, 2.32)
+REFLEX = "BackOff"
+MEETINGS = 12
+NEAR_RAD, SPREAD_RAD = 0.4, 0.01
+"""They begin between these angles, 0.14 rad before the bar, so that the touch comes anywhere in a scan and a step."""
+STEP_S, ENDS_S = 1e-3, 0.25
+"""MuJoCo's step, and when all have touched the bar and all but one have let go."""
+COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
 """Of the clip: the arms come, and the touch in slow motion."""
-COMING, TOUCHING, STANDING = 9, 31, 12
+COMING, TOUCHING, STANDING = 10, 28, 15
 """Frames of each, and of the end, which stands."""
 FRAME_MS, SETTLE_MS, QUALITY = 100, 900, 55
-SIZE = 1120, 560
+SIZE = 1120, 400
 """In pixels."""
 
 
@@ -45,23 +51,54 @@ def paced(found: SimulatedSource) -> Asked:
     return pace
 
 
-def peaks_n(reflex: str) -> list[float]:
-    """The largest force in N on the arm, by :data:`contactfpga.tools.view.simulated.SKINS`."""
-    found = SimulatedSource(ROBOT, SCENE, REFLEXES)
-    pace, found.reflex = paced(found), reflex
-    pace.until_s = ENDS_S
-    try:
-        while found.simulated_s < ENDS_S - 1e-9:
-            found.advance()
-        return [copy.most_n["arm"] for copy in found.copies]
-    finally:
-        found.close()
+@dataclasses.dataclass(frozen=True)
+class Met:
+    """What came of one arm's way into the bar."""
+
+    late_s: float
+    """From the touch to the reflex's next command; nan: there was none."""
+    peak_n: float
+
+
+def meet(angle: float) -> list[Met]:
+    """The example's arm by :data:`contactfpga.tools.view.simulated.SKINS`, from this angle on, where it goes back."""
+    robots = SimulatedSource(ROBOT, SCENE, REFLEXES)
+    robots.reflex, pace = REFLEX, paced(robots)
+    robots.advance()
+    for copy in robots.copies:
+        copy.sheets.data.qpos[0] = angle
+    told = [copy.sheets.data.ctrl[0] for copy in robots.copies]
+    touched_s, acted_s = math.nan, [math.nan] * len(SKINS)
+    while pace.until_s < ENDS_S:
+        pace.until_s += STEP_S
+        robots.advance()
+        if math.isnan(touched_s) and robots.copies[0].force_n("arm"):
+            touched_s = pace.until_s
+        for number, copy in enumerate(robots.copies):
+            if math.isnan(acted_s[number]) and copy.sheets.data.ctrl[0] != told[number]:
+                acted_s[number] = pace.until_s
+    robots.close()
+    return [Met(at_s - touched_s, copy.most_n["arm"]) for at_s, copy in zip(acted_s, robots.copies)]
 
 
 def peaks_table() -> str:
     """For docs/mujoco.md."""
-    rows = [[f"`{reflex}`", *(f"{peak:.1f}" for peak in peaks_n(reflex))] for reflex in SHOWN]
-    return table_of([["largest force, N", *SKINS], *rows])
+    rng = np.random.default_rng(0)
+    found = [meet(NEAR_RAD + rng.uniform(0, SPREAD_RAD)) for _ in range(MEETINGS)]
+    late_ms, peak_n = (
+        np.array([[getattr(one, key) for one in each] for each in found]) for key in ("late_s", "peak_n")
+    )
+    rows = [
+        ["from the touch to the reflex, ms", *map(_ranged, 1e3 * late_ms.T)],
+        ["largest force, N", *map(_ranged, peak_n.T)],
+    ]
+    return table_of([["", *SKINS], *rows])
+
+
+def _ranged(values: np.ndarray) -> str:
+    if np.isnan(values).any():
+        return "never"
+    return f"{np.median(values):.1f} ({values.min():.1f} to {values.max():.1f})"
 
 
 def draw(folder: Path) -> list[Path]:
@@ -79,9 +116,14 @@ def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path)
 
     robots = shown.source
     assert isinstance(robots, SimulatedSource)
-    robots.reflex = "BackOff"
-    began_s, pace = robots.simulated_s, paced(robots)
     browser.tidy(visitor)
+    visitor.choose(robots.reflex, REFLEX)
+    visitor.choose(KIT, ALL)
+    while len(robots.copies) < len(SKINS):
+        visitor.page.wait_for_timeout(50)
+    pace = paced(robots)
+    visitor.page.wait_for_timeout(SETTLE_MS)
+    began_s = robots.simulated_s
     frames = []
     for at_s in moments():
         pace.until_s = began_s + at_s

@@ -113,6 +113,13 @@ class Visitor:
             self.page.mouse.move(*self._pixel(one), steps=8)
             self.page.wait_for_timeout(hold_ms)
 
+    def choose(self, before: str, now: str) -> None:
+        """In the list of the panel that shows ``before``."""
+        lists = self.page.locator("input[aria-haspopup=listbox]")
+        number = [lists.nth(one).input_value() for one in range(lists.count())].index(before)
+        lists.nth(number).click()
+        self.page.get_by_role("option", name=now, exact=True).click()
+
     def watch(self, x_mm: float, y_mm: float) -> None:
         """Wait from now on, in the page, until a barycenter is drawn there."""
         self.page.evaluate("([x, y]) => window.watch(x, y)", list(self.place(x_mm, y_mm)))
