@@ -73,6 +73,8 @@ class SimulatedView(RobotView):
             stage.place(copy.poses())
             self._names[number].position = (0.0, 0.0, float(self.stage.points_m()[:, 2].max()) + ABOVE * radius)
             self._names[number].visible = len(copies) > 1
+            for sheet in stage.stages.values():
+                sheet.told = contacts.MOST if len(copies) == 1 else 0  # the table has them
 
     def _add_stage(self) -> None:
         node = f"{ROOT}{len(self._stages)}"
@@ -128,11 +130,14 @@ class SimulatedView(RobotView):
         robot.stage.place(copy.poses())
         several = len(self._drawn) > 1
         if several:
-            name.text = f"{copy.skin}: at most {max(copy.most_n.values()):.1f} N"
+            name.text = f"{copy.skin}\nat most {max(copy.most_n.values()):.1f} N"
         rows = []
         for link, state in copy.states().items():
             worn, plan = copy.sheets[link], self._source.body.links[link]
             arrows = pushes(plan, worn.touches)
+            if copy.skin == BARE:
+                robot.stage.stages[link].draw_no_data(arrows)
+                continue
             label = f"{link}, {copy.skin}" if several else link
             rows += robot.draw(link, state, worn.pressed, arrows, label)
         return rows

@@ -1,4 +1,4 @@
-"""The robots of docs/mujoco.md side by side: their peak forces, and a clip of them in a browser without a window."""
+"""The arms of docs/mujoco.md side by side: their peak forces, and a clip of them in a browser without a window."""
 
 from __future__ import annotations
 
@@ -101,16 +101,16 @@ def _ranged(values: np.ndarray) -> str:
     return f"{np.median(values):.1f} ({values.min():.1f} to {values.max():.1f})"
 
 
-def draw(folder: Path) -> list[Path]:
-    """A picture of the view, and a clip that ends with it."""
+def draw(folder: Path) -> Path:
+    """A clip of the view."""
     named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
-    image, clip = folder / "arms.png", folder / "arms.webp"
+    clip = folder / "arms.webp"
     with opening.opened(named, http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:
-        record(shown, visitor, image, clip)
-    return [image, clip]
+        record(shown, visitor, clip)
+    return clip
 
 
-def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path) -> None:
+def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
     """Play it frame by frame."""
     from PIL import Image
 
@@ -131,7 +131,6 @@ def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path)
             visitor.page.wait_for_timeout(50)
         visitor.page.wait_for_timeout(SETTLE_MS)  # the panel is written four times a second
         frames.append(Image.open(io.BytesIO(visitor.page.screenshot())).convert("RGB"))
-    frames[-1].save(image)
     durations = [FRAME_MS] * (len(frames) - 1) + [FRAME_MS * STANDING]
     frames[0].save(clip, save_all=True, append_images=frames[1:], duration=durations, loop=0, quality=QUALITY)
 
