@@ -30,8 +30,8 @@ COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
 COMING, TOUCHING, STANDING = 10, 28, 15
 """Frames of each, and of the end, which stands."""
 FRAME_MS, SETTLE_MS, QUALITY = 100, 900, 55
-SIZE = 1120, 400
-"""In pixels."""
+WIDTH, HEIGHT, TALL = 1120, 400, 700
+"""In pixels; tall while one chooses, so that the panel does not scroll."""
 
 
 class Asked(SimulatedPace):
@@ -105,7 +105,7 @@ def draw(folder: Path) -> Path:
     """A clip of the view."""
     named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
     clip = folder / "arms.webp"
-    with opening.opened(named, http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:
+    with opening.opened(named, http_port=0) as shown, browser.visit(shown, WIDTH, TALL, dark=True) as visitor:
         record(shown, visitor, clip)
     return clip
 
@@ -121,6 +121,7 @@ def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
     visitor.choose(KIT, ALL)
     while len(robots.copies) < len(SKINS):
         visitor.page.wait_for_timeout(50)
+    visitor.page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
     pace = paced(robots)
     visitor.page.wait_for_timeout(SETTLE_MS)
     began_s = robots.simulated_s
