@@ -121,6 +121,7 @@ def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
     visitor.choose(KIT, ALL)
     while len(robots.copies) < len(SKINS):
         visitor.page.wait_for_timeout(50)
+    visitor.page.wait_for_timeout(SETTLE_MS)  # the page says where its camera is now
     visitor.page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
     pace = paced(robots)
     visitor.page.wait_for_timeout(SETTLE_MS)
