@@ -151,17 +151,17 @@ def test_the_chart_names_its_curves_and_units():
 
 @pytest.mark.parametrize(("kind", "half_mm"), [(obstacle.BALL, 1.0), (obstacle.HAND, 80.0)])
 def test_an_obstacle_in_its_way_is_felt_and_stops_it(kind, half_mm):
-    """0.2 m from the joint, where the arm would be after 0.25 rad; the sheet begins at 0.08 m, its rows are 10 mm."""
+    """0.2 m from the joint, where the arm would be after 0.4 rad; the sheet begins at 0.08 m, its rows are 10 mm."""
     source = started("Stop", angle=0.0)
-    source.obstacle.put(kind, 0.2 * np.array([np.cos(0.25), np.sin(0.25), 0.0]))
+    source.obstacle.put(kind, 0.2 * np.array([np.cos(0.4), np.sin(0.4), 0.0]))
     goes_on(source, 0.2)
     (copy,) = source.copies
     state = copy.states()["arm"]
     source.close()
     assert copy.sheets.data.ctrl[0] == 0.0
     assert len(state.zones) == 1
-    assert 0 < copy.sheets.data.qpos[0] < 0.25
-    along_mm = 200.0 * np.cos(0.25 - copy.sheets.data.qpos[0]) - 80.0
+    assert 0 < copy.sheets.data.qpos[0] < 0.4
+    along_mm = 200.0 * np.cos(0.4 - copy.sheets.data.qpos[0]) - 80.0
     assert abs(state.zones[0].y_mm - along_mm) < 5.0 + half_mm
 
 
