@@ -84,7 +84,7 @@ def test_copies_differ_by_when_their_reflex_knows_and_by_nothing_else():
     data = {copy.skin: copy.sheets.data for copy in source.copies}
     assert list(data) == [BARE, LATE, KIT]
     touched_s, acted_s = None, {}
-    for _ in range(160):
+    for _ in range(100):
         goes_on(source, 1e-3)
         time_s = data[KIT].time
         if touched_s is None and source.copies[-1].force_n("arm"):
@@ -116,7 +116,7 @@ def test_every_start_is_the_same():
         source.restart()
         source.advance()
         source.copies[0].sheets.data.qpos[0] = BEFORE_BAR
-        goes_on(source, 0.12)
+        goes_on(source, 0.08)
         paths.append((source.copies[0].most_n, source.copies[0].sheets.data.qpos[0]))
     source.close()
     assert paths[0] == paths[1]
