@@ -86,6 +86,7 @@ def test_back_off_lets_go_again_and_rests():
     assert -0.06 < run.course[-1][1] - max(angle for _, angle, *_ in run.course) < -0.04
 
 
+@pytest.mark.slow  # 7 s
 def test_follow_gives_way_to_a_hand_as_far_as_it_goes():
     pushed = Run(reflexes.Follow(1.0), 0.3, FREE, push_n=12.0)
     held = Run(lambda snapshot, angle: 0.0, 0.3, FREE, push_n=12.0)

@@ -11,7 +11,7 @@ pytest.importorskip("viser")
 from contactfpga.driver import driver
 from contactfpga.errors import PortNotFound
 from contactfpga.robot.body import Body, BodyError
-from contactfpga.tools.view import bodies
+from contactfpga.tools.view import robot_stage
 from contactfpga.tools.view import server as serving
 from contactfpga.tools.view.bodies import BodySource
 
@@ -53,12 +53,12 @@ def stage(request, tmp_path):
     (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 4\n")
     (tmp_path / "robot.toml").write_text(TABLE.format(mirrored=str(request.param).lower()))
     server, _ = serving.serve(port=0)
-    yield bodies.RobotStage(server, Body.load(tmp_path / "robot.toml")), request.param
+    yield robot_stage.RobotStage(server, Body.load(tmp_path / "robot.toml")), request.param
     serving.stop(server)
 
 
 def test_meshes_are_found_with_their_places(tmp_path, stage):
-    (found,) = bodies.visuals(tmp_path / "arm.urdf")
+    (found,) = robot_stage.visuals(tmp_path / "arm.urdf")
     assert (found.link, found.path.name, found.scale) == ("arm", "arm.stl", (2.0, 1.0, 1.0))
     np.testing.assert_allclose(found.pose.apply(np.array([1.0, 0.0, 0.0])), [0.1, 1.0, 0.0], atol=1e-6)
     assert stage[0].unread == set()
@@ -81,15 +81,15 @@ def test_the_mouse_meets_a_sheet_where_the_joints_put_it(stage):
 def test_a_mesh_that_cannot_be_read_is_said(tmp_path, stage):
     path = tmp_path / "broken.dae"
     path.write_text("no mesh")
-    visual = bodies.visuals(tmp_path / "arm.urdf")[0]
-    stage[0]._add_mesh(bodies.Visual("arm", visual.pose, path, (1.0, 1.0, 1.0)))
+    visual = robot_stage.visuals(tmp_path / "arm.urdf")[0]
+    stage[0]._add_mesh(robot_stage.Visual("arm", visual.pose, path, (1.0, 1.0, 1.0)))
     assert stage[0].unread == {".dae"}
 
 
 def test_a_mesh_of_a_package_that_is_not_installed_is_left_out(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(URDF.replace("arm.stl", "package://nobodys_description/meshes/arm.stl"))
-    assert bodies.visuals(path) == []
+    assert robot_stage.visuals(path) == []
 
 
 @pytest.mark.parametrize(("old", "new"), [('xyz="0.1 0 0"', 'xyz="0.1 0"'), ('scale="2 1 1"', 'scale="big"')])
@@ -101,7 +101,7 @@ def test_a_mesh_without_a_place_is_refused_in_one_line(tmp_path, old, new):
     with pytest.raises(
         BodyError, match=rf"^{path}: {name} of a mesh of link 'arm' is {value[1:-1]!r}; it must be three"
     ):
-        bodies.visuals(path)
+        robot_stage.visuals(path)
 
 
 def test_only_one_link_at_a_time_is_searched_for(tmp_path, monkeypatch):
@@ -134,7 +134,7 @@ def test_a_robot_without_joints_is_shown(tmp_path):
     (tmp_path / "robot.toml").write_text(TABLE.format(mirrored="false"))
     server, _ = serving.serve(port=0)
     try:
-        shown = bodies.RobotStage(server, Body.load(tmp_path / "robot.toml"))
+        shown = robot_stage.RobotStage(server, Body.load(tmp_path / "robot.toml"))
         shown.move({})
         assert shown.points_m()[:, 2] == pytest.approx(0.5)
         np.testing.assert_allclose(shown.stages["sheet"].point_m, [0.0, 0.0, 0.5])
@@ -144,9 +144,9 @@ def test_a_robot_without_joints_is_shown(tmp_path):
 
 def test_meshes_beyond_a_limit_are_left_out_and_told(tmp_path, stage, monkeypatch):
     shown, _ = stage
-    monkeypatch.setattr(bodies, "MAX_MESHES", 2)
-    (visual,) = bodies.visuals(tmp_path / "arm.urdf")
+    monkeypatch.setattr(robot_stage, "MAX_MESHES", 2)
+    (visual,) = robot_stage.visuals(tmp_path / "arm.urdf")
     shown._add_mesh(visual)
     assert shown.unread == set()
     shown._add_mesh(visual)
-    assert shown.unread == {bodies.REST}
+    assert shown.unread == {robot_stage.REST}

@@ -194,13 +194,16 @@ _ALL = (
     ),
     Study(
         "mujoco",
-        title="A sheet beside a momentum observer",
+        title="An arm with and without skin, and a sheet beside a momentum observer",
         page="mujoco.md",
-        minutes=6,
+        minutes=8,
         sections={
+            "peaks": Section("clip:peaks_table"),
             "observer": Section("collisions:observer_table"),
         },
-        extra="mujoco",
+        pictures="clip:draw",
+        extra="test",
+        needs=("chromium",),
     ),
     Study(
         "mutants",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -94,7 +94,7 @@ def sides_of(tiles: Tiles) -> dict[str, Side]:
 class Cameras:
     """Sets the camera of each browser: first, when its window changes its size, and to a side that is asked for."""
 
-    def __init__(self, server: viser.ViserServer, sides: Mapping[str, Side], points: Callable[[], np.ndarray]):
+    def __init__(self, server: viser.ViserServer, sides: dict[str, Side], points: Callable[[], np.ndarray]):
         self.sides, self._points = sides, points
         self._sizes: dict[int, tuple[int, int]] = {}
         self._first = next(iter(sides))
@@ -119,6 +119,10 @@ class Cameras:
             camera.position = placed.position
             camera.look_at = placed.look_at
 
+    def fit(self, camera: Any) -> None:
+        """Have this camera hold all that is shown, from where it looks."""
+        self.look(camera, Side(camera.position - camera.look_at, camera.up_direction))
+
     def _follow(self, client: Any) -> None:
         self._sizes[client.client_id] = _size(client.camera)
         self.show(client, self._first)
@@ -129,7 +133,7 @@ class Cameras:
         size = _size(camera)
         if self._sizes.get(camera.client.client_id) != size:
             self._sizes[camera.client.client_id] = size
-            self.look(camera, Side(camera.position - camera.look_at, camera.up_direction))
+            self.fit(camera)
 
 
 def _size(camera: Any) -> tuple[int, int]:

@@ -33,8 +33,8 @@ class Finger:
         return off_mm**2 + (self.y_mm - y_mm) ** 2 <= self.radius_mm**2
 
 
-class Touchable(Protocol):
-    """A virtual board; :class:`contactfpga_sim.model.board.virtual.VirtualBoard` is one."""
+class Pressable(Protocol):
+    """What fingers can press."""
 
     def touch(self, fingers: Sequence[Finger]) -> None:
         """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
@@ -42,6 +42,10 @@ class Touchable(Protocol):
     @property
     def by_force(self) -> bool:
         """Whether it depends on a finger's force which switches close."""
+
+
+class Touchable(Pressable, Protocol):
+    """A virtual board; :class:`contactfpga_sim.model.board.virtual.VirtualBoard` is one."""
 
     @property
     def pressed(self) -> np.ndarray:
@@ -58,7 +62,7 @@ class Hand:
     :attr:`radius_mm` and :attr:`force_n` are those of the next finger.
     """
 
-    def __init__(self, board: Touchable, radius_mm: float, force_n: float = 5.0, around_mm: float | None = None):
+    def __init__(self, board: Pressable, radius_mm: float, force_n: float = 5.0, around_mm: float | None = None):
         self.radius_mm, self.force_n = radius_mm, force_n
         self._around_mm = around_mm
         self.board = board
@@ -68,7 +72,7 @@ class Hand:
         self._stays: set[object] = set()
 
     @classmethod
-    def on(cls, board: Touchable, sheet: Sheet) -> Hand:
+    def on(cls, board: Pressable, sheet: Sheet) -> Hand:
         """With a finger that suits this board's sheet."""
         return cls(board, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm), around_mm=sheet.around_mm)
 

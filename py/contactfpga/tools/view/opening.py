@@ -22,11 +22,12 @@ from contactfpga.inputs.files import names_robot
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.tools.view import page, server
-from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, holds_robot
+from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, RobotView, holds_robot
 from contactfpga.tools.view.cameras import Cameras, sides_of
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
+from contactfpga.tools.view.pushing import SimulatedView
 from contactfpga.tools.view.replayed import LinkRecording, Reading, is_recording, load, silent
 from contactfpga.tools.view.server import Guard
 from contactfpga.tools.view.simulated import SimulatedSource
@@ -85,7 +86,7 @@ class ServedView:
 
     web: viser.ViserServer
     guard: Guard
-    view: View | BodyView
+    view: View | RobotView
     source: Source | BodySource | BodyPlayer | SimulatedSource
     hand: Hand | None
     """The mouse's, on a virtual board."""
@@ -131,8 +132,10 @@ def opened(
     try:
         web, guard = server.serve(host, http_port)
         try:
-            if isinstance(source, (BodySource, BodyPlayer, SimulatedSource)):
-                view: View | BodyView = BodyView(web, source)
+            if isinstance(source, SimulatedSource):
+                view: View | RobotView = SimulatedView(web, source)
+            elif isinstance(source, (BodySource, BodyPlayer)):
+                view = BodyView(web, source)
             else:
                 view = View(web, source, hand)
             yield ServedView(web, guard, view, source, hand, guard.url(web.get_port()))

@@ -33,7 +33,7 @@ OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
         picture_style.SKY,
         picture_style.BLUE,
         picture_style.ORANGE,
-        picture_style.SOFT,
+        picture_style.INK,
     )
 )
 """Cells: open; closed on a virtual board that sends zones only, which is its own truth; closed, as the board reports;

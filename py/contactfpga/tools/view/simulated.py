@@ -1,12 +1,14 @@
-"""A robot in MuJoCo that wears sheets, in real time: the mouse pushes it, and a reflex moves it."""
+"""A robot in MuJoCo that wears sheets, in real time: the mouse pushes it, and a reflex moves it.
+
+Copies of it, each with another skin, run in lockstep."""
 
 from __future__ import annotations
 
-import dataclasses
+import collections
 import inspect
 import runpy
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -17,92 +19,63 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shortened, shown
 from contactfpga.robot.body import Body, LinkState, Snapshot
 from contactfpga.robot.body.kinematics import Pose
-from contactfpga.surfaces import mesh_file
-from contactfpga.tools.view.fingers import Touchable
-from contactfpga.tools.view.limb import revolved
+from contactfpga.tools.view import obstacle, solids
+from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.sources import SimulatedPace
 
 REFLEX_S = 1e-3
 """A reflex is asked this often."""
-REST_S = 0.05
-"""After a start no reflex is asked for so long: what touched before it may still be on its way to the host."""
 NO_REFLEX = "none"
-UNDER = 0.96
-"""Size of the geom that wears a sheet, so that the cells are seen on it."""
-PLANE_M = 1.0
-"""Half a side of a plane without an end."""
+BARE, LATE, KIT = SKINS = ("without skin", "6 ms late", "with the kit")
+ALL = "side by side"
+LATE_S = 6e-3
+"""From the sheet's scan to the reflex; what the paper takes for screening the sensors and computing (section IV A)."""
+SWEEP_S, SWEEP_STEPS = 0.1, 100
+"""Of forces from a touch on."""
 
 Reflex = Callable[[Snapshot, float], float]
 """From what is felt and the joint's angle to how fast to turn."""
 
 
-class SimulatedSource:
-    """A robot of MuJoCo in real time, or as near to it as the machine can."""
+class RobotCopy:
+    """One of the robots, with what it wears and what moves it."""
 
-    def __init__(self, robot: str, model: str, reflex: str | None = None, gateware: bool = False):
-        """``model``: MJCF or URDF; its first keyframe is where it starts. ``reflex``: a Python file, whose classes with
-        ``__call__(snapshot, angle)`` can each set the first actuator.
-
-        Raises :class:`~contactfpga.ContactFPGAError` for a model that cannot be read, what
-        :class:`contactfpga.mujoco.Sheets` raises, and :class:`~contactfpga.MissingExtra`.
-        """
-        parts: Any = import_module("contactfpga.mujoco")
-        self.title = model
-        self.reflexes = _reflexes(reflex)
-        """By name what makes a reflex of a speed; without :data:`NO_REFLEX`."""
-        self.reflex = next(iter(self.reflexes), NO_REFLEX)
-        """The name of the one that acts; :data:`NO_REFLEX`: the model's first command stays."""
-        compiled, data = _compiled(parts, model, robot)
-        if self.reflexes and not compiled.nu:
-            raise ContactFPGAError(f"{model} has no actuator; --reflex needs one, a <velocity> servo of a joint")
-        self.sheets: Any = parts.Sheets(compiled, data, robot, golden=not gateware)
-        self.body: Body = self.sheets.body
-        self.angles: dict[str, float] = {}  # its joints are MuJoCo's to turn
-        self.virtual: dict[str, Touchable] = dict(self.sheets)
-        self.most_n = dict.fromkeys(self.sheets, 0.0)
+    def __init__(self, skin: str, sheets: Any, acts: Reflex | None):
+        """``skin``: one of :data:`SKINS`; without one ``acts`` is never asked."""
+        self.skin, self.sheets = skin, sheets
+        self.most_n = dict.fromkeys(sheets, 0.0)
         """By link the largest force in N since the start."""
-        self._pace = SimulatedPace(self.sheets.clock())
-        self._restart()
+        self._acts = None if skin == BARE else acts
+        self._asked = 0
+        self._coming: collections.deque[tuple[float, Snapshot]] = collections.deque()
+        for worn in sheets.values():
+            worn.dead = skin == BARE
 
-    def restart(self) -> None:
-        """Put the robot back to where it started, and its reflex as well, before the next moment."""
-        self._stale = True
-
-    def _restart(self) -> None:
-        import mujoco
-
-        self._stale, model, data = False, self.sheets.model, self.sheets.data
-        self.sheets.reset()
-        if model.nkey:
-            mujoco.mj_resetDataKeyframe(model, data, 0)
-        mujoco.mj_forward(model, data)
-        self.most_n = dict.fromkeys(self.sheets, 0.0)
-        made = self.reflexes.get(self.reflex)
-        self._acts = None if made is None else made(float(data.ctrl[0]))
-        self._asked = round(REST_S / REFLEX_S)
-
-    def states(self) -> dict[str, LinkState]:
-        """Of all links, after the next moment."""
-        if self._stale:
-            self._restart()
-        sheets, pace = self.sheets, self._pace
-        began_s, began = sheets.clock(), time.monotonic()
-        until_s = began_s + min(pace.due(began_s), pace.most_s)
-        while sheets.clock() < until_s:
-            self._step()
-        if sheets.clock() > began_s:
-            pace.ran(sheets.clock() - began_s, time.monotonic() - began)
-        links: dict[str, LinkState] = sheets.snapshot().links
-        return links
-
-    def _step(self) -> None:
-        data = self.sheets.data
+    def step(self, fingers: Mapping[str, Sequence[Finger]]) -> None:
+        """MuJoCo's next step, while these fingers push its links."""
+        sheets, data = self.sheets, self.sheets.data
         if self._acts is not None and (tick := int(data.time / REFLEX_S + 1e-6)) > self._asked:
             self._asked = tick
-            data.ctrl[0] = self._acts(self.sheets.snapshot(), self._angle())
-        self.sheets.step()
-        for name in self.most_n:
+            if (seen := self._seen()) is not None:
+                data.ctrl[0] = self._acts(seen, self._angle())
+        for name, worn in sheets.items():
+            worn.touch(fingers[name])
+        sheets.step()
+        for name in sheets:
             self.most_n[name] = max(self.most_n[name], self.force_n(name))
+
+    def _seen(self) -> Snapshot | None:
+        """What the reflex knows now; None: nothing has come yet."""
+        now: Snapshot = self.sheets.snapshot()
+        if self.skin != LATE:
+            return now
+        age_s = min((state.age_s for state in now.links.values() if state.age_s is not None), default=0.0)
+        coming = self._coming
+        coming.append((now.host_time_s - age_s + LATE_S, now))
+        while len(coming) > 1 and coming[1][0] <= now.host_time_s:
+            coming.popleft()
+        due_s, seen = coming[0]
+        return seen if due_s <= now.host_time_s else None
 
     def _angle(self) -> float:
         """Of the joint that the first actuator turns."""
@@ -117,49 +90,170 @@ class SimulatedSource:
         """Of a link's forces, for the panel."""
         return f"pressed by {self.force_n(link):.1f} N, most so far {self.most_n[link]:.1f} N"
 
-    @property
-    def share(self) -> float:
-        """Of real time."""
-        return self._pace.share
-
-    # ---- what is drawn
-
-    def solids(self) -> list[Solid]:
-        """All geoms that can be drawn."""
-        model = self.sheets.model
-        found = [_solid(model, number, self.body) for number in range(model.ngeom)]
-        return [solid for solid in found if solid is not None]
+    def states(self) -> dict[str, LinkState]:
+        """Of all links, as the kit's bytes tell of them."""
+        links: dict[str, LinkState] = self.sheets.snapshot().links
+        return links
 
     def poses(self) -> dict[str, Pose]:
         """Of MuJoCo's bodies, by their names."""
         model, data = self.sheets.model, self.sheets.data
         return {
-            _named(model, number): Pose(data.xmat[number].reshape(3, 3).copy(), data.xpos[number].copy())
+            solids.named(model, number): Pose(data.xmat[number].reshape(3, 3).copy(), data.xpos[number].copy())
             for number in range(model.nbody)
         }
 
+
+class Sweep:
+    """The largest forces of each copy over the time since a touch; the next touch after :data:`SWEEP_S` starts it over.
+    As an oscilloscope does, so that it stands while one looks at it."""
+
+    def __init__(self, copies: int):
+        self.forces_n = np.full((copies, SWEEP_STEPS), np.nan)
+        """(copies, SWEEP_STEPS) in N; nan where the time has not come, or nothing touched yet."""
+        self._began_s: float | None = None
+        self._before = np.zeros(copies)
+
+    def add(self, seconds: float, forces_n: Sequence[float]) -> None:
+        """Of all copies, at a time."""
+        forces = np.array(forces_n)
+        ended = self._began_s is None or seconds - self._began_s >= SWEEP_S - 1e-9
+        if ended and ((forces > 0) & (self._before == 0)).any():
+            self._began_s = seconds
+            self.forces_n[:] = np.nan
+        self._before = forces
+        if self._began_s is not None:
+            step = int((seconds - self._began_s) / SWEEP_S * SWEEP_STEPS + 1e-6)
+            if step < SWEEP_STEPS:
+                self.forces_n[:, step] = np.fmax(self.forces_n[:, step], forces)
+
+
+class SharedLink:
+    """A link of all copies, as the mouse presses it."""
+
+    by_force = True
+
+    def __init__(self) -> None:
+        self.fingers: tuple[Finger, ...] = ()
+
+    def touch(self, fingers: Sequence[Finger]) -> None:
+        """From the next step on these push it in every copy."""
+        self.fingers = tuple(fingers)
+
+
+class SimulatedSource:
+    """A robot of MuJoCo in real time, or as near to it as the machine can."""
+
+    def __init__(self, robot: str, model: str, reflex: str | None = None, gateware: bool = False):
+        """``model``: MJCF or URDF; its first keyframe is where it starts. ``reflex``: a Python file, whose classes with
+        ``__call__(snapshot, angle)`` can each set the first actuator.
+
+        Raises :class:`~contactfpga.ContactFPGAError` for a model that cannot be read, what
+        :class:`contactfpga.mujoco.Sheets` raises, and :class:`~contactfpga.MissingExtra`.
+        """
+        self._parts: Any = import_module("contactfpga.mujoco")
+        self._robot, self._gateware = robot, gateware
+        self.title = model
+        self.reflexes = _reflexes(reflex)
+        """By name what makes a reflex of a speed; without :data:`NO_REFLEX`."""
+        self.reflex = next(iter(self.reflexes), NO_REFLEX)
+        """The name of the one that acts; :data:`NO_REFLEX`: the model's first command stays."""
+        self.skin = KIT
+        """One of :data:`SKINS`, or :data:`ALL`."""
+        self.body = Body.load(robot)
+        self._model = _compiled(self._parts, model, robot, self.body)
+        if self.reflexes and not self._model.nu:
+            raise ContactFPGAError(f"{model} has no actuator; --reflex needs one, a <velocity> servo of a joint")
+        self.copies: list[RobotCopy] = []
+        """As :attr:`skin` says; new ones after each start."""
+        self.links = {name: SharedLink() for name in self.body.links}
+        self.obstacle = obstacle.Obstacle()
+        self.simulated_s = 0.0
+        """In all, over all starts."""
+        self.pace = SimulatedPace(self.simulated_s)
+        self._restart()
+
+    def restart(self) -> None:
+        """Put the robot back to where it started, and its reflex as well, before the next moment."""
+        self._stale = True
+
+    def _restart(self) -> None:
+        self.close()
+        self._stale = False
+        self.copies = []
+        for skin in SKINS if self.skin == ALL else (self.skin,):
+            self.copies.append(self._copy(skin))
+        self.sweep = Sweep(len(self.copies))
+
+    def _copy(self, skin: str) -> RobotCopy:
+        import mujoco
+
+        model, data = self._model, mujoco.MjData(self._model)
+        if model.nkey:
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+        self.obstacle.place(model, data)
+        mujoco.mj_forward(model, data)
+        # The foam is a spring where the model leaves room for it.
+        foam = bool((model.geom_gap > 0).any())
+        sheets = self._parts.Sheets(model, data, self._robot, foam=foam, golden=not self._gateware)
+        made = self.reflexes.get(self.reflex)
+        return RobotCopy(skin, sheets, None if made is None else made(float(data.ctrl[0])))
+
+    def advance(self) -> None:
+        """Go on to the next moment."""
+        if self._stale:
+            self._restart()
+        pace = self.pace
+        began_s, began = self.simulated_s, time.monotonic()
+        until_s = began_s + min(pace.due(began_s), pace.most_s)
+        while self.simulated_s < until_s - 1e-9:
+            self._step()
+        if self.simulated_s > began_s:
+            pace.ran(self.simulated_s - began_s, time.monotonic() - began)
+
+    def _step(self) -> None:
+        """All copies feel the same fingers and the same obstacle."""
+        step_s = float(self._model.opt.timestep)
+        fingers = {name: link.fingers for name, link in self.links.items()}
+        self.obstacle.go_on(step_s)
+        for copy in self.copies:
+            self.obstacle.place(self._model, copy.sheets.data)
+            copy.step(fingers)
+        self.simulated_s += step_s
+        self.sweep.add(self.simulated_s, [max(map(copy.force_n, copy.sheets)) for copy in self.copies])
+
+    @property
+    def share(self) -> float:
+        """Of real time."""
+        return self.pace.share
+
+    def solids(self) -> list[solids.Solid]:
+        """All geoms that can be drawn."""
+        return solids.solids_of(self._model, self.body.links)
+
     def close(self) -> None:
         """Free the boards."""
-        self.sheets.close()
+        for copy in self.copies:
+            copy.sheets.close()
 
 
-def _compiled(parts: Any, path: str, robot: str) -> tuple[Any, Any]:
-    """Model and data; its sheets' shapes are added where a link has none."""
+def _compiled(parts: Any, path: str, robot: str, body: Body) -> Any:
+    """The model, with its sheets' shapes where a link has none, and with obstacles."""
     import mujoco
 
     if not Path(path).is_file():
         raise ContactFPGAError(f"{path} is no file; --mujoco takes the MJCF or URDF of a robot")
     try:
         spec = mujoco.MjSpec.from_file(path)
-        bodies = [spec.body(plan.frame) for plan in Body.load(robot).links.values()]
+        bodies = [spec.body(plan.frame) for plan in body.links.values()]
         if any(body is None or not len(body.geoms) for body in bodies):
             parts.wear(spec, robot)
-        model = spec.compile()
+        obstacle.add(spec)
+        return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         if isinstance(error, ContactFPGAError):
             raise
         raise ContactFPGAError(f"{path}: MuJoCo says {shortened(' '.join(str(error).split()))}") from None
-    return model, mujoco.MjData(model)
 
 
 def _reflexes(path: str | None) -> dict[str, Callable[[float], Reflex]]:
@@ -177,71 +271,3 @@ def _reflexes(path: str | None) -> dict[str, Callable[[float], Reflex]]:
     if not found:
         raise ContactFPGAError(f"--reflex {path} has no class with __call__(snapshot, angle)")
     return found
-
-
-@dataclasses.dataclass(frozen=True)
-class Solid:
-    """A part of a link that is drawn."""
-
-    link: str
-    pose: Pose
-    """In the link's frame."""
-    vertices_m: np.ndarray
-    """(n, 3)"""
-    faces: np.ndarray
-    """(m, 3)"""
-    color: tuple[int, int, int]
-
-
-def _named(model: Any, number: int) -> str:
-    return str(model.body(number).name) or f"body{number}"
-
-
-def _solid(model: Any, number: int, body: Body) -> Solid | None:
-    """None for a kind of geom that is not drawn: a height field, a field of distances."""
-    import mujoco
-
-    geom = model.geom(number)
-    worn = geom.name in body.links
-    made = _mesh(model, int(geom.dataid[0])) if geom.dataid[0] >= 0 else _form(int(geom.type[0]), geom.size)
-    if made is None:
-        return None
-    vertices, faces = made
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, geom.quat)
-    pose = Pose(turn.reshape(3, 3), geom.pos.copy())
-    red, green, blue = (round(255 * float(share)) for share in geom.rgba[:3])
-    owner = _named(model, int(geom.bodyid[0]))
-    return Solid(owner, pose, vertices * (UNDER if worn else 1.0), faces, (red, green, blue))
-
-
-def _mesh(model: Any, number: int) -> tuple[np.ndarray, np.ndarray]:
-    mesh = model.mesh(number)
-    first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
-    begin, faces = int(mesh.faceadr[0]), int(mesh.facenum[0])
-    if faces > mesh_file.MAX_TRIANGLES:
-        raise ContactFPGAError(f"mesh {shown(mesh.name)} has {faces} triangles; at most {mesh_file.MAX_TRIANGLES}")
-    return model.mesh_vert[first : first + count].copy(), model.mesh_face[begin : begin + faces].copy()
-
-
-def _form(kind: int, size: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices in m and faces of MuJoCo's primitives."""
-    from mujoco import mjtGeom
-
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 17)
-    ball = np.stack([np.cos(turn), np.sin(turn)], -1)
-    if kind in (mjtGeom.mjGEOM_BOX, mjtGeom.mjGEOM_PLANE):
-        half = size.copy() if kind == mjtGeom.mjGEOM_BOX else np.append(np.where(size[:2] > 0, size[:2], PLANE_M), 5e-4)
-        shift = 0.0 if kind == mjtGeom.mjGEOM_BOX else -5e-4
-        square = np.array([(0, -1), (np.sqrt(2), -1), (np.sqrt(2), 1), (0, 1)])
-        vertices, faces = revolved(square, sides=4, first=np.pi / 4)
-        return vertices * half + np.array([0, 0, shift]), faces
-    if kind in (mjtGeom.mjGEOM_SPHERE, mjtGeom.mjGEOM_ELLIPSOID):
-        vertices, faces = revolved(ball)
-        return vertices * (size if kind == mjtGeom.mjGEOM_ELLIPSOID else size[0]), faces
-    radius, half_length = float(size[0]), float(size[1])
-    if kind == mjtGeom.mjGEOM_CAPSULE:
-        return revolved(radius * ball + np.stack([0 * turn, half_length * np.where(turn < 0, -1, 1)], -1))
-    if kind == mjtGeom.mjGEOM_CYLINDER:
-        return revolved(np.array([(0, -1), (radius, -1), (radius, 1), (0, 1)]) * (1, half_length))
-    return None

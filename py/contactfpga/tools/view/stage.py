@@ -69,6 +69,8 @@ class Stage:
         self._lines: dict[str, Any] = {}
         self._points: Any = None
         self._labels: list[Any] = []
+        self.told = contacts.MOST
+        """Contacts that have all that is known written beside them."""
         self._glow = glow.Glow(server, f"{node}/glow", tiles, under_mm) if carried else None
         self._trails = picture.Trails(tiles.surface, self._lift_mm + 0.03 * self._pitch_mm)
         self._colors: np.ndarray | None = None
@@ -106,12 +108,14 @@ class Stage:
         self._draw_labels(moment)
         self._draw_arrows(self._forces(moment))
 
-    def draw_no_data(self) -> None:
-        """Dark cells and nothing on them: nobody knows what touches."""
+    def draw_no_data(self, arrows: np.ndarray | None = None) -> None:
+        """Dark cells and nothing on them but these forces: nobody knows what touches."""
         self._color(np.tile(np.array(picture.UNKNOWN, np.uint8), (len(self.tiles.points_mm), 1)))
         for handle in (*self._lines.values(), self._points, *self._labels, self._arrows):
             if handle is not None:
                 handle.visible = False
+        if arrows is not None:
+            self._draw_arrows(arrows)
 
     def _color(self, colors: np.ndarray) -> None:
         if self._colors is None or not np.array_equal(colors, self._colors):
@@ -180,7 +184,7 @@ class Stage:
             assert row.y_mm is not None
             point, normal = self.tiles.surface.place(row.x_mm, row.y_mm)
             label.position = (np.array(point) + (self._lift_mm + 0.9 * self._pitch_mm) * np.array(normal)) * MM
-            label.text = "\n".join(row.lines) if number < contacts.MOST else row.name
+            label.text = "\n".join(row.lines) if number < self.told else row.name
             label.visible = True
         for label in self._labels[len(shown) :]:
             label.visible = False

@@ -78,31 +78,47 @@ class Visitor:
 
     def place(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
         """Where a place of the sheet is on the canvas, as shares of its width and height; ``link``: of a robot."""
-        camera = next(iter(self._shown.web.get_clients().values())).camera
         view = self._shown.view
         stage = view.stage if isinstance(view, View) else view.stage.stages[link]
         point, _ = stage.tiles.surface.place(x_mm, y_mm)
-        world = stage.rotation @ np.array(point) * MM + stage.point_m
-        x, y, z = turned(camera.wxyz, world - camera.position)
+        return self._seen(stage.rotation @ np.array(point) * MM + stage.point_m)
+
+    def _seen(self, point_m: np.ndarray) -> tuple[float, float]:
+        """The same of a place in the scene."""
+        camera = next(iter(self._shown.web.get_clients().values())).camera
+        x, y, z = turned(camera.wxyz, point_m - camera.position)
         scale = 0.5 / np.tan(camera.fov / 2) / z
         return 0.5 + x * scale / camera.aspect, 0.5 + y * scale
 
     def click(self, x_mm: float, y_mm: float, link: str = "") -> None:
         """With the mouse, as a user does."""
-        x, y = self._pixel(x_mm, y_mm, link)
-        self.page.mouse.move(x, y)
+        self.page.mouse.move(*self._pixel(self.place(x_mm, y_mm, link)))
         self.page.wait_for_timeout(100)
         self.page.mouse.down()
         self.page.mouse.up()
 
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
         """From the first to the last, which is held for a while; the button stays down."""
-        self.page.mouse.move(*self._pixel(*places[0]))
+        self._drag([self.place(*place) for place in places], hold_ms)
+
+    def drag_in_space(self, *points_m: np.ndarray, hold_ms: int = 300) -> None:
+        """The same along places in the scene."""
+        self._drag([self._seen(point) for point in points_m], hold_ms)
+
+    def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
+        self.page.mouse.move(*self._pixel(shares[0]))
         self.page.wait_for_timeout(hold_ms)  # the page finds out what the mouse is over
         self.page.mouse.down()
-        for place in places[1:]:
-            self.page.mouse.move(*self._pixel(*place), steps=8)
+        for one in shares[1:]:
+            self.page.mouse.move(*self._pixel(one), steps=8)
             self.page.wait_for_timeout(hold_ms)
+
+    def choose(self, before: str, now: str) -> None:
+        """In the list of the panel that shows ``before``."""
+        lists = self.page.locator("input[aria-haspopup=listbox]")
+        number = [lists.nth(one).input_value() for one in range(lists.count())].index(before)
+        lists.nth(number).click()
+        self.page.get_by_role("option", name=now, exact=True).click()
 
     def watch(self, x_mm: float, y_mm: float) -> None:
         """Wait from now on, in the page, until a barycenter is drawn there."""
@@ -114,10 +130,9 @@ class Visitor:
         clicked, drawn = self.page.evaluate("[window.clicked_ms, window.drawn_ms]")
         return clicked / 1e3, drawn / 1e3
 
-    def _pixel(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
-        x, y = self.place(x_mm, y_mm, link)
+    def _pixel(self, shares: tuple[float, float]) -> tuple[float, float]:
         left, top, width, height = self.page.evaluate("window.box()")
-        return left + x * width, top + y * height
+        return left + shares[0] * width, top + shares[1] * height
 
 
 def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:

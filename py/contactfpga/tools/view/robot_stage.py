@@ -1,0 +1,203 @@
+"""The links of a robot in viser's scene, with the sheets on them."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactfpga import picture_style
+from contactfpga.inputs.values import shown
+from contactfpga.robot.body import Body, BodyError
+from contactfpga.robot.body import urdf as urdf_file
+from contactfpga.robot.body.kinematics import Pose
+from contactfpga.robot.body.plan import Plan
+from contactfpga.surfaces import SurfaceError, mesh_file
+from contactfpga.tools.view.picture import rgb
+from contactfpga.tools.view.solids import Solid
+from contactfpga.tools.view.stage import Stage
+from contactfpga.tools.view.tiles import MM, Tiles, quaternions
+
+if TYPE_CHECKING:
+    from xml.etree import ElementTree
+
+    import viser
+
+ROOT = "/robot"
+BONE = rgb(picture_style.GRAY)
+MESHES = (*mesh_file.SUFFIXES, mesh_file.COLLADA)
+MAX_MESHES = 1000
+MAX_MESH_BYTES = 100_000_000
+"""Of all meshes of a robot; they may have as many triangles as one alone."""
+REST = "what is beyond the limit of all meshes"
+
+
+@dataclasses.dataclass(frozen=True)
+class Visual:
+    """A mesh of a link."""
+
+    link: str
+    pose: Pose
+    path: Path
+    scale: tuple[float, float, float]
+
+
+def visuals(urdf: Path) -> list[Visual]:
+    """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out. Raises
+    :class:`BodyError`, OSError."""
+    found = []
+    links = urdf_file.tree(urdf).findall("link")
+    try:
+        for link in links:
+            found += [_visual(one, link.get("name", ""), urdf.parent) for one in link.findall("visual")]
+    except BodyError as error:
+        raise BodyError(f"{urdf}: {error}") from None
+    return [visual for visual in found if visual is not None]
+
+
+def _visual(element: ElementTree.Element, link: str, folder: Path) -> Visual | None:
+    mesh = element.find("geometry/mesh")
+    path = None if mesh is None else _path(mesh.get("filename", ""), folder)
+    if path is None:
+        return None
+    where, origin = f"a mesh of link {shown(link)}", element.find("origin")
+    shift, turn = (urdf_file.vector(origin, key, where) for key in ("xyz", "rpy"))
+    return Visual(link, Pose.of(shift, turn), path, urdf_file.vector(mesh, "scale", where, "1 1 1"))
+
+
+def _path(name: str, folder: Path) -> Path | None:
+    try:
+        path = urdf_file.located(name.removeprefix("file://"), folder)
+    except BodyError:  # of a package that is not installed: the sheets can be shown all the same
+        return None
+    return path if path.is_file() else None
+
+
+class RobotStage:
+    """Links as meshes where these can be read, else as lines between joints; and a stage for each sheet."""
+
+    def __init__(self, server: viser.ViserServer, body: Body, solids: Sequence[Solid] = (), node: str = ROOT):
+        """``solids``: what is drawn in the place of the URDF's links."""
+        self._server, self._body, self._node = server, body, node
+        self._root = server.scene.add_frame(node, show_axes=False)
+        self.at_m = np.zeros(3)
+        """Where the robot's base is drawn."""
+        self._frames: dict[str, Any] = {}
+        self.unread: set[str] = set()
+        """Kinds of mesh files that could not be read."""
+        self._meshes = self._mesh_bytes = self._triangles = 0
+        self._corners: list[tuple[str, np.ndarray]] = []
+        """Links with the corners of a box around a mesh, (8, 3) in m in the link's frame."""
+        self._poses: Mapping[str, Pose] = {}
+        self._hidden: set[str] = set()
+        scene = server.scene
+        names = [plan.frame for plan in body.links.values()]
+        if solids:
+            names += [solid.link for solid in solids]
+        elif body.kinematics is not None:
+            names = list(body.kinematics.robot.links)
+        for name in dict.fromkeys(names):
+            self._frames[name] = scene.add_frame(f"{self._node}/{name}", show_axes=False)
+        for visual in visuals(body.urdf) if body.urdf is not None and not solids else ():
+            self._add_mesh(visual)
+        for solid in solids:
+            self._add(solid)
+        self.stages = {name: self._add_sheet(plan) for name, plan in body.links.items()}
+        self._bones: Any = None
+        for name, plan in body.links.items():
+            self.stages[name].rotation, self.stages[name].point_m = plan.pose.rotation, plan.pose.point_m
+
+    def _add_mesh(self, visual: Visual) -> None:
+        try:
+            self._meshes += 1
+            self._mesh_bytes += visual.path.stat().st_size
+            if self._meshes > MAX_MESHES or self._mesh_bytes > MAX_MESH_BYTES:
+                raise SurfaceError(REST)
+            mesh = mesh_file.read(visual.path, "view", MESHES)
+            self._triangles += len(mesh.faces)
+            if self._triangles > mesh_file.MAX_TRIANGLES:
+                raise SurfaceError(REST)
+        except (SurfaceError, OSError) as error:
+            self.unread.add(REST if str(error) == REST else visual.path.suffix)
+            return
+        mesh.merge_vertices()
+        vertices, faces = np.asarray(mesh.vertices) * visual.scale, np.asarray(mesh.faces)
+        self._add(Solid(visual.link, visual.pose, vertices, faces, rgb(picture_style.SHEET)))
+
+    def _add(self, solid: Solid) -> None:
+        box = np.array(list(itertools.product(*zip(solid.vertices_m.min(0), solid.vertices_m.max(0)))))
+        self._corners.append((solid.link, solid.pose.apply(box)))
+        count = len(self._frames)
+        self._frames[f"{solid.link}#{count}"] = self._server.scene.add_mesh_simple(
+            f"{self._node}/{solid.link}/mesh{count}",
+            solid.vertices_m,
+            solid.faces,
+            color=solid.color,
+            wxyz=quaternions(solid.pose.rotation[None])[0],
+            position=solid.pose.point_m,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def _add_sheet(self, plan: Plan) -> Stage:
+        node = f"{self._node}/{plan.frame}/{plan.name}"
+        wxyz = quaternions(plan.pose.rotation[None])[0]
+        self._server.scene.add_frame(node, show_axes=False, wxyz=wxyz, position=plan.pose.point_m)
+        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node, carried=False)
+
+    def move(self, angles: Mapping[str, float]) -> None:
+        """Draw all links at these angles."""
+        kinematics = self._body.kinematics
+        if kinematics is None:
+            return
+        poses = kinematics.poses(angles)
+        self.place(poses)
+        joints = kinematics.robot.joints.values()
+        if not joints:
+            return
+        bones = np.array([(poses[joint.parent].point_m, poses[joint.child].point_m) for joint in joints])
+        if self._bones is None:
+            self._bones = self._server.scene.add_line_segments(
+                f"{self._node}/bones", bones, BONE, thickness=2.0, thickness_units="screen"
+            )
+        self._bones.points = bones.astype(np.float32)
+
+    def place(self, poses: Mapping[str, Pose]) -> None:
+        """Draw the links at these poses."""
+        self._poses = poses
+        orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
+        for name, plan in self._body.links.items():
+            mine = poses[plan.frame] @ plan.pose
+            self.stages[name].rotation, self.stages[name].point_m = mine.rotation, mine.point_m + self.at_m
+        for (name, pose), wxyz in zip(poses.items(), orientations):
+            if (frame := self._frames.get(name)) is not None:
+                frame.wxyz, frame.position = wxyz, pose.point_m
+
+    def shift(self, at_m: np.ndarray) -> None:
+        """Draw the robot's base at (3,) ``at_m`` from now on; takes effect with the next poses."""
+        self.at_m = at_m
+        self._root.position = at_m
+
+    def show(self, visible: bool = True, link: str | None = None) -> None:
+        """Draw all of it or not, or one link of it."""
+        (self._root if link is None else self._frames[link]).visible = visible
+        if link is not None:
+            (self._hidden.discard if visible else self._hidden.add)(link)
+
+    def on_drag(self, link: str, follow: Callable[[Any], Any]) -> None:
+        """Have the left mouse button on a link's meshes call this with viser's event."""
+        for name, mesh in self._frames.items():
+            if name.startswith(f"{link}#"):
+                mesh.on_drag("left")(follow)
+
+    def points_m(self) -> np.ndarray:
+        """(n, 3) around all that is drawn, where the joints put it."""
+        sheets = [stage.tiles.points_mm * MM @ stage.rotation.T + stage.point_m for stage in self.stages.values()]
+        seen = [(link, corners) for link, corners in self._corners if link not in self._hidden]
+        meshes = [self._poses[link].apply(corners) + self.at_m for link, corners in seen]
+        return np.concatenate([*sheets, *meshes])
