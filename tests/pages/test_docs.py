@@ -5,6 +5,7 @@ import doctest
 import importlib.util
 import io
 import re
+import runpy
 import shlex
 from pathlib import Path
 
@@ -16,31 +17,48 @@ from contactfpga.tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ALL_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-EXAMPLE = re.compile(r"^ *(?:>>> |\$ contactfpga .*\n *\S)", re.MULTILINE)
+EXAMPLE = re.compile(r"^ *(?:>>> |\$ (?:contactfpga|python) .*\n *\S)", re.MULTILINE)
 PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if EXAMPLE.search(page.read_text(encoding="utf-8")))
 
 
 def test_the_pages_have_examples():
-    assert {"README.md", "docs/use.md", "docs/skin.md", "docs/starter.md"} <= set(PAGES)
+    assert {"README.md", "docs/use.md", "docs/skin.md", "docs/starter.md", "docs/stop.md"} <= set(PAGES)
 
 
-SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/watch.md"}
-"""Their examples compile boards of their own."""
+SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/stop.md", "docs/watch.md"}
+"""Their examples compile boards of their own, or run an arm for seconds."""
+NEEDED = {"docs/ros.md": ("cyclonedds",), "docs/stop.md": ("cyclonedds", "mujoco")}
+"""Packages of extras, without which a page is left out."""
 
 
 class Session(doctest.DocTestParser):
-    """A page from top to bottom: Python, and each command after ``$ `` whose output follows; ``...`` stands for any."""
+    """A page from top to bottom: Python, and each command or file of Python after ``$ `` whose output follows; ``...`` stands for any."""
 
     def parse(self, string, name="<string>"):
         python = r"\1>>> run(r'''\2''')  # doctest: +ELLIPSIS\n"
-        return super().parse(re.sub(r"^( *)\$ contactfpga (.*)\n(?= *\S)", python, string, flags=re.MULTILINE), name)
+        command = r"^( *)\$ ((?:contactfpga|python) .*)\n(?= *\S)"
+        return super().parse(re.sub(command, python, string, flags=re.MULTILINE), name)
 
 
-def run(arguments: str) -> None:
+def run(command: str) -> None:
     """A command, in this process; without the spaces with which tables fill their lines."""
+    program, *arguments = shlex.split(command)
     with contextlib.redirect_stdout(io.StringIO()) as shown:
-        assert cli.main(shlex.split(arguments)) == 0
+        if program == "contactfpga":
+            assert cli.main(arguments) == 0
+        else:
+            run_file(arguments)
     print(re.sub(r" +$", "", shown.getvalue(), flags=re.MULTILINE), end="")
+
+
+def run_file(arguments: list[str]) -> None:
+    """A file of Python, as a program."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", arguments)
+        try:
+            runpy.run_path(arguments[0], run_name="__main__")
+        except SystemExit as end:
+            assert not end.code
 
 
 def examples_of(page: Path) -> doctest.TestResults:
@@ -50,6 +68,8 @@ def examples_of(page: Path) -> doctest.TestResults:
 @pytest.mark.usefixtures("_closed_ports")
 @pytest.mark.parametrize("page", sample(PAGES, quick={*PAGES} - SLOW, slow=SLOW))
 def test_examples_print_what_they_say(page, tmp_path, monkeypatch):
+    for package in NEEDED.get(page, ()):
+        pytest.importorskip(package)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
