@@ -108,9 +108,14 @@ def test_each_documented_module_has_its_heading():
         assert re.search(rf"^#+ {re.escape(module)}$", page, re.MULTILINE), module
 
 
-@pytest.mark.parametrize("page", sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "index.md"))
-def test_each_page_is_in_a_group_of_the_index(page):
-    assert f"\n{page.removesuffix('.md')}\n" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
+GROUPS = ["Start", "Guide", "Hardware", "Reference", "Internals", "Evidence"]
+
+
+def test_each_page_is_in_one_group_of_the_index():
+    index = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (.*)", index, re.MULTILINE) == GROUPS
+    rows = re.findall(r"^\| \[.+\]\((\S+)\) \| \S.+ \|$", index, re.MULTILINE)
+    assert sorted(rows) == sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "index.md")
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
@@ -124,6 +129,44 @@ def words(page: Path) -> str:
     text = page.read_text(encoding="utf-8")
     text = re.sub(r"<!-- (?:figures|pins): \w+(?: of \w+)? -->.*?<!-- end -->", "", text, flags=re.DOTALL)
     return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+
+
+GENERATED = {"api.md"}
+"""Its text is that of the docstrings."""
+
+
+@pytest.mark.parametrize("page", [page for page in ALL_PAGES if page.name not in GENERATED], ids=lambda path: path.name)
+def test_a_page_is_plain_markdown(page):
+    """Hosts of repositories show directives and targets of Sphinx as code, and no links to them."""
+    text = page.read_text(encoding="utf-8")
+    assert [line for line in text.splitlines() if SPHINX.search(line)] == []
+
+
+SPHINX = re.compile(r"^\s*(?:`{3,}|:{3,}|~{3,}) *\{|^\([\w-]+\)= *$|(?<!`)\{[a-z]+\}`|^%|^\+{3}")
+
+
+@pytest.mark.parametrize(
+    "line", ["```{image} a.svg", "  :::{note}", "(unseen)=", "see {ref}`unseen`", "% a remark", "+++"]
+)
+def test_a_line_of_sphinx_is_seen(line):
+    assert SPHINX.search(line)
+    assert not SPHINX.search(f"say {line.replace('`', '')}")
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_links_into_pages_lead_to_headings(page):
+    """By the rule of GitHub, whose names of headings Sphinx makes, too."""
+    links = re.findall(r"\]\(((?:\w[\w./-]*\.md)?)#([^)\s]+)\)", page.read_text(encoding="utf-8"))
+    found = {name: headings(page.parent / name if name else page) for name in {name for name, _ in links}}
+    wrong = {f"{name}#{place}" for name, place in links if place not in found[name] and name not in GENERATED}
+    assert wrong == set()
+
+
+def headings(page: Path) -> set[str]:
+    """The names by which a page's headings are linked to."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    heads = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", head) for head in re.findall(r"^#+ (.*)", text, re.MULTILINE)]
+    return {re.sub(r"[^\w\- ]", "", head.strip().lower()).replace(" ", "-") for head in heads}
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)

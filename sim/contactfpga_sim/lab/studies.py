@@ -342,6 +342,15 @@ _ALL = (
         extra="boards",
     ),
     Study(
+        "skin",
+        title="The fields of a Skin file",
+        page="skin.md",
+        minutes=0.1,
+        sections={
+            "fields": Section("tables:fields_table", sample="tables:fields_table"),
+        },
+    ),
+    Study(
         "tested",
         title="Changes of the gateware's source that the default tests notice",
         page="mutants.md",
