@@ -3,8 +3,8 @@
     contactfpga ros              # or the node: ros2 run contactfpga_ros skin
     python examples/ros_stop.py  # in a shell that knows the workspace with contactfpga_msgs
 
-"No data" is never "no contact": `/stop` is also True before the first frame. What moves the robot must stop on True, and
-when `/stop` itself does not arrive. After a contact or a fault it stays True until this node starts again.
+"No data" is never "no contact": `/stop` is also True before the first frame. What moves the robot must stop on True,
+and when `/stop` itself does not arrive. After a contact or a fault it stays True until this node starts again.
 """
 
 import time

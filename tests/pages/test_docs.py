@@ -32,7 +32,8 @@ NEEDED = {"docs/ros.md": ("cyclonedds",), "docs/stop.md": ("cyclonedds", "mujoco
 
 
 class Session(doctest.DocTestParser):
-    """A page from top to bottom: Python, and each command or file of Python after ``$ `` whose output follows; ``...`` stands for any."""
+    """A page from top to bottom: Python, and each command or file of Python after ``$ `` whose output follows; ``...``
+    stands for any."""
 
     def parse(self, string, name="<string>"):
         python = r"\1>>> run(r'''\2''')  # doctest: +ELLIPSIS\n"
@@ -55,10 +56,8 @@ def run_file(arguments: list[str]) -> None:
     """A file of Python, as a program."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sys.argv", arguments)
-        try:
-            runpy.run_path(arguments[0], run_name="__main__")
-        except SystemExit as end:
-            assert not end.code
+        patch.setattr("sys.exit", lambda status=None: status and pytest.fail(f"{arguments}: exit status {status}"))
+        runpy.run_path(arguments[0], run_name="__main__")
 
 
 def examples_of(page: Path) -> doctest.TestResults:
@@ -84,6 +83,13 @@ def test_a_command_with_another_output_is_seen(tmp_path):
     assert examples_of(page) == doctest.TestResults(failed=1, attempted=1)
     page.write_text(page.read_text().replace("1 zone", "0 zones"))
     assert examples_of(page) == doctest.TestResults(failed=0, attempted=1)
+
+
+def test_a_file_with_another_output_is_seen(tmp_path):
+    file, page = tmp_path / "file.py", tmp_path / "page.md"
+    file.write_text("import sys\nprint(sys.argv[1])\nsys.exit(0)")
+    page.write_text(f"    $ python {file} one\n    one\n    $ python {file} one\n    two\n")
+    assert examples_of(page) == doctest.TestResults(failed=1, attempted=2)
 
 
 def documented(page: str) -> set[str]:
