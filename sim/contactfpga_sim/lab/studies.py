@@ -125,9 +125,9 @@ _ALL = (
         minutes=10,
         sections={
             "fingers": Section("tables:fingers_section", kept="12x12|16x16|20x20|23x23|host|answer|runner"),
-            "bumper": Section("tables:bumper_section"),
-            "hands": Section("tables:hands_section"),
-            "sole": Section("tables:sole_section"),
+            "bumper": Section("tables:bumper_section", kept="10x10|11x11|host|answer|runner"),
+            "hands": Section("tables:hands_section", kept="12x12|14x14|15x15|host|answer|runner"),
+            "sole": Section("tables:sole_section", kept="20x8|22x9|host|answer|runner"),
         },
         extra="chart",
     ),
