@@ -11,6 +11,7 @@ from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
 
+from contactfpga import __version__
 from contactfpga.helptext import HEAD
 
 sys.path.append(str(Path(__file__).parent / "try"))
@@ -22,7 +23,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
-html_title = "contactfpga"
+html_title = f"contactfpga {__version__}"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
 html_math_renderer = "mathml"
