@@ -199,7 +199,7 @@ _ALL = (
         minutes=8,
         sections={
             "peaks": Section("clip:peaks_table"),
-            "observer": Section("collisions:observer_table"),
+            "observer": Section("collisions:observer_table", page="collisions.md"),
         },
         pictures="clip:draw",
         extra="test",
