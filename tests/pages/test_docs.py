@@ -17,6 +17,8 @@ from contactfpga.tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ALL_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+GENERATED = {page.name for page in ALL_PAGES if page.name.startswith("api")}
+"""Their text is that of the docstrings."""
 EXAMPLE = re.compile(r"^ *(?:>>> |\$ (?:contactfpga|python) .*\n *\S)", re.MULTILINE)
 PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if EXAMPLE.search(page.read_text(encoding="utf-8")))
 
@@ -93,7 +95,7 @@ def test_a_file_with_another_output_is_seen(tmp_path):
 
 
 def documented(page: str) -> set[str]:
-    """Names that the directives of the interface's page take: one by one, or all of a module that are its own."""
+    """Names that the directives of the interface's pages take: one by one, or all of a module that are its own."""
     found = set(re.findall(r"^\.\. auto(?:class|function):: (\S+)$", page, re.MULTILINE))
     for module in re.findall(r"^\.\. automodule:: (\S+)\n   :members:$", page, re.MULTILINE):
         values = vars(importlib.import_module(module)).items()
@@ -101,15 +103,15 @@ def documented(page: str) -> set[str]:
     return found
 
 
-def test_the_interface_page_has_every_public_name():
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+def test_the_interface_pages_have_every_public_name():
+    page = "\n".join(page.read_text(encoding="utf-8") for page in ALL_PAGES if page.name in GENERATED)
     names = {f"contactfpga.{name}" for name in contactfpga.__all__}
     assert names - documented(page) == {"contactfpga.__version__"}
     assert "contactfpga.__version__" in page
 
 
 def test_each_documented_module_has_its_heading():
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    page = "\n".join(page.read_text(encoding="utf-8") for page in ALL_PAGES if page.name in GENERATED)
     for module in re.findall(r"^\.\. automodule:: (\S+)$", page, re.MULTILINE):
         assert re.search(rf"^#+ {re.escape(module)}$", page, re.MULTILINE), module
 
@@ -135,10 +137,6 @@ def words(page: Path) -> str:
     text = page.read_text(encoding="utf-8")
     text = re.sub(r"<!-- (?:figures|pins): \w+(?: of \w+)? -->.*?<!-- end -->", "", text, flags=re.DOTALL)
     return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-
-
-GENERATED = {"api.md"}
-"""Its text is that of the docstrings."""
 
 
 @pytest.mark.parametrize("page", [page for page in ALL_PAGES if page.name not in GENERATED], ids=lambda path: path.name)
