@@ -16,6 +16,7 @@ from contactfpga_sim.lab.view import browser
 
 pytestmark = [
     pytest.mark.slow,  # a minute
+    pytest.mark.timeout(1200),  # the first one builds all pages, also on a busy machine
     pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed"),
 ]
 
