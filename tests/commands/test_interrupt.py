@@ -18,7 +18,7 @@ from contactfpga_sim.lab import pool
 SOON_S = 2.0
 """Within which a command ends, on a machine with nothing else to do."""
 
-SLACK_S = 3.0
+SLACK_S = 10.0
 """What other work on this machine may add."""
 
 SCENES = "examples/scenes-bumper.toml"
