@@ -22,7 +22,7 @@ CELLS = 10
 """On sheets of at most so many cells every frame is tried."""
 SIDE = 32
 """Rows and columns of the sheets of the others, and the most of the larger frames that are tried."""
-NOISE = 300
+NOISE = 100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,6 +105,11 @@ def embedded(faults: list[Fault]) -> np.ndarray:
 def pictures(faults: list[Fault]) -> str:
     """The frame of each fault as text."""
     return "\n\n".join(f"{_said(one)}\n\n```text\n{drawn(one.cells)}\n```" for one in faults)
+
+
+def sample() -> str:
+    """The part of the pictures that takes a second."""
+    return pictures([fault(INEXACT[0])])
 
 
 def _said(one: Fault) -> str:
