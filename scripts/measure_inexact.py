@@ -75,8 +75,7 @@ def sheets(side: int, cells: int) -> list[tuple[int, int]]:
 def exact(frames: np.ndarray) -> list[list[Zone]]:
     """Zones of each of (N, R, C) bool frames by the golden model, sorted."""
     found = all_departures(frames, 8)
-    zones = [sorted(map(tuple, part.tolist())) for part in np.split(found.moments, found.offsets[1:-1])]
-    return zones  # type: ignore[return-value]
+    return [sorted(map(tuple, part.tolist())) for part in np.split(found.moments, found.offsets[1:-1])]
 
 
 def inexact_table(faults: list[Fault]) -> str:

@@ -1,4 +1,4 @@
-"""What four public labellers do that are not exact, in our own words: models of their published ideas, none of their code.
+"""What four public labellers do that are not exact: models of their published ideas, with none of their code.
 
 Each takes the cells of a frame, (R, C) bool, and gives its zones as (area, sum x, sum y), in any order.
 """

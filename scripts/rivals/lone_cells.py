@@ -7,15 +7,14 @@ from rivals.rival import Rival, Sheet
 VERILOG = """
 module top(input clk, rst, pressed, input [{place}-1:0] x, y, output reg found, output reg [{bits}-1:0] zone);
   always @(posedge clk) begin
-    found <= pressed & ~rst;
-    zone <= 1 | x << {area} | y << {area_x};
+    {{found, zone}} <= {{pressed & ~rst, {bits}'d1 | x << {area} | y << {area_x}}};
   end
 endmodule"""
 
 
 def convert(clone: Path, sheet: Sheet, scrambled: bool) -> str:
-    area, sum_x, sum_y = sheet.moment_bits
-    return VERILOG.format(place=sheet.place_bits, bits=area + sum_x + sum_y, area=area, area_x=area + sum_x)
+    area, wide = sheet.moment_bits[0], sum(sheet.moment_bits[:2])
+    return VERILOG.format(place=sheet.place_bits, bits=sum(sheet.moment_bits), area=area, area_x=wide)
 
 
 RIVAL = Rival("lone cells", blank_columns=1, blank_rows=1, convert=convert)

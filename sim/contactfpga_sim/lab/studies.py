@@ -265,7 +265,9 @@ _ALL = (
         page="rivals.md",
         minutes=2,
         sections={
-            "inexact_frames": Section("scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"),
+            "inexact_frames": Section(
+                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
+            ),
         },
         compute="scripts/measure_inexact.py:compute",
     ),
