@@ -1,6 +1,6 @@
 """Measures other people's labellers like ours: exact or not, how late, how large, how fast. See docs/rivals.md.
 
-    python scripts/measure_rivals.py [--clone FOLDER] [--sizes 16 32 64]
+    python scripts/measure_rivals.py [--clone FOLDER] [--enter FILE.py] [--sizes 16 32 64]
 
 Needs git and, for LinkRunCCA, ghdl (sudo apt install ghdl); and contactfpga with its extras `sim` and `boards`.
 """
@@ -8,6 +8,7 @@ Needs git and, for LinkRunCCA, ghdl (sudo apt install ghdl); and contactfpga wit
 from __future__ import annotations
 
 import argparse
+import runpy
 import sys
 import time
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from rivals.campaign import FRAMES, measure
 from rivals.house import DEVICES, SEEDS, BitstreamFailed, ContactFPGAError, guarded
 from rivals.linkruncca import LINK_RUN_CCA
 from rivals.report import Measured, exactness_table, provenance, sizes_table, summary_table
-from rivals.rival import Rival
+from rivals.rival import Rival, RivalError
 
 RIVALS = {rival.name.lower(): rival for rival in (LINK_RUN_CCA,)}
 """Those that can be measured. docs/rivals.md says what a further one needs."""
@@ -34,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     began = time.monotonic()
     try:
-        rival = RIVALS[options.rival]
+        rival = entered(options.enter) if options.enter else RIVALS[options.rival]
         devices = [device for device in DEVICES if device.title.lower() in options.devices]
         clone = _clone(rival, options.clone)
         measured = measure(rival, clone, sorted(set(options.sizes)), devices, options.seeds)
@@ -51,6 +52,16 @@ def compute() -> Measured:
     return measure(LINK_RUN_CCA, _clone(LINK_RUN_CCA, None), list(SIZES), list(DEVICES), SEEDS)
 
 
+def entered(file: Path) -> Rival:
+    """``RIVAL`` of a Python file, which runs."""
+    if not file.is_file():
+        raise RivalError(f"--enter is {str(file)!r}; there is no such file, give one like scripts/rivals/lone_cells.py")
+    found = runpy.run_path(str(file)).get("RIVAL")
+    if not isinstance(found, Rival):
+        raise RivalError(f"{file} has no RIVAL; set it as scripts/rivals/lone_cells.py does")
+    return found
+
+
 def _clone(rival: Rival, folder: Path | None) -> Path:
     if folder is None:
         folder = CLONES / rival.name.lower()
@@ -62,6 +73,7 @@ def _clone(rival: Rival, folder: Path | None) -> Path:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--rival", choices=sorted(RIVALS), default="linkruncca")
+    parser.add_argument("--enter", type=Path, metavar="FILE.py", help="measure the RIVAL of this file, which runs")
     parser.add_argument("--clone", type=Path, help="folder of its clone (default: one is made in build/rivals)")
     parser.add_argument("--sizes", type=int, nargs="+", choices=sorted(FRAMES), default=SIZES, metavar="N")
     names = [device.title.lower() for device in DEVICES]

@@ -8,10 +8,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from rivals import exactness, linkruncca, placement
 from rivals.house import Device, Netlists, Size
 from rivals.report import Measured, Row
-from rivals.rival import Rival, RivalError
+from rivals.rival import Rival, RivalError, Sheet
 
 OURS = ("run", "serial")
 FRAMES = {4: 0, 8: 40_000, 16: 15_000, 32: 3_000, 64: 600}
@@ -19,7 +21,8 @@ FRAMES = {4: 0, 8: 40_000, 16: 15_000, 32: 3_000, 64: 600}
 
 
 def measure(rival: Rival, clone: Path, sizes: Sequence[int], devices: Sequence[Device], seeds: int) -> Measured:
-    """The rival and ours; raises :class:`~rivals.rival.RivalError` if any of them is wrong."""
+    """The rival and ours; a rival that is wrong gets no place and route. Raises :class:`~rivals.rival.RivalError` if
+    ours are wrong."""
     rows: list[Row] = []
     digests: dict[int, str] = {}
     for lines in sizes:
@@ -28,17 +31,25 @@ def measure(rival: Rival, clone: Path, sizes: Sequence[int], devices: Sequence[D
         verilog = rival.convert(clone, sheet, False)
         digests[lines] = hashlib.sha256(verilog.encode()).hexdigest()
         _say(f"{lines}x{lines}: {len(frames):,} frames")
-        checked = _right(rival.name, lines, exactness.check_rival(verilog, sheet, frames))
-        scrambled = exactness.check_rival(rival.convert(clone, sheet, True), sheet, frames).wrong
-        netlists = placement.rival(verilog, sheet)
-        found = _placed(lines, rival.name, netlists, devices, seeds, collides=scrambled > 0)
-        rows.append(Row(lines, rival.name, checked, scrambled, found))
+        rows.append(_rival(rival, clone, sheet, verilog, frames, devices, seeds))
         for labeller in OURS:
             checked = _right(labeller, lines, exactness.check_ours(labeller, lines, frames))
             netlists = placement.ours(labeller, lines)
             found = _placed(lines, labeller, netlists, devices, seeds, collides=False)
             rows.append(Row(lines, f"`{labeller}`", checked, None, found))
     return Measured(rival, rival.digest(clone), linkruncca.version(), seeds, tuple(rows), digests)
+
+
+def _rival(
+    rival: Rival, clone: Path, sheet: Sheet, verilog: str, frames: np.ndarray, devices: Sequence[Device], seeds: int
+) -> Row:
+    checked = exactness.check_rival(verilog, sheet, frames)
+    if checked.wrong:
+        return Row(sheet.size, rival.name, checked, None, {})
+    scrambled = exactness.check_rival(rival.convert(clone, sheet, True), sheet, frames).wrong
+    netlists = placement.rival(verilog, sheet)
+    found = _placed(sheet.size, rival.name, netlists, devices, seeds, collides=scrambled > 0)
+    return Row(sheet.size, rival.name, checked, scrambled, found)
 
 
 def _right(name: str, lines: int, checked: exactness.Checked) -> exactness.Checked:

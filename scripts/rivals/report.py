@@ -42,8 +42,8 @@ def provenance(measured: Measured) -> str:
     rival = measured.rival
     rows = [
         ("", ""),
-        (rival.name, f"<{rival.url}> at `{rival.commit}`"),
-        (f"its {len(rival.sources)} sources, SHA-256", f"`{measured.digest}`"),
+        (rival.name, f"<{rival.url}> at `{rival.commit}`" if rival.url else "a file of yours"),
+        *([(f"its {len(rival.sources)} sources, SHA-256", f"`{measured.digest}`")] if rival.url else []),
         *((f"converted for {size}x{size}, SHA-256", f"`{digest}`") for size, digest in measured.verilog.items()),
         ("converter", measured.converter),
         ("tools", ", ".join(f"{tool} {importlib.metadata.version(tool)}" for tool in tools)),
@@ -69,7 +69,9 @@ def _of(row: Row) -> tuple[str, str]:
 
 
 def _scrambled(row: Row) -> str:
-    return "uses none" if row.scrambled_wrong is None else f"{row.scrambled_wrong:,}"
+    if row.scrambled_wrong is None:
+        return "not tried" if row.checked.wrong else "uses none"
+    return f"{row.scrambled_wrong:,}"
 
 
 def sizes_table(measured: Measured) -> str:

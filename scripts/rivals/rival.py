@@ -49,16 +49,17 @@ class Rival:
     """A labeller of other people, put behind the port of docs/rivals.md."""
 
     name: str
-    url: str
-    commit: str
-    sources: tuple[str, ...]
-    """Files of the clone that are converted."""
     blank_columns: int
     """Cells after each row, and rows after each frame, that it needs blank."""
     blank_rows: int
     convert: Callable[[Path, Sheet, bool], str]
     """From a clone: Verilog with the module ``top`` that has the port. If the flag is set its memories give wrong words
     where one is read while it is written, to show whether it uses such words."""
+    url: str = ""
+    """Empty: ``convert`` needs no clone."""
+    commit: str = ""
+    sources: tuple[str, ...] = ()
+    """Files of the clone that are converted."""
 
     def sheet(self, size: int) -> Sheet:
         return Sheet(size, self.blank_columns, self.blank_rows)
@@ -69,6 +70,8 @@ class Rival:
 
     def check(self, clone: Path) -> None:
         """Raise :class:`RivalError` unless the folder is a clone at the commit, with nothing changed."""
+        if not self.url:
+            return
         if not (clone / ".git").exists():
             raise RivalError(f"{clone} is not a clone of {self.name}; make one with: git clone {self.url} {clone}")
         found = git("-C", str(clone), "rev-parse", "HEAD")
@@ -84,8 +87,8 @@ class Rival:
             )
 
     def fetch(self, clone: Path) -> None:
-        """Make a clone at the commit."""
-        if not (clone / ".git").exists():
+        """Make a clone at the commit, if there is anything to clone."""
+        if self.url and not (clone / ".git").exists():
             git("clone", "--quiet", "--no-checkout", self.url, str(clone))
             git("-C", str(clone), "checkout", "--quiet", self.commit)
 

@@ -260,6 +260,18 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "inexact",
+        title="Faults of labellers of others, in models of them",
+        page="rivals.md",
+        minutes=2,
+        sections={
+            "inexact_frames": Section(
+                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
+            ),
+        },
+        compute="scripts/measure_inexact.py:compute",
+    ),
+    Study(
         "rivals",
         title="Labellers of others on our bench",
         page="rivals.md",
