@@ -7,9 +7,9 @@ from typing import NoReturn
 
 from contactfpga.driver.events import Silence, checked_deadline
 from contactfpga.driver.link import Link
+from contactfpga.driver.remote import RemoteLink
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription
-from contactfpga.driver.transport import counters_of
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
@@ -21,7 +21,7 @@ from contactfpga.zones.units import UnitHistory
 class BoardFacts:
     """An open port, what its board said about itself, and queues of its frames."""
 
-    def __init__(self, link: Link, frames: Subscription, expected: Skin | None):
+    def __init__(self, link: Link | RemoteLink, frames: Subscription, expected: Skin | None):
         self._link, self._frames, self._expected = link, frames, expected
 
     def __repr__(self) -> str:
@@ -120,7 +120,7 @@ class BoardFacts:
         """Counters since the port was opened."""
         stats = self._link.conversation.stats
         stats.dropped = self._frames.dropped
-        stats.net = counters_of(self._link.transport)
+        stats.net = self._link.net
         return stats
 
     def clock(self) -> float:

@@ -1,0 +1,159 @@
+"""What comes from a board as the bytes of a message, from the process that reads the port to the one that uses it."""
+
+from __future__ import annotations
+
+import marshal
+import pickle
+from typing import Any
+
+import numpy as np
+
+from contactfpga.driver.conversation import Arrival
+from contactfpga.driver.events import SideEvent
+from contactfpga.errors import ContactFPGAError
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import STUCK
+from contactfpga.wire.many import FIELDS
+from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
+from contactfpga.wire.units import Sweep
+from contactfpga.zones.run import Run
+from contactfpga.zones.units import UnitHistory, UnitSamples
+from contactfpga.zones.zone import HostLine, Zones
+
+_FLAG_WORDS = {flags: word for word, flags in enumerate(FLAG_SETS)}
+
+Packed = tuple[Any, ...]
+
+
+def pack_frame(arrival: Arrival, sheet: int, history: int) -> bytes:
+    """A frame; ``sheet`` and ``history`` are the numbers by which the other process knows what it belongs to."""
+    zones = arrival.zones
+    before, line = zones._before, zones._line
+    return marshal.dumps(
+        (
+            sheet,
+            history,
+            zones.time_us,
+            _frame(zones.frame),
+            None if before is None else _frame(before),
+            None if line is None else _line(line),
+            zones.faults,
+        )
+    )
+
+
+def unpack_frame(body: bytes, sheets: dict[int, Sheet], histories: dict[int, UnitHistory]) -> Zones:
+    """The frame. Raises KeyError where its sheet is not known any more."""
+    number, history, time_us, frame, before, line, faults = marshal.loads(body)
+    sheet = sheets[number]
+    return Zones(
+        _made(frame, sheet),
+        sheet,
+        time_us,
+        None if before is None else _made(before, sheet),
+        None if line is None else HostLine(*line),
+        faults or (STUCK,),
+        histories.get(history),
+    )
+
+
+def pack_run(run: Run, sheet: int, history: int) -> bytes:
+    """A run of frames likewise."""
+    return marshal.dumps(
+        (
+            sheet,
+            history,
+            run.packets.tobytes(),
+            (run.starts - run.starts[0]).tobytes(),
+            run.carried.tobytes(),
+            run.records.shape[1],
+            run.times_us.tobytes(),
+            None if run.line is None else _line(run.line),
+            None if run.before is None else _frame(run.before),
+            run.faults,
+        )
+    )
+
+
+def unpack_run(body: bytes, sheets: dict[int, Sheet], histories: dict[int, UnitHistory]) -> Run:
+    """The run. Raises KeyError as :func:`unpack_frame`."""
+    number, history, packets, starts, records, fields, times_us, line, before, faults = marshal.loads(body)
+    sheet = sheets[number]
+    return Run(
+        sheet,
+        np.frombuffer(packets, FIELDS),
+        np.frombuffer(starts, np.int64),
+        np.frombuffer(records, np.int64).reshape(-1, fields),
+        np.frombuffer(times_us, np.int64),
+        None if line is None else HostLine(*line),
+        None if before is None else _made(before, sheet),
+        faults,
+        histories.get(history),
+    )
+
+
+def pack_error(error: ContactFPGAError, unreadable: bool) -> bytes:
+    """An error that came in the place of a frame; ``unreadable``: no frame can be read now."""
+    return pickle.dumps((error, unreadable))
+
+
+def unpack_error(body: bytes) -> tuple[ContactFPGAError, bool]:
+    """The same."""
+    found: tuple[ContactFPGAError, bool] = pickle.loads(body)
+    return found
+
+
+def pack_side(event: SideEvent, number: int, history: UnitHistory | None) -> bytes:
+    """What is told between frames. With a sweep goes what the history of this number knows of all sweeps by now."""
+    if not isinstance(event, UnitSamples) or history is None or history.last is None:
+        return pickle.dumps((event, None))
+    last = history.last
+    sweep = last.time_us, last.sequence, last.readings, last.over, last.armed
+    return pickle.dumps((event, (number, sweep, history.count, history.lows, history.highs)))
+
+
+def unpack_side(body: bytes) -> tuple[SideEvent, tuple[int, Sweep, int, list[int], list[int]] | None]:
+    """The event, and the history's number and what it knows."""
+    event, known = pickle.loads(body)
+    if known is None:
+        return event, None
+    number, sweep, count, lows, highs = known
+    return event, (number, Sweep(*sweep), count, lows, highs)
+
+
+def _line(line: HostLine) -> Packed:
+    return line.arrived_s, line.base_us, line.base_s, line.rate, line.sigma_s
+
+
+def _frame(frame: Frame) -> Packed:
+    if frame.bitmap is not None:
+        carried = np.packbits(frame.bitmap).tobytes()
+    else:
+        records = frame.moments if frame.barycenters is None else frame.barycenters
+        carried = records.tobytes() if len(records) else b""
+    return (
+        frame.sequence,
+        frame.time_us,
+        _FLAG_WORDS[frame.flags],
+        frame.overwritten,
+        frame.heard,
+        frame.zones,
+        frame.cells,
+        carried,
+    )
+
+
+def _made(packed: Packed, sheet: Sheet) -> Frame:
+    sequence, time_us, flags, overwritten, heard, zones, cells, carried = packed
+    bitmap = barycenters = None
+    moments = nothing = no_records(sheet)
+    if sheet.report == "cells":
+        bits = np.unpackbits(np.frombuffer(carried, np.uint8), count=sheet.rows * sheet.columns)
+        bitmap = bits.reshape(sheet.rows, sheet.columns).view(np.bool_)
+    else:
+        records = np.frombuffer(carried, np.int64).reshape(-1, nothing.shape[1]) if carried else nothing
+        if sheet.report == "barycenter":
+            barycenters = records
+        else:
+            moments = records
+    return Frame(sequence, time_us, FLAG_SETS[flags], overwritten, heard, zones, cells, moments, bitmap, barycenters)

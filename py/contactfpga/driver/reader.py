@@ -1,0 +1,278 @@
+"""A process that reads one port for another process: it holds the conversation with the board, and puts what comes
+into memory that both share.
+
+:mod:`contactfpga.driver.remote` starts it and takes what it puts there. What it is told comes over a socket; it ends
+with the process that started it, however that ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import gc
+import marshal
+import mmap
+import os
+import pickle
+import select
+import signal
+import socket
+import sys
+from typing import NamedTuple
+
+from contactfpga.driver.conversation import Arrival, Event
+from contactfpga.driver.link import Link
+from contactfpga.driver.packed import pack_error, pack_frame, pack_run, pack_side
+from contactfpga.driver.recording import FileTap, RecordingTransport
+from contactfpga.driver.shared import ERROR, FRAME, RUN, SIDE, Ring, Slot
+from contactfpga.driver.stats import Stats
+from contactfpga.driver.transport import Transport, connect, counters_of
+from contactfpga.errors import ContactFPGAError, PortLost
+from contactfpga.skin import Skin
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.command import Command
+from contactfpga.wire.faults import Faults
+from contactfpga.wire.hello import Hello
+from contactfpga.wire.units import UnitFacts
+from contactfpga.zones.run import Run
+from contactfpga.zones.units import UnitHistory
+
+RING_BYTES = 4 << 20
+"""Of frames that wait: 16,384 and some more with a few zones each."""
+_STATS_BYTES, _FACTS_BYTES = 4096, 128 << 10
+_RING_AT = _STATS_BYTES + _FACTS_BYTES
+MEMORY_BYTES = _RING_AT + Ring.HEAD + RING_BYTES
+
+MOST_SHEETS = 64
+"""Sheets and histories of which frames can still be taken, the newest."""
+
+SWITCH_S = 0.0005
+"""How soon a request is sent while frames are decoded."""
+
+LONGEST_MESSAGE = 1 << 16
+
+
+class Shared(NamedTuple):
+    """What is in the memory."""
+
+    stats: Slot
+    """:class:`Stats`, as :func:`stats_of` reads them."""
+    facts: Slot
+    """:class:`Facts`, pickled."""
+    ring: Ring
+
+    @classmethod
+    def of(cls, descriptor: int) -> Shared:
+        """Of the memory behind a descriptor."""
+        memory = memoryview(mmap.mmap(descriptor, MEMORY_BYTES))
+        return cls(Slot(memory[:_STATS_BYTES]), Slot(memory[_STATS_BYTES:_RING_AT]), Ring(memory[_RING_AT:]))
+
+
+@dataclasses.dataclass
+class Facts:
+    """What changes seldom."""
+
+    hello: Hello | None = None
+    told: Faults | None = None
+    readable: bool = False
+    """Frames can be read, as :attr:`contactfpga.driver.conversation.Conversation.sheet`."""
+    numbers: frozenset[int] = frozenset()
+    sheets: dict[int, Sheet] = dataclasses.field(default_factory=dict)
+    """By the numbers in frames."""
+    histories: dict[int, tuple[UnitFacts, int]] = dataclasses.field(default_factory=dict)
+    """Units and clock of each, by the numbers in frames."""
+    history: int = 0
+    """The present one; 0: the board has no units."""
+    failure: BaseException | None = None
+    """Why nothing can come any more."""
+
+
+class ReaderLink(Link):
+    """A link whose frames go to another process."""
+
+    def __init__(self, transport: Transport, skin: Skin | None, shared: Shared, wake: int):
+        super().__init__(transport, skin)
+        self._shared, self._wake = shared, wake
+        self._facts = Facts()
+        self._histories: list[UnitHistory] = []
+        self._sheet: Sheet | None = None
+        self._number = self._numbered = 0
+        shared.ring.begin()
+        self._show_facts()
+        self._publish()
+
+    def fail(self, error: BaseException) -> None:
+        """Nothing can come any more; the lock is held."""
+        if self._facts.failure is None:
+            self._facts.failure = error
+            self._show_facts()
+            self._publish()
+
+    def _take(self, data: bytes) -> None:
+        super()._take(data)
+        if data:
+            self._publish()
+
+    def _read_all(self) -> None:
+        super()._read_all()
+        with self.changed:
+            if self._failure is not None:
+                self.fail(self._failure)
+
+    def _pass_on(self, event: Event | Run) -> None:
+        super()._pass_on(event)
+        ring, said = self._shared.ring, self.conversation
+        self._note_facts(event)
+        if isinstance(event, Hello):
+            return
+        if isinstance(event, Arrival):
+            number = self._number_of(event.zones.sheet)
+            ring.put(FRAME, pack_frame(event, number, self._facts.history), 1, event.answers)
+        elif isinstance(event, Run):
+            number = self._number_of(event.sheet)
+            ring.put(RUN, pack_run(event, number, self._facts.history), len(event))
+        elif isinstance(event, ContactFPGAError):
+            ring.put(ERROR, pack_error(event, said.sheet is None))
+        else:
+            ring.put(SIDE, pack_side(event, self._facts.history, said.units.history))
+        if ring.hidden > ring.size // 4:
+            self._publish()
+
+    def _note_facts(self, event: Event | Run) -> None:
+        """Show them again where this event may have changed them."""
+        history = self.conversation.units.history
+        known = self._histories[-1] if self._facts.history else None
+        if history is not known:
+            if history is not None:
+                self._histories = [*self._histories[1 - MOST_SHEETS :], history]
+                self._numbered += 1
+                self._facts.histories[self._numbered] = history.facts, self._clock_hz()
+                self._facts.histories.pop(self._numbered - MOST_SHEETS, None)
+            self._facts.history = 0 if history is None else self._numbered
+        elif isinstance(event, (Arrival, Run)):
+            return
+        self._show_facts()
+
+    def _clock_hz(self) -> int:
+        hello = self.conversation.hello
+        assert hello is not None
+        return hello.clock_hz
+
+    def _number_of(self, sheet: Sheet) -> int:
+        if sheet is not self._sheet:
+            if sheet != self._sheet:
+                self._number += 1
+                self._facts.sheets[self._number] = sheet
+                self._facts.sheets.pop(self._number - MOST_SHEETS, None)
+                self._show_facts()
+            self._sheet = sheet
+        return self._number
+
+    def _show_facts(self) -> None:
+        facts, said = self._facts, self.conversation
+        facts.hello, facts.told, facts.readable = said.hello, said.lines.told, said.sheet is not None
+        facts.numbers = frozenset(said.numbers)
+        self._shared.facts.write(pickled(facts))
+
+    def _publish(self) -> None:
+        """Show all that was put into the ring, and wake who waits."""
+        said, shared = self.conversation, self._shared
+        if len(said.numbers) != len(self._facts.numbers):
+            self._show_facts()
+        shared.stats.write(packed_stats(said.stats, counters_of(self.transport)))
+        shared.ring.publish(shared.facts.version, self._last_bytes, self.last_s)
+        os.eventfd_write(self._wake, 1)
+
+
+def pickled(facts: Facts) -> bytes:
+    """Facts as bytes, whatever the failure is."""
+    try:
+        return pickle.dumps(facts)
+    except Exception:
+        return pickle.dumps(dataclasses.replace(facts, failure=ContactFPGAError(repr(facts.failure))))
+
+
+def packed_stats(stats: Stats, net: object) -> bytes:
+    """Counters as bytes."""
+    values = vars(stats)
+    return marshal.dumps(
+        ([values[name] for name in COUNTED], dict(stats.damaged), None if net is None else list(vars(net).values()))
+    )
+
+
+COUNTED = tuple(
+    field.name for field in dataclasses.fields(Stats) if field.name not in ("damaged", "net", "dropped")
+)
+"""Counters of the process that reads."""
+
+
+def served(control: socket.socket, link: ReaderLink) -> None:
+    """Do what comes over the socket until it says that this is all, or until who has the other end is gone."""
+    owner = os.getppid()
+    gone = select.poll()
+    gone.register(control, select.POLLIN)
+    with contextlib.ExitStack() as opened:
+        with contextlib.suppress(OSError):  # gone already
+            descriptor = os.pidfd_open(owner)
+            opened.callback(os.close, descriptor)
+            gone.register(descriptor, select.POLLIN)
+        while True:
+            ready = dict(gone.poll())
+            if control.fileno() not in ready:
+                return
+            message = control.recv(LONGEST_MESSAGE)
+            if not message:
+                return
+            what, *arguments = pickle.loads(message)
+            if what == "close":
+                return
+            with link.changed:
+                _do(link, what, arguments)
+            try:
+                link._send()
+            except ContactFPGAError as error:
+                with link.changed:
+                    link.fail(error)
+
+
+def _do(link: ReaderLink, what: str, arguments: list[float]) -> None:
+    now, said = link.transport.clock(), link.conversation
+    if what == "ask":
+        said.ask(now, arguments[0])
+    elif what == "command":
+        until, *numbers = arguments
+        said.command(Command(*map(int, numbers)), now, until)
+    else:
+        said.end_command()
+
+
+def main(control_descriptor: int, memory_descriptor: int, wake: int) -> None:
+    """What the process does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the owner's, whose end is this one's
+    sys.setswitchinterval(SWITCH_S)
+    control = socket.socket(fileno=control_descriptor)
+    owner_pid, name, baud, skin, record = pickle.loads(control.recv(LONGEST_MESSAGE))
+    try:
+        transport = connect(name, baud)
+        if record is not None:
+            transport = RecordingTransport(transport, FileTap(record))
+        link = ReaderLink(transport, skin, Shared.of(memory_descriptor), wake)
+    except Exception as error:
+        control.send(pickle.dumps(error))
+        return
+    os.close(memory_descriptor)
+    gc.freeze()
+    if os.getppid() != owner_pid:
+        return
+    control.send(pickle.dumps(link.last_s))
+    link.start()
+    served(control, link)
+    closed = None
+    try:
+        link.close()
+    except Exception as error:
+        closed = error
+    with contextlib.suppress(OSError):
+        control.send(pickle.dumps(closed))
+    sys.stderr.flush()
+    os._exit(0)
