@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast, runtime_checkable
 
 from contactfpga.driver.events import SideEvent
 from contactfpga.driver.facts import BoardFacts
 from contactfpga.driver.link import Link
-from contactfpga.driver.remote import RemoteLink
 from contactfpga.driver.subscription import Subscription, checked, frame_of
 from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReadTimeout, ReplayEnded
@@ -22,6 +21,9 @@ from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.driver.remote import RemoteLink
 
 QUEUE = 16_384
 """Frames that wait for :meth:`Board.next` at most."""
@@ -47,7 +49,7 @@ class Board(BoardFacts):
         skin: Skin | None = None,
         opened: Callable[[Board], object] | None = None,
     ):
-        link = port if isinstance(port, RemoteLink) else Link(port, skin)
+        link = cast("RemoteLink", port) if hasattr(port, "wait_for") else Link(port, skin)
         super().__init__(link, Subscription(link, QUEUE), skin)
         if opened is not None:
             opened(self)

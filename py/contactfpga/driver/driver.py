@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 from contactfpga.choices.choice import trusted
-from contactfpga.driver import forks, recording, remote
+from contactfpga.driver import forks, recording
 from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
@@ -102,6 +102,8 @@ def _opened(
 
         port = finding.find(port, skin, baud)
     if reader == "process":
+        from contactfpga.driver import remote  # processes, which a thread has no use for
+
         return Board(remote.open_link(port, baud, skin, record), skin)
     transport = connect(port, baud)
     try:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from contactfpga.driver.events import Silence, checked_deadline
 from contactfpga.driver.link import Link
-from contactfpga.driver.remote import RemoteLink
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription
 from contactfpga.errors import ContactFPGAError
@@ -16,6 +15,9 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.units import UnitHistory
+
+if TYPE_CHECKING:
+    from contactfpga.driver.remote import RemoteLink
 
 
 class BoardFacts:

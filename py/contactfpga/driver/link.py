@@ -7,15 +7,24 @@ import logging
 import math
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from typing import Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.framequeue import FrameQueue
-from contactfpga.driver.stats import NetCounters, refused
+from contactfpga.driver.stats import NetCounters, Stats, refused
 from contactfpga.driver.transport import Transport, counters_of
-from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, PortLost, ReadTimeout
+from contactfpga.errors import (
+    BoardClosed,
+    BoardSilent,
+    ContactFPGAError,
+    NoSuchCommand,
+    OnlyNoise,
+    PortLost,
+    ReadTimeout,
+)
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.faults import Faults
@@ -99,9 +108,9 @@ class Link:
                 queue.put(self.conversation.lines.told)
         return queue
 
-    def leave(self, queue: FrameQueue) -> None:
-        """Put nothing more into it; the lock is held."""
-        self._queues.discard(queue)
+    def leave(self, queue: object) -> None:
+        """Put nothing more into this queue; the lock is held."""
+        self._queues.discard(queue)  # type: ignore[arg-type]
 
     def clock(self) -> float:
         """Seconds on the clock that timeouts run on."""
@@ -141,7 +150,10 @@ class Link:
         try:
             with self.changed:
                 self.check_open()
-                check_command(self.transport, self.conversation.hello, command)
+                name = self.transport.name
+                if not self.transport.live:
+                    raise NoSuchCommand(f"{name} is a recording, which takes no {command}; open the board's port")
+                check_command(name, self.conversation.hello, command)
                 waiter = _Waiter(self.conversation.command(command, self.transport.clock(), deadline))
                 self._waiters.append(waiter)
             try:
@@ -360,11 +372,8 @@ class Link:
                 self._send()
 
 
-def check_command(transport: Transport, hello: Hello | None, command: Command) -> None:
+def check_command(name: str, hello: Hello | None, command: Command) -> None:
     """Raises :class:`NoSuchCommand` where a board with this hello does not take the command."""
-    name = transport.name
-    if not transport.live:
-        raise NoSuchCommand(f"{name} is a recording, which takes no {command}; open the board's port")
     if hello is None or command.what in hello.commands:
         return
     known = COMMANDS.get(command.what)
@@ -378,7 +387,19 @@ def denied_error(name: str) -> NoSuchCommand:
     return NoSuchCommand(f"{name}: its publisher passes on no commands; {step}")
 
 
-def timed_out(name: str, timeout: float, said: Conversation, start: int, net: NetCounters | None) -> ReadTimeout:
+class Said(Protocol):
+    """What of a conversation tells why no frame came."""
+
+    @property
+    def stats(self) -> Stats:
+        """What came."""
+
+    @property
+    def numbers(self) -> Collection[int]:
+        """Of sheets that packets said while no hello had come."""
+
+
+def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounters | None) -> ReadTimeout:
     """The error of a port on which no frame came within ``timeout`` seconds; ``start``: bytes that had come before.
     ``net``: what is counted about the network; None: there is none."""
     stats = said.stats

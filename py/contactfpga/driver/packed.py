@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import marshal
 import pickle
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from contactfpga.driver.conversation import Arrival
-from contactfpga.driver.events import SideEvent
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.many import FIELDS
 from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
-from contactfpga.wire.units import Sweep
 from contactfpga.zones.run import Run
-from contactfpga.zones.units import UnitHistory, UnitSamples
+from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import HostLine, Zones
 
 _FLAG_WORDS = {flags: word for word, flags in enumerate(FLAG_SETS)}
@@ -42,7 +41,7 @@ def pack_frame(arrival: Arrival, sheet: int, history: int) -> bytes:
     )
 
 
-def unpack_frame(body: bytes, sheets: dict[int, Sheet], histories: dict[int, UnitHistory]) -> Zones:
+def unpack_frame(body: bytes, sheets: dict[int, Sheet], histories: Mapping[int, UnitHistory]) -> Zones:
     """The frame. Raises KeyError where its sheet is not known any more."""
     number, history, time_us, frame, before, line, faults = marshal.loads(body)
     sheet = sheets[number]
@@ -75,7 +74,7 @@ def pack_run(run: Run, sheet: int, history: int) -> bytes:
     )
 
 
-def unpack_run(body: bytes, sheets: dict[int, Sheet], histories: dict[int, UnitHistory]) -> Run:
+def unpack_run(body: bytes, sheets: dict[int, Sheet], histories: Mapping[int, UnitHistory]) -> Run:
     """The run. Raises KeyError as :func:`unpack_frame`."""
     number, history, packets, starts, records, fields, times_us, line, before, faults = marshal.loads(body)
     sheet = sheets[number]
@@ -101,24 +100,6 @@ def unpack_error(body: bytes) -> tuple[ContactFPGAError, bool]:
     """The same."""
     found: tuple[ContactFPGAError, bool] = pickle.loads(body)
     return found
-
-
-def pack_side(event: SideEvent, number: int, history: UnitHistory | None) -> bytes:
-    """What is told between frames. With a sweep goes what the history of this number knows of all sweeps by now."""
-    if not isinstance(event, UnitSamples) or history is None or history.last is None:
-        return pickle.dumps((event, None))
-    last = history.last
-    sweep = last.time_us, last.sequence, last.readings, last.over, last.armed
-    return pickle.dumps((event, (number, sweep, history.count, history.lows, history.highs)))
-
-
-def unpack_side(body: bytes) -> tuple[SideEvent, tuple[int, Sweep, int, list[int], list[int]] | None]:
-    """The event, and the history's number and what it knows."""
-    event, known = pickle.loads(body)
-    if known is None:
-        return event, None
-    number, sweep, count, lows, highs = known
-    return event, (number, Sweep(*sweep), count, lows, highs)
 
 
 def _line(line: HostLine) -> Packed:

@@ -18,16 +18,18 @@ import select
 import signal
 import socket
 import sys
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from contactfpga.driver.clock import Timeline
 from contactfpga.driver.conversation import Arrival, Event
+from contactfpga.driver.events import UnitLine
 from contactfpga.driver.link import Link
-from contactfpga.driver.packed import pack_error, pack_frame, pack_run, pack_side
+from contactfpga.driver.packed import pack_error, pack_frame, pack_run
 from contactfpga.driver.recording import FileTap, RecordingTransport
-from contactfpga.driver.shared import ERROR, FRAME, RUN, SIDE, Ring, Slot
+from contactfpga.driver.shared import ERROR, FRAME, RUN, SIDE, SWEEP, Ring, Slot
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.transport import Transport, connect, counters_of
-from contactfpga.errors import ContactFPGAError, PortLost
+from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
@@ -35,7 +37,7 @@ from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.units import UnitFacts
 from contactfpga.zones.run import Run
-from contactfpga.zones.units import UnitHistory
+from contactfpga.zones.units import UnitHistory, UnitSamples
 
 RING_BYTES = 4 << 20
 """Of frames that wait: 16,384 and some more with a few zones each."""
@@ -87,6 +89,27 @@ class Facts:
     """Why nothing can come any more."""
 
 
+class NotedUnits(UnitLine):
+    """Sweeps of pressure units, noted for the other process."""
+
+    def __init__(self, stats: Stats):
+        super().__init__(stats)
+        self.noted: list[tuple[UnitHistory, tuple[Any, ...]]] = []
+        """Of each sweep its history and what :meth:`contactfpga.driver.remote.RemoteHistory.take` takes."""
+        self.clock_hz = 0
+
+    def take_hello(self, hello: Hello) -> None:
+        self.clock_hz = hello.clock_hz
+        super().take_hello(hello)
+
+    def take(self, plain: bytes, timeline: Timeline) -> UnitSamples | None:
+        history, samples = self.history, super().take(plain, timeline)
+        if samples is not None and history is not None and history.last is not None:
+            last = dataclasses.astuple(history.last)
+            self.noted.append((history, (samples.time_us, last, history.count, history.lows, history.highs)))
+        return samples
+
+
 class ReaderLink(Link):
     """A link whose frames go to another process."""
 
@@ -94,7 +117,8 @@ class ReaderLink(Link):
         super().__init__(transport, skin)
         self._shared, self._wake = shared, wake
         self._facts = Facts()
-        self._histories: list[UnitHistory] = []
+        self._histories: dict[int, UnitHistory] = {}
+        self._units = self.conversation.units = NotedUnits(self.conversation.stats)
         self._sheet: Sheet | None = None
         self._number = self._numbered = 0
         shared.ring.begin()
@@ -121,42 +145,34 @@ class ReaderLink(Link):
 
     def _pass_on(self, event: Event | Run) -> None:
         super()._pass_on(event)
-        ring, said = self._shared.ring, self.conversation
-        self._note_facts(event)
-        if isinstance(event, Hello):
-            return
+        ring = self._shared.ring
         if isinstance(event, Arrival):
-            number = self._number_of(event.zones.sheet)
-            ring.put(FRAME, pack_frame(event, number, self._facts.history), 1, event.answers)
+            zones = event.zones
+            numbers = self._number_of(zones.sheet), self._number_of_history(zones._history)
+            ring.put(FRAME, pack_frame(event, *numbers), 1, event.answers)
         elif isinstance(event, Run):
-            number = self._number_of(event.sheet)
-            ring.put(RUN, pack_run(event, number, self._facts.history), len(event))
+            numbers = self._number_of(event.sheet), self._number_of_history(event.history)
+            ring.put(RUN, pack_run(event, *numbers), len(event))
         elif isinstance(event, ContactFPGAError):
-            ring.put(ERROR, pack_error(event, said.sheet is None))
-        else:
-            ring.put(SIDE, pack_side(event, self._facts.history, said.units.history))
+            ring.put(ERROR, pack_error(event, self.conversation.sheet is None))
+        elif not isinstance(event, Hello):
+            ring.put(SIDE, pickle.dumps(event))
         if ring.hidden > ring.size // 4:
             self._publish()
 
-    def _note_facts(self, event: Event | Run) -> None:
-        """Show them again where this event may have changed them."""
-        history = self.conversation.units.history
-        known = self._histories[-1] if self._facts.history else None
-        if history is not known:
-            if history is not None:
-                self._histories = [*self._histories[1 - MOST_SHEETS :], history]
-                self._numbered += 1
-                self._facts.histories[self._numbered] = history.facts, self._clock_hz()
-                self._facts.histories.pop(self._numbered - MOST_SHEETS, None)
-            self._facts.history = 0 if history is None else self._numbered
-        elif isinstance(event, (Arrival, Run)):
-            return
+    def _number_of_history(self, history: UnitHistory | None) -> int:
+        for number, known in reversed(self._histories.items()):
+            if known is history:
+                return number
+        if history is None:
+            return 0
+        number = next(reversed(self._histories), 0) + 1
+        self._histories[number] = history
+        self._facts.histories[number] = history.facts, self._units.clock_hz
+        for old in (self._histories, self._facts.histories):
+            old.pop(number - MOST_SHEETS, None)
         self._show_facts()
-
-    def _clock_hz(self) -> int:
-        hello = self.conversation.hello
-        assert hello is not None
-        return hello.clock_hz
+        return number
 
     def _number_of(self, sheet: Sheet) -> int:
         if sheet is not self._sheet:
@@ -170,14 +186,21 @@ class ReaderLink(Link):
 
     def _show_facts(self) -> None:
         facts, said = self._facts, self.conversation
+        facts.history = 0 if said.units.history is None else self._number_of_history(said.units.history)
         facts.hello, facts.told, facts.readable = said.hello, said.lines.told, said.sheet is not None
         facts.numbers = frozenset(said.numbers)
         self._shared.facts.write(pickled(facts))
 
     def _publish(self) -> None:
         """Show all that was put into the ring, and wake who waits."""
-        said, shared = self.conversation, self._shared
-        if len(said.numbers) != len(self._facts.numbers):
+        said, shared, facts = self.conversation, self._shared, self._facts
+        for history, sweep in self._units.noted:
+            shared.ring.put(SWEEP, marshal.dumps((self._number_of_history(history), *sweep)))
+        self._units.noted.clear()
+        if said.units.history is not self._histories.get(facts.history):
+            self._show_facts()
+        same = said.hello is facts.hello and said.lines.told is facts.told
+        if not same or len(said.numbers) != len(facts.numbers):
             self._show_facts()
         shared.stats.write(packed_stats(said.stats, counters_of(self.transport)))
         shared.ring.publish(shared.facts.version, self._last_bytes, self.last_s)
@@ -200,9 +223,7 @@ def packed_stats(stats: Stats, net: object) -> bytes:
     )
 
 
-COUNTED = tuple(
-    field.name for field in dataclasses.fields(Stats) if field.name not in ("damaged", "net", "dropped")
-)
+COUNTED = tuple(field.name for field in dataclasses.fields(Stats) if field.name not in ("damaged", "net", "dropped"))
 """Counters of the process that reads."""
 
 

@@ -7,7 +7,6 @@ process writes: no other thread of this process has to run before a frame is her
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import marshal
 import os
@@ -20,18 +19,18 @@ import threading
 import time
 import weakref
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from contactfpga.driver import forks
 from contactfpga.driver.address import Replay, SheetOf, Sim, parse
 from contactfpga.driver.events import Silence
 from contactfpga.driver.link import ASK_S, Result, check_command, denied_error, timed_out
+from contactfpga.driver.packed import unpack_error, unpack_frame
 from contactfpga.driver.reader import COUNTED, LONGEST_MESSAGE, MEMORY_BYTES, Facts, Shared
-from contactfpga.driver.ringqueue import Cursor, RingQueue
-from contactfpga.driver.shared import ERROR, FRAME, SIDE, Marks, WriterGone
-from contactfpga.driver.packed import unpack_error, unpack_frame, unpack_side
 from contactfpga.driver.recording import Tap
+from contactfpga.driver.ringqueue import Cursor, RingQueue
+from contactfpga.driver.shared import ERROR, FRAME, SWEEP, Marks, WriterGone
 from contactfpga.driver.stats import NetCounters, Stats
 from contactfpga.driver.transport import OPEN_PORTS, SimulatedPort, user_of
 from contactfpga.errors import AddressError, BoardClosed, ContactFPGAError, PortBusy, PortLost, ReadTimeout
@@ -40,6 +39,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
+from contactfpga.wire.units import Sweep, UnitFacts
 from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitHistory, UnitSamples
 from contactfpga.zones.zone import Zones
@@ -140,13 +140,18 @@ class ReaderProcess:
 class RemoteHistory(UnitHistory):
     """A history that first takes the sweeps that have come."""
 
-    def __init__(self, facts, clock_hz: int, take: Callable[[], None]):  # type: ignore[no-untyped-def]
+    def __init__(self, facts: UnitFacts, clock_hz: int, take: Callable[[], None]):
         super().__init__(facts, clock_hz)
         self._take = take
 
     def at(self, time_us: int) -> UnitSamples | None:
         self._take()
         return super().at(time_us)
+
+    def take(self, time_us: int, last: Sweep, count: int, lows: list[int], highs: list[int]) -> None:
+        """A sweep of that time, and how many there are with it; earlier ones may be lost."""
+        self.add(last, time_us)
+        self.count, self.lows, self.highs = count, lows, highs
 
 
 class RemoteLines:
@@ -182,7 +187,7 @@ class RemoteConversation:
         self._facts, self._version = Facts(), -1
         self._stats, self._stats_version = Stats(), -1
         self._net: list[int] | None = None
-        self._histories: dict[int, UnitHistory] = {}
+        self._histories: dict[int, RemoteHistory] = {}
         self._lock = threading.Lock()
         self._sweeps = Cursor(shared.ring, self)
         self.places: weakref.WeakKeyDictionary[Zones, int] = weakref.WeakKeyDictionary()
@@ -227,7 +232,7 @@ class RemoteConversation:
         """By the numbers in frames."""
         return self.facts.sheets
 
-    def histories(self) -> dict[int, UnitHistory]:
+    def histories(self) -> Mapping[int, RemoteHistory]:
         """By the numbers in frames."""
         for number, (units, clock_hz) in self.facts.histories.items():
             if number not in self._histories:
@@ -243,19 +248,11 @@ class RemoteConversation:
         with self._lock:
             marks = ring.marks()
             while (found := self._sweeps.message(marks)) is not None:
-                if found.kind == SIDE and (body := ring.body(self._sweeps.place)) is not None:
-                    self._take_sweep(body)
+                if found.kind == SWEEP and (body := ring.body(self._sweeps.place)) is not None:
+                    number, time_us, last, *known = marshal.loads(body)
+                    if (history := self.histories().get(number)) is not None:
+                        history.take(time_us, Sweep(*last), *known)
                 self._sweeps.skip(found)
-
-    def _take_sweep(self, body: bytes) -> None:
-        samples, known = unpack_side(body)
-        if known is None or not isinstance(samples, UnitSamples):
-            return
-        number, last, count, lows, highs = known
-        history = self.histories().get(number)
-        if history is not None:
-            history.add(dataclasses.replace(last, readings=samples.readings), samples.time_us)
-            history.last, history.count, history.lows, history.highs = last, count, lows, highs
 
 
 class _Waiter:
@@ -292,10 +289,10 @@ class _Waiter:
 class RemoteLink:
     """A :class:`~contactfpga.driver.link.Link` to a port that a process of its own reads."""
 
-    def __init__(self, name: str, baud: int, skin: Skin | None, record: str | Path | None = None):
+    def __init__(self, name: str, reader: ReaderProcess):
         self.transport = RemotePort(name)
-        self._reader = ReaderProcess(name, baud, skin, record)
-        self._shared = self._reader.shared
+        self._reader = reader
+        self._shared = reader.shared
         self.conversation = RemoteConversation(self._shared)
         self.changed = threading.Condition()
         self._asking, self._commanding = threading.Lock(), threading.Lock()
@@ -336,7 +333,7 @@ class RemoteLink:
     def clock(self) -> float:
         """Seconds on the clock that timeouts run on."""
         self.check_open()
-        return time.monotonic()
+        return self.transport.clock()
 
     def read(self, timeout: float) -> Result:
         """Ask the board; the first frame scanned after now, or the error that came in its place."""
@@ -355,7 +352,7 @@ class RemoteLink:
 
     def ask(self) -> None:
         """Ask the board, at most once per second; nobody waits for the answer, which says how late frames are."""
-        now = time.monotonic()
+        now = self.transport.clock()
         if now >= self._asked_s + ASK_S:
             self._asked_s = now
             self._asked("ask", now)
@@ -368,7 +365,7 @@ class RemoteLink:
             raise ReadTimeout(f"{name}: another command was not answered within {timeout:g} s")
         try:
             self.check_open()
-            check_command(self.transport, self.conversation.hello, command)
+            check_command(name, self.conversation.hello, command)
             waiter = self._asked("command", deadline, command.what, command.value)
             try:
                 return self.wait_for(waiter.look, deadline, timeout)
@@ -400,7 +397,7 @@ class RemoteLink:
                 cursor.jump(marks.last, newest)
                 item = cursor.item(newest)
                 last = item[len(item) - 1] if isinstance(item, Run) else item
-        seconds = time.monotonic() - max(since, marks.last_s)
+        seconds = self.transport.clock() - max(since, marks.last_s)
         last = last if isinstance(last, Zones) else None
         return Silence(self.transport.name, seconds, stats.bytes - marks.last_bytes, last)
 
@@ -419,7 +416,7 @@ class RemoteLink:
                 return result
             if ended:
                 raise self._failure()
-            left = deadline - time.monotonic()
+            left = deadline - self.transport.clock()
             if left <= 0:
                 raise timed_out(self.transport.name, timeout, self.conversation, start, self.net)
             self._wait(min(left, 1.0))
@@ -447,12 +444,12 @@ class RemoteLink:
         failure = self.conversation.facts.failure
         return self._gone() if failure is None else failure.with_traceback(None)
 
-    def leave(self, queue: RingQueue) -> None:
+    def leave(self, queue: object) -> None:
         """It holds nothing here."""
 
     def linger(self, until: float, seconds: float) -> None:
         """Let all come that comes until then."""
-        while (left := until - time.monotonic()) > 0:
+        while (left := until - self.transport.clock()) > 0:
             self.check_open()
             time.sleep(min(left, 0.05))
 
@@ -492,16 +489,15 @@ class RemoteLink:
             self._reader.disown()
 
 
-def open_link(
-    port: str | SimulatedPort, baud: int, skin: Skin | None, record: str | Path | Tap | None
-) -> RemoteLink:
+def open_link(port: str | SimulatedPort, baud: int, skin: Skin | None, record: str | Path | Tap | None) -> RemoteLink:
     """Have a process of its own read a port. Raises as :func:`contactfpga.driver.transport.connect`, and
     :class:`AddressError` for what no other process can read."""
     name = port if isinstance(port, str) else "the virtual board"
     if why := refusal(port, record):
         raise AddressError(f"{name}: {why}; leave reader='process' out")
     try:
-        link = RemoteLink(name, baud, skin, record if record is None else os.path.abspath(str(record)))
+        file = record if record is None else os.path.abspath(str(record))
+        link = RemoteLink(name, ReaderProcess(name, baud, skin, file))
     except PortBusy:
         raise PortBusy(f"{name} is in use: {user_of(name)}") from None
     OPEN_PORTS.add(link.transport)

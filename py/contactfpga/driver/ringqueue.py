@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Mapping
 from typing import Protocol
 
 from contactfpga.driver.events import SideEvent
-from contactfpga.driver.packed import unpack_error, unpack_frame, unpack_run, unpack_side
-from contactfpga.driver.shared import ERROR, FRAME, PAD, SIDE, Marks, Message, Ring
+from contactfpga.driver.packed import unpack_error, unpack_frame, unpack_run
+from contactfpga.driver.shared import ERROR, FRAME, PAD, SIDE, SWEEP, Marks, Message, Ring
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin.sheet import Sheet
-from contactfpga.wire.units import Sweep
 from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
 Item = Zones | Run | SideEvent | ContactFPGAError
-Known = tuple[int, Sweep, int, list[int], list[int]]
 
 
 class Belongings(Protocol):
@@ -24,7 +24,7 @@ class Belongings(Protocol):
     def sheets(self) -> dict[int, Sheet]:
         """Of each sheet."""
 
-    def histories(self) -> dict[int, UnitHistory]:
+    def histories(self) -> Mapping[int, UnitHistory]:
         """Of the pressure units since each power-up."""
 
     def place_of(self, zones: Zones) -> int:
@@ -101,7 +101,8 @@ class Cursor:
         if message.kind == ERROR:
             return unpack_error(body)[0]
         if message.kind == SIDE:
-            return unpack_side(body)[0]
+            side: SideEvent = pickle.loads(body)
+            return side
         self._run = unpack_run(body, sheets, histories)
         return self._run
 
@@ -114,6 +115,7 @@ class RingQueue:
     def __init__(self, ring: Ring, belongings: Belongings, maxsize: int, all_events: bool):
         self.maxsize = maxsize
         self.all_events = all_events
+        self._left_out = (SWEEP,) if all_events else (SWEEP, SIDE)
         self._ring = ring
         self._belongings = belongings
         self._cursor = Cursor(ring, belongings)
@@ -121,7 +123,9 @@ class RingQueue:
         self._dropped = 0
 
     def __len__(self) -> int:
-        return self._length(self._ring.marks())
+        marks = self._ring.marks()
+        self._cursor.message(marks)  # past what is overwritten
+        return min(self._length(marks), self.maxsize)
 
     def _length(self, marks: Marks) -> int:
         cursor = self._cursor
@@ -136,7 +140,7 @@ class RingQueue:
 
     def _next(self, marks: Marks) -> Message | None:
         """What comes next of what this queue takes."""
-        while (found := self._cursor.message(marks)) is not None and found.kind == SIDE and not self.all_events:
+        while (found := self._cursor.message(marks)) is not None and found.kind in self._left_out:
             self._cursor.skip(found)
         return found
 

@@ -124,8 +124,8 @@ _MARKS = struct.Struct("8qd")
 _PAD, _COUNTS = struct.Struct("2Q"), struct.Struct("5Q")
 _HEADER_WORDS = 8
 _ALIGNED = 16
-PAD, FRAME, RUN, ERROR, SIDE = range(5)
-"""Kinds of messages. The first one fills the end of the ring."""
+PAD, FRAME, RUN, ERROR, SIDE, SWEEP = range(6)
+"""Kinds of messages. The first one fills the end of the ring; the last one is for the history of pressure units."""
 
 
 class Ring:
@@ -183,7 +183,7 @@ class Ring:
             self._answered = max(self._answered, answers)
         elif kind == ERROR:
             self._errors += 1
-        else:
+        elif kind == SIDE:
             self._sides += 1
         self._head += length
 

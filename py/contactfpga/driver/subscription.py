@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
-from typing import Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.link import Link
-from contactfpga.driver.remote import RemoteLink
 from contactfpga.errors import BoardClosed, ContactFPGAError, NoData, ReadTimeout, ReplayEnded
 from contactfpga.inputs.values import is_finite
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.zones.batch import Batch
-from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
 
+if TYPE_CHECKING:
+    from contactfpga.driver.remote import RemoteLink
 
 Item = TypeVar("Item")
 

@@ -1,0 +1,127 @@
+"""Boards on pseudo-terminals, in a process of their own: each frame's moment is noted before it is written."""
+
+from __future__ import annotations
+
+import functools
+import gc
+import multiprocessing
+import os
+import select
+import time
+import tty
+from typing import Any, NamedTuple
+
+from contactfpga_sim.lab.speed.driver import FRAMES, SKIN, frame, greeting
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import heard
+
+ALIVE_S = 0.25
+"""How often a board that was not told to go sends a frame."""
+DISTINCT = 2048
+"""Frames that are made for each board; then only their numbers go on, as far as the first :data:`FRAMES`."""
+
+
+class Pace(NamedTuple):
+    """How frames are written."""
+
+    per_second: int
+    at_once: int
+    """In one write, as a port of USB hands them over."""
+
+    @property
+    def pause_s(self) -> float:
+        return self.at_once / self.per_second
+
+
+PACES = Pace(1_000, 1), Pace(10_000, 1), Pace(72_000, 18)
+"""The reference sheet with a slow and a fast scan, and what 12 Mbaud carry."""
+
+
+@functools.cache
+def frames(low: int) -> list[bytes]:
+    """All frames of a board that last heard a number with these lowest bits."""
+    return [frame(number, low) for number in range(FRAMES)]
+
+
+def prepare() -> None:
+    """Make all frames, which a process that is forked then need not."""
+    for low in range(8):
+        frames(low)
+    gc.freeze()
+
+
+class Feeder:
+    """Boards that answer requests until they are told to go, and then write ``count`` frames each."""
+
+    def __init__(self, boards: int, pace: Pace, count: int):
+        prepare()
+        self._pace, self._count = pace, count
+        context: Any = multiprocessing.get_context("fork")
+        pairs = [os.openpty() for _ in range(boards)]
+        for _, slave in pairs:
+            tty.setraw(slave)
+        self._masters = [master for master, _ in pairs]
+        self._slaves = [slave for _, slave in pairs]
+        self.ports = [os.ttyname(slave) for slave in self._slaves]
+        self.go = context.Event()
+        self.first = context.RawArray("q", boards)
+        """Number of the first frame of each board after it was told to go."""
+        self.written_s = context.RawArray("d", count)
+        """When each frame was about to be written, to the first board, on ``time.monotonic``."""
+        self.late = context.RawValue("q", 0)
+        """How often frames were due before the last ones were written."""
+        self.process = context.Process(target=self._run, daemon=True)
+        self.process.start()
+
+    def _run(self) -> None:
+        asked = [b""] * len(self._masters)
+        taken, lows, sent = [0] * len(asked), [0] * len(asked), [0] * len(asked)
+        alive_s = time.monotonic()
+        while not self.go.is_set():
+            for master in select.select(self._masters, [], [], 0.01)[0]:
+                board = self._masters.index(master)
+                asked[board] += os.read(master, 4096)
+                for one in heard([(0, asked[board])], facts(SKIN).bit_clocks).requests[taken[board] :]:
+                    taken[board] += 1
+                    lows[board] = one.number % 8
+                    said = greeting(one.number) if one.hello and not sent[board] else b""
+                    os.write(master, said + frames(lows[board])[sent[board]])
+                    sent[board] += 1
+            if time.monotonic() > alive_s + ALIVE_S:
+                alive_s = time.monotonic()
+                for board, master in enumerate(self._masters):
+                    if taken[board]:
+                        os.write(master, frames(lows[board])[sent[board]])
+                        sent[board] += 1
+        self.first[:] = sent
+        self._stream(lows, sent)
+        time.sleep(60.0)  # a port that is closed would take what was not read with it
+
+    def _stream(self, lows: list[int], sent: list[int]) -> None:
+        size, pause_s, count = self._pace.at_once, self._pace.pause_s, self._count
+        made = [frames(low) for low in lows]
+        due_s = time.monotonic()
+        for place in range(0, count, size):
+            chosen = range(place, min(place + size, count))
+            for board, master in enumerate(self._masters):
+                data = b"".join([made[board][(sent[board] + number) % FRAMES] for number in chosen])
+                if not board:
+                    now_s = time.monotonic()
+                    for number in chosen:
+                        self.written_s[number] = now_s
+                while data:
+                    data = data[os.write(master, data) :]
+            due_s += pause_s
+            left_s = due_s - time.monotonic()
+            if left_s > 0:
+                time.sleep(left_s)
+            else:
+                self.late.value += 1
+                due_s = time.monotonic()  # what came too late is not made up for
+
+    def close(self) -> None:
+        """End the boards."""
+        self.process.kill()
+        self.process.join()
+        for descriptor in self._masters + self._slaves:
+            os.close(descriptor)

@@ -1,0 +1,109 @@
+"""From the last byte to user code, with a thread or a process that reads, beside a C program on the same line."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import contactfpga
+from contactfpga.errors import MissingTool
+from contactfpga_sim.lab.reader.feeder import Feeder, Pace
+from contactfpga_sim.lab.speed.driver import SKIN, STEP_US
+
+SECONDS = 2.0
+"""Of each stream."""
+LEFT_OUT = 0.15
+"""The share of a stream's beginning that does not count."""
+READERS = ("thread", "process")
+
+
+class Found(NamedTuple):
+    """What one stream gave."""
+
+    us: np.ndarray
+    """From the last byte's write to user code, of each call that returned."""
+    calls: float
+    """Calls that returned per second."""
+
+
+@contextlib.contextmanager
+def bare_program() -> Iterator[Path]:
+    """The C program, compiled."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        raise MissingTool("comparing with a C program", "cc", "apt install gcc")
+    with tempfile.TemporaryDirectory() as folder:
+        built = Path(folder, "bare")
+        source = Path(__file__).with_name("bare.c")
+        subprocess.run([compiler, "-std=c99", "-O2", "-Ic", "-o", built, source], check=True)
+        yield built
+
+
+def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
+    """Of frames with these numbers at these moments."""
+    places = numbers - feeder.first[0]
+    counted = places > len(feeder.written_s) * LEFT_OUT
+    places, seconds = places[counted], seconds[counted]
+    span = seconds[-1] - seconds[0]
+    return Found((seconds - np.array(feeder.written_s)[places]) * 1e6, (len(seconds) - 1) / span)
+
+
+def bare(program: Path, pace: Pace) -> Found:
+    """The C program's."""
+    count = int(pace.per_second * SECONDS)
+    with contextlib.closing(Feeder(1, pace, count)) as feeder, tempfile.NamedTemporaryFile() as file:
+        # A frame or two go out before the stream; so many frames of it are not waited for.
+        command = [program, feeder.ports[0], str(count - 2), str(STEP_US), file.name]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL) as running:
+            time.sleep(0.2)
+            feeder.go.set()
+            assert running.wait(60) == 0
+        numbers, seconds = np.fromfile(file.name).reshape(-1, 2).T
+    return _times(numbers.astype(int), seconds, feeder)
+
+
+def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
+    """The driver's; ``busy``: while another Python thread computes."""
+    count = int(pace.per_second * SECONDS)
+    numbers: list[int] = []
+    seconds: list[float] = []
+    with contextlib.closing(Feeder(1, pace, count)) as feeder:
+        with contactfpga.open(feeder.ports[0], SKIN, timeout=10.0, reader=reader) as board, computing(busy):
+            take: Callable[[float], contactfpga.Zones] = getattr(board, call)
+            feeder.go.set()
+            last = count - 2
+            while not numbers or numbers[-1] < last:
+                numbers.append(take(10.0).time_us // STEP_US)
+                seconds.append(time.monotonic())
+            assert not board.stats.lost
+    return _times(np.array(numbers), np.array(seconds), feeder)
+
+
+@contextlib.contextmanager
+def computing(busy: bool) -> Iterator[None]:
+    """A thread that does nothing but compute, if ``busy``."""
+    done: list[bool] = []
+
+    def compute() -> None:
+        value = 0
+        while not done:
+            value += 1
+
+    thread = threading.Thread(target=compute, daemon=True)
+    if busy:
+        thread.start()
+    try:
+        yield
+    finally:
+        done.append(True)
+        if busy:
+            thread.join()
