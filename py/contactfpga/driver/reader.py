@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import gc
+import logging
 import marshal
 import mmap
 import os
@@ -23,7 +24,7 @@ from typing import Any, NamedTuple
 from contactfpga.driver.clock import Timeline
 from contactfpga.driver.conversation import Arrival, Event
 from contactfpga.driver.events import UnitLine
-from contactfpga.driver.link import Link
+from contactfpga.driver.link import LOG, Link
 from contactfpga.driver.packed import pack_error, pack_frame, pack_run
 from contactfpga.driver.recording import FileTap, RecordingTransport
 from contactfpga.driver.shared import ERROR, FRAME, RUN, SIDE, SWEEP, Ring, Slot
@@ -47,6 +48,9 @@ MEMORY_BYTES = _RING_AT + Ring.HEAD + RING_BYTES
 
 MOST_SHEETS = 64
 """Sheets and histories of which frames can still be taken, the newest."""
+
+MOST_LINES = 32
+"""For the log that wait to be taken."""
 
 SWITCH_S = 0.0005
 """How soon a request is sent while frames are decoded."""
@@ -87,6 +91,23 @@ class Facts:
     """The present one; 0: the board has no units."""
     failure: BaseException | None = None
     """Why nothing can come any more."""
+    logged: int = 0
+    """Lines for the log since the port was opened."""
+    lines: tuple[tuple[int, str], ...] = ()
+    """The last of them, with their levels."""
+
+
+class Lines(logging.Handler):
+    """Passes what is logged about the port to the other process."""
+
+    def __init__(self, facts: Facts):
+        super().__init__(logging.INFO)
+        self._facts = facts
+
+    def emit(self, record: logging.LogRecord) -> None:
+        facts = self._facts
+        facts.logged += 1
+        facts.lines = (*facts.lines, (record.levelno, record.getMessage()))[-MOST_LINES:]
 
 
 class NotedUnits(UnitLine):
@@ -117,6 +138,8 @@ class ReaderLink(Link):
         super().__init__(transport, skin)
         self._shared, self._wake = shared, wake
         self._facts = Facts()
+        self.log = Lines(self._facts)
+        """To be added to the logger."""
         self._histories: dict[int, UnitHistory] = {}
         self._units = self.conversation.units = NotedUnits(self.conversation.stats)
         self._sheet: Sheet | None = None
@@ -187,6 +210,7 @@ class ReaderLink(Link):
     def _show_facts(self) -> None:
         facts, said = self._facts, self.conversation
         facts.history = 0 if said.units.history is None else self._number_of_history(said.units.history)
+        self._logged_lines = facts.logged
         facts.hello, facts.told, facts.readable = said.hello, said.lines.told, said.sheet is not None
         facts.numbers = frozenset(said.numbers)
         self._shared.facts.write(pickled(facts))
@@ -199,7 +223,7 @@ class ReaderLink(Link):
         self._units.noted.clear()
         if said.units.history is not self._histories.get(facts.history):
             self._show_facts()
-        same = said.hello is facts.hello and said.lines.told is facts.told
+        same = said.hello is facts.hello and said.lines.told is facts.told and facts.logged == self._logged_lines
         if not same or len(said.numbers) != len(facts.numbers):
             self._show_facts()
         shared.stats.write(packed_stats(said.stats, counters_of(self.transport)))
@@ -282,6 +306,8 @@ def main(control_descriptor: int, memory_descriptor: int, wake: int) -> None:
         control.send(pickle.dumps(error))
         return
     os.close(memory_descriptor)
+    LOG.setLevel(logging.INFO)
+    LOG.addHandler(link.log)
     gc.freeze()
     if os.getppid() != owner_pid:
         return

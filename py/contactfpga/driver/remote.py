@@ -25,7 +25,7 @@ from pathlib import Path
 from contactfpga.driver import forks
 from contactfpga.driver.address import Replay, SheetOf, Sim, parse
 from contactfpga.driver.events import Silence
-from contactfpga.driver.link import ASK_S, Result, check_command, denied_error, timed_out
+from contactfpga.driver.link import ASK_S, LOG, Result, check_command, denied_error, timed_out
 from contactfpga.driver.packed import unpack_error, unpack_frame
 from contactfpga.driver.reader import COUNTED, LONGEST_MESSAGE, MEMORY_BYTES, Facts, Shared
 from contactfpga.driver.recording import Tap
@@ -80,7 +80,7 @@ class ReaderProcess:
             self.control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             with theirs:
                 numbers = theirs.fileno(), memory, self.wake
-                command = [sys.executable, "-c", _CODE, json.dumps([numbers, sys.path])]
+                command = [sys.executable, "-c", _CODE, json.dumps([numbers, sys.path]), f"reader of {name}"]
                 self.process = subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, pass_fds=numbers
                 )
@@ -188,7 +188,7 @@ class RemoteConversation:
         self._stats, self._stats_version = Stats(), -1
         self._net: list[int] | None = None
         self._histories: dict[int, RemoteHistory] = {}
-        self._lock = threading.Lock()
+        self._lock, self._facts_lock = threading.Lock(), threading.Lock()
         self._sweeps = Cursor(shared.ring, self)
         self.places: weakref.WeakKeyDictionary[Zones, int] = weakref.WeakKeyDictionary()
         """Where frames that were asked for begin in the ring."""
@@ -199,8 +199,12 @@ class RemoteConversation:
         """What changes seldom."""
         version = self._shared.facts.version
         if version != self._version:
-            facts = pickle.loads(self._shared.facts.read())
-            self._facts, self._version = facts, version
+            with self._facts_lock:
+                logged, facts = self._facts.logged, pickle.loads(self._shared.facts.read())
+                self._facts, self._version = facts, version
+            new = min(facts.logged - logged, len(facts.lines))
+            for level, line in facts.lines[len(facts.lines) - max(new, 0) :]:
+                LOG.log(level, "%s", line)
         return self._facts
 
     @property
