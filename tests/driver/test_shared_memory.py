@@ -164,9 +164,9 @@ def test_a_ring_keeps_the_newest_messages_in_order(size, rng):
     for _ in range(120):
         for _ in range(rng.randrange(4)):
             model.put(rng)
-        model.ring.publish(7, 11, 1.5)
+        model.ring.publish(7, 12, 11, 1.5)
         marks = model.ring.marks()
-        assert (marks.facts, marks.last_bytes, marks.last_s) == (7, 11, 1.5)
+        assert (marks.facts, marks.bytes, marks.last_bytes, marks.last_s) == (7, 12, 11, 1.5)
         assert marks.frames == sum(frames for _, _, frames in model.messages)
         assert marks.errors == sum(kind == ERROR for kind, _, _ in model.messages)
         assert marks.sides == sum(kind == SIDE for kind, _, _ in model.messages)
@@ -197,7 +197,7 @@ def test_a_message_that_is_overwritten_during_the_copy_is_not_taken(kind):
     torn = taken = 0
     for _ in range(300):
         model.put(rng)
-        model.ring.publish(0, 0, 0.0)
+        model.ring.publish(0, 0, 0, 0.0)
         place = model.ring.tail
         message = model.ring.look(place)
         if message.kind == PAD:
@@ -220,13 +220,13 @@ def test_readers_of_a_ring_that_is_written_meanwhile_see_the_newest(rng):
     """In a thread, which the interpreter switches to at any moment."""
     model = Model(4096)
     model.put(rng)
-    model.ring.publish(0, 0, 0.0)
+    model.ring.publish(0, 0, 0, 0.0)
     done = []
 
     def write():
         while not done:
             model.put(rng)
-            model.ring.publish(0, 0, 0.0)
+            model.ring.publish(0, 0, 0, 0.0)
 
     with background(write):
         newest, until = 0, time.monotonic() + 0.3

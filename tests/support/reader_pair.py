@@ -35,15 +35,15 @@ class NoProcess:
         os.close(memory)
         self.wake = os.eventfd(0, os.EFD_NONBLOCK)
         self.link = reader.ReaderLink(line, skin, self.shared, self.wake)
-        self.process = self
+        self.control = self
+
+    def fileno(self):
+        return -1
 
     def send(self, what, *arguments):
         with self.link.changed:
             reader._do(self.link, what, list(arguments))
         self.link._send()
-
-    def poll(self):
-        return None
 
     def end(self):
         os.close(self.wake)

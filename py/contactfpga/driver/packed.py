@@ -41,19 +41,23 @@ def pack_frame(arrival: Arrival, sheet: int, history: int) -> bytes:
     )
 
 
-def unpack_frame(body: bytes, sheets: dict[int, Sheet], histories: Mapping[int, UnitHistory]) -> Zones:
-    """The frame. Raises KeyError where its sheet is not known any more."""
+Last = tuple[Packed, Frame, Sheet]
+"""A frame, packed and made."""
+
+
+def unpack_frame(
+    body: bytes, sheets: dict[int, Sheet], histories: Mapping[int, UnitHistory], last: Last | None = None
+) -> tuple[Zones, Last]:
+    """The frame, and what makes the next one sooner. Raises KeyError where its sheet is not known any more."""
     number, history, time_us, frame, before, line, faults = marshal.loads(body)
-    sheet = sheets[number]
-    return Zones(
-        _made(frame, sheet),
-        sheet,
-        time_us,
-        None if before is None else _made(before, sheet),
-        None if line is None else HostLine(*line),
-        faults or (STUCK,),
-        histories.get(history),
-    )
+    sheet, made = sheets[number], None
+    if last is not None and last[0] == before and last[2] is sheet:
+        made = last[1]
+    elif before is not None:
+        made = _made(before, sheet)
+    line = None if line is None else HostLine(*line)
+    zones = Zones(_made(frame, sheet), sheet, time_us, made, line, faults or (STUCK,), histories.get(history))
+    return zones, (frame, zones.frame, sheet)
 
 
 def pack_run(run: Run, sheet: int, history: int) -> bytes:

@@ -13,6 +13,7 @@ import gc
 import logging
 import marshal
 import mmap
+import operator
 import os
 import pickle
 import select
@@ -28,8 +29,8 @@ from contactfpga.driver.link import LOG, Link
 from contactfpga.driver.packed import pack_error, pack_frame, pack_run
 from contactfpga.driver.recording import FileTap, RecordingTransport
 from contactfpga.driver.shared import ERROR, FRAME, RUN, SIDE, SWEEP, Ring, Slot
-from contactfpga.driver.stats import Stats
-from contactfpga.driver.transport import Transport, connect, counters_of
+from contactfpga.driver.stats import NetCounters, Stats
+from contactfpga.driver.transport import Transport, connect
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
@@ -49,6 +50,12 @@ MEMORY_BYTES = _RING_AT + Ring.HEAD + RING_BYTES
 MOST_SHEETS = 64
 """Sheets and histories of which frames can still be taken, the newest."""
 
+WITH_EACH = ("frames", "bytes")
+"""Counters that each frame changes; :class:`contactfpga.driver.shared.Marks` have them."""
+COUNTED = tuple(
+    field.name for field in dataclasses.fields(Stats) if field.name not in ("damaged", "net", "dropped", *WITH_EACH)
+)
+"""The others, which the process that reads counts."""
 MOST_LINES = 32
 """For the log that wait to be taken."""
 
@@ -62,7 +69,7 @@ class Shared(NamedTuple):
     """What is in the memory."""
 
     stats: Slot
-    """:class:`Stats`, as :func:`stats_of` reads them."""
+    """What :func:`counters_in` gives."""
     facts: Slot
     """:class:`Facts`, pickled."""
     ring: Ring
@@ -143,7 +150,8 @@ class ReaderLink(Link):
         self._histories: dict[int, UnitHistory] = {}
         self._units = self.conversation.units = NotedUnits(self.conversation.stats)
         self._sheet: Sheet | None = None
-        self._number = self._numbered = 0
+        self._number = 0
+        self._counted: tuple[object, ...] = ()
         shared.ring.begin()
         self._show_facts()
         self._publish()
@@ -226,8 +234,11 @@ class ReaderLink(Link):
         same = said.hello is facts.hello and said.lines.told is facts.told and facts.logged == self._logged_lines
         if not same or len(said.numbers) != len(facts.numbers):
             self._show_facts()
-        shared.stats.write(packed_stats(said.stats, counters_of(self.transport)))
-        shared.ring.publish(shared.facts.version, self._last_bytes, self.last_s)
+        counted = counters_in(said.stats, self.net)
+        if counted != self._counted:
+            self._counted = counted
+            shared.stats.write(marshal.dumps(counted))
+        shared.ring.publish(shared.facts.version, said.stats.bytes, self._last_bytes, self.last_s)
         os.eventfd_write(self._wake, 1)
 
 
@@ -239,16 +250,12 @@ def pickled(facts: Facts) -> bytes:
         return pickle.dumps(dataclasses.replace(facts, failure=ContactFPGAError(repr(facts.failure))))
 
 
-def packed_stats(stats: Stats, net: object) -> bytes:
-    """Counters as bytes."""
-    values = vars(stats)
-    return marshal.dumps(
-        ([values[name] for name in COUNTED], dict(stats.damaged), None if net is None else list(vars(net).values()))
-    )
+_COUNTED = operator.attrgetter(*COUNTED)
 
 
-COUNTED = tuple(field.name for field in dataclasses.fields(Stats) if field.name not in ("damaged", "net", "dropped"))
-"""Counters of the process that reads."""
+def counters_in(stats: Stats, net: NetCounters | None) -> tuple[object, ...]:
+    """Counters but those that each frame changes, as plain values that are no longer changed."""
+    return _COUNTED(stats), dict(stats.damaged), None if net is None else tuple(vars(net).values())
 
 
 def served(control: socket.socket, link: ReaderLink) -> None:

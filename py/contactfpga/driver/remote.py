@@ -186,7 +186,7 @@ class RemoteConversation:
         self._shared = shared
         self._facts, self._version = Facts(), -1
         self._stats, self._stats_version = Stats(), -1
-        self._net: list[int] | None = None
+        self._net: tuple[int, ...] | None = None
         self._histories: dict[int, RemoteHistory] = {}
         self._lock, self._facts_lock = threading.Lock(), threading.Lock()
         self._sweeps = Cursor(shared.ring, self)
@@ -218,13 +218,15 @@ class RemoteConversation:
     @property
     def stats(self) -> Stats:
         """The counters; always the same object."""
-        slot = self._shared.stats
+        slot, stats = self._shared.stats, self._stats
+        marks = self._shared.ring.marks()
         if (version := slot.version) != self._stats_version:
             values, damaged, self._net = marshal.loads(slot.read())
-            vars(self._stats).update(zip(COUNTED, values, strict=True))
-            self._stats.damaged = Counter(damaged)
+            vars(stats).update(zip(COUNTED, values, strict=True))
+            stats.damaged = Counter(damaged)
             self._stats_version = version
-        return self._stats
+        stats.frames, stats.bytes = marks.frames, marks.bytes
+        return stats
 
     @property
     def net(self) -> NetCounters | None:
@@ -281,7 +283,7 @@ class _Waiter:
             if body is None:
                 continue
             if found.kind == FRAME:
-                zones = unpack_frame(body, self._said.sheets(), self._said.histories())
+                zones, _ = unpack_frame(body, self._said.sheets(), self._said.histories())
                 self._said.places[zones] = place
                 return zones
             error, unreadable = unpack_error(body)
@@ -302,7 +304,8 @@ class RemoteLink:
         self._asking, self._commanding = threading.Lock(), threading.Lock()
         self._tickets = 0
         self._asked_s = -float("inf")
-        self._closing = self._inherited = False
+        self._closing = self._inherited = self._over = False
+        self._control = reader.control.fileno()
         self._waiting = threading.local()
         forks.watch(self)
 
@@ -407,7 +410,7 @@ class RemoteLink:
 
     def wait_for(self, found: Callable[[], Result | None], deadline: float, timeout: float) -> Result:
         """What ``found`` returns as soon as it is not None; raises :class:`ReadTimeout` at the deadline."""
-        start = self.conversation.stats.bytes
+        start = self._marks().bytes
         while True:
             self.check_open()
             ended = self._ended()
@@ -435,14 +438,14 @@ class RemoteLink:
                     events = self._waiting.events = select.epoll()
                     events.register(self._reader.wake, select.EPOLLIN | select.EPOLLET)
                     events.register(self._reader.control, select.EPOLLRDHUP)
-            events.poll(seconds)
+            self._over = any(place == self._control for place, _ in events.poll(seconds)) or self._over
         except (OSError, ValueError):
             self.check_open()
             raise
 
     def _ended(self) -> bool:
         """Whether nothing can come any more, as far as is known."""
-        return self.conversation.facts.failure is not None or self._reader.process.poll() is not None
+        return self._over or self.conversation.facts.failure is not None
 
     def _failure(self) -> BaseException:
         failure = self.conversation.facts.failure

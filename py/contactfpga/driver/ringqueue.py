@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from contactfpga.driver.events import SideEvent
-from contactfpga.driver.packed import unpack_error, unpack_frame, unpack_run
+from contactfpga.driver.packed import Last, unpack_error, unpack_frame, unpack_run
 from contactfpga.driver.shared import ERROR, FRAME, PAD, SIDE, SWEEP, Marks, Message, Ring
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin.sheet import Sheet
@@ -44,6 +44,7 @@ class Cursor:
         self.taken = 0  # frames of the message at this place
         self._belongings = belongings
         self._run: Run | None = None  # at this place
+        self._last: Last | None = None
 
     def message(self, marks: Marks) -> Message | None:
         """What comes next; None where nothing does."""
@@ -97,7 +98,8 @@ class Cursor:
             return None
         sheets, histories = self._belongings.sheets(), self._belongings.histories()
         if message.kind == FRAME:
-            return unpack_frame(body, sheets, histories)
+            zones, self._last = unpack_frame(body, sheets, histories, self._last)
+            return zones
         if message.kind == ERROR:
             return unpack_error(body)[0]
         if message.kind == SIDE:

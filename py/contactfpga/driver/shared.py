@@ -114,13 +114,15 @@ class Marks(NamedTuple):
     """Where the newest message with a frame begins; -1: there is none."""
     facts: int
     """Version of the facts that belong to this moment."""
+    bytes: int
+    """That had come."""
     last_bytes: int
-    """Bytes that had come with the newest frame."""
+    """Those of them that had come with the newest frame."""
     last_s: float
     """When it came."""
 
 
-_MARKS = struct.Struct("8qd")
+_MARKS = struct.Struct("9qd")
 _PAD, _COUNTS = struct.Struct("2Q"), struct.Struct("5Q")
 _HEADER_WORDS = 8
 _ALIGNED = 16
@@ -141,6 +143,7 @@ class Ring:
         self._size = len(self._bytes)
         self._tail = memory[:WORD].cast("Q")
         self._slot = Slot(memory[2 * WORD : self.HEAD])
+        self._known: tuple[int, Marks | None] = -1, None
 
     # ---- for the writer
 
@@ -150,7 +153,7 @@ class Ring:
         self._head = self._shown = self._frames = self._errors = self._sides = self._answered = 0
         self._last = -1
         self._starts: list[tuple[int, int]] = []
-        self.publish(0, 0, 0.0)
+        self.publish(0, 0, 0, 0.0)
 
     def put(self, kind: int, body: bytes, frames: int = 0, answers: int = 0) -> None:
         """Append a message, which :meth:`publish` shows."""
@@ -203,17 +206,22 @@ class Ring:
             tail += self._words[tail % self._size // WORD]
         self._tail[0] = tail
 
-    def publish(self, facts: int, last_bytes: int, last_s: float) -> None:
-        """Show all messages."""
+    def publish(self, facts: int, came: int, last_bytes: int, last_s: float) -> None:
+        """Show all messages; ``came``: bytes from the board by now, ``last_bytes``: those by the newest frame."""
         counts = self._head, self._frames, self._errors, self._sides, self._answered, self._last
-        self._slot.write(_MARKS.pack(*counts, facts, last_bytes, last_s))
+        self._slot.write(_MARKS.pack(*counts, facts, came, last_bytes, last_s))
         self._shown = self._head
 
     # ---- for readers
 
     def marks(self) -> Marks:
         """How far the writer has come. Raises :class:`WriterGone`."""
-        return Marks._make(_MARKS.unpack(self._slot.read()))
+        version, marks = self._known
+        if version != self._slot.version or marks is None:
+            version = self._slot.version
+            marks = Marks._make(_MARKS.unpack(self._slot.read()))
+            self._known = version, marks  # of this version, or of a later one
+        return marks
 
     @property
     def shown(self) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import gc
 import multiprocessing
 import os
 import select
@@ -17,8 +16,6 @@ from contactfpga_sim.model.golden.request import heard
 
 ALIVE_S = 0.25
 """How often a board that was not told to go sends a frame."""
-DISTINCT = 2048
-"""Frames that are made for each board; then only their numbers go on, as far as the first :data:`FRAMES`."""
 
 
 class Pace(NamedTuple):
@@ -38,24 +35,18 @@ PACES = Pace(1_000, 1), Pace(10_000, 1), Pace(72_000, 18)
 
 
 @functools.cache
-def frames(low: int) -> list[bytes]:
+def frames(low: int, touched: bool) -> list[bytes]:
     """All frames of a board that last heard a number with these lowest bits."""
-    return [frame(number, low) for number in range(FRAMES)]
-
-
-def prepare() -> None:
-    """Make all frames, which a process that is forked then need not."""
-    for low in range(8):
-        frames(low)
-    gc.freeze()
+    return [frame(number, low, int(touched)) for number in range(FRAMES)]
 
 
 class Feeder:
     """Boards that answer requests until they are told to go, and then write ``count`` frames each."""
 
-    def __init__(self, boards: int, pace: Pace, count: int):
-        prepare()
-        self._pace, self._count = pace, count
+    def __init__(self, boards: int, pace: Pace, count: int, touched: bool = True):
+        for low in range(8):  # which the process that is forked need not make
+            frames(low, touched)
+        self._pace, self._count, self._touched = pace, count, touched
         context: Any = multiprocessing.get_context("fork")
         pairs = [os.openpty() for _ in range(boards)]
         for _, slave in pairs:
@@ -85,13 +76,13 @@ class Feeder:
                     taken[board] += 1
                     lows[board] = one.number % 8
                     said = greeting(one.number) if one.hello and not sent[board] else b""
-                    os.write(master, said + frames(lows[board])[sent[board]])
+                    os.write(master, said + frames(lows[board], self._touched)[sent[board]])
                     sent[board] += 1
             if time.monotonic() > alive_s + ALIVE_S:
                 alive_s = time.monotonic()
                 for board, master in enumerate(self._masters):
                     if taken[board]:
-                        os.write(master, frames(lows[board])[sent[board]])
+                        os.write(master, frames(lows[board], self._touched)[sent[board]])
                         sent[board] += 1
         self.first[:] = sent
         self._stream(lows, sent)
@@ -99,7 +90,7 @@ class Feeder:
 
     def _stream(self, lows: list[int], sent: list[int]) -> None:
         size, pause_s, count = self._pace.at_once, self._pace.pause_s, self._count
-        made = [frames(low) for low in lows]
+        made = [frames(low, self._touched) for low in lows]
         due_s = time.monotonic()
         for place in range(0, count, size):
             chosen = range(place, min(place + size, count))
