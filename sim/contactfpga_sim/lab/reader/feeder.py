@@ -59,8 +59,8 @@ class Feeder:
         """Number of the first frame of each board after it was told to go."""
         self.written_s = context.RawArray("d", count)
         """When each frame was about to be written, to the first board, on ``time.monotonic``."""
-        self.late = context.RawValue("q", 0)
-        """How often frames were due before the last ones were written."""
+        self.greeted = context.RawValue("q", 0)
+        """Requests that were answered."""
         self.process = context.Process(target=self._run, daemon=True)
         self.process.start()
 
@@ -78,6 +78,7 @@ class Feeder:
                     said = greeting(one.number) if one.hello and not sent[board] else b""
                     os.write(master, said + frames(lows[board], self._touched)[sent[board]])
                     sent[board] += 1
+                    self.greeted.value += 1
             if time.monotonic() > alive_s + ALIVE_S:
                 alive_s = time.monotonic()
                 for board, master in enumerate(self._masters):
@@ -107,7 +108,6 @@ class Feeder:
             if left_s > 0:
                 time.sleep(left_s)
             else:
-                self.late.value += 1
                 due_s = time.monotonic()  # what came too late is not made up for
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from contactfpga.errors import MissingTool
 from contactfpga_sim.lab.reader.feeder import Feeder, Pace
 from contactfpga_sim.lab.speed.driver import SKIN, STEP_US
 
-SECONDS = 2.0
+SECONDS = 1.5
 """Of each stream."""
 LEFT_OUT = 0.15
 """The share of a stream's beginning that does not count."""
@@ -64,7 +64,9 @@ def bare(program: Path, pace: Pace) -> Found:
         # A frame or two go out before the stream; so many frames of it are not waited for.
         command = [program, feeder.ports[0], str(count - 2), str(STEP_US), file.name]
         with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL) as running:
-            time.sleep(0.2)
+            while not feeder.greeted.value:
+                time.sleep(0.01)
+            time.sleep(0.1)
             feeder.go.set()
             assert running.wait(60) == 0
         numbers, seconds = np.fromfile(file.name).reshape(-1, 2).T

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from contactfpga_sim.lab.reader.feeder import PACES, Pace
 from contactfpga_sim.lab.reader.latency import READERS, Found
 
 ROUNDS = 2
-COUNTS = 16, 64
+LINKS = (16, "latest"), (16, "batch"), (64, "latest")
 
 
 def times(streams: list[Found]) -> tuple[float, float]:
@@ -51,7 +50,7 @@ def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
     return f"{writer.table_of(rows)}\n\n{conditions()}"
 
 
-def busy_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
+def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
     """The same beside a thread that computes."""
     rows = [["frames per second", "call", *(f'`reader="{reader}"`' for reader in READERS), "calls per second"]]
     for pace in paces:
@@ -77,15 +76,14 @@ def loop_table() -> str:
     return writer.table_of(rows)
 
 
-def links_table(counts: tuple[int, ...] = COUNTS, measure: Callable[..., links.Share] = links.measured) -> str:
+def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
     """Many links in one process."""
     rows = [["links of 1 kHz", "each 10 ms", "reader", "the process", "its readers", "frames that came in time", "age"]]
-    for count in counts:
-        for call in ("latest", "batch"):
-            for reader in READERS:
-                found = measure(reader, count, call)
-                shares = [f"{100 * share:.0f} %" for share in (found.used, found.readers, found.came)]
-                rows.append([str(count), f"`{call}()`", f"`{reader}`", *shares, f"{found.age_ms:.1f} ms"])
+    for count, call in asked:
+        for reader in READERS:
+            found = links.measured(reader, count, call)
+            shares = [f"{100 * share:.0f} %" for share in (found.used, found.readers, found.came)]
+            rows.append([str(count), f"`{call}()`", f"`{reader}`", *shares, f"{found.age_ms:.1f} ms"])
     return writer.table_of(rows)
 
 
