@@ -16,6 +16,7 @@ import pytest
 from byte_histories import SKINS, History
 from child_processes import alive, reader_processes
 from fake_board import FakeBoard, background, wait_until
+from sample import sample
 from terminals import environment
 
 import contactfpga
@@ -52,6 +53,7 @@ def test_frames_come_through_the_memory(board):
         host.latest()
 
 
+@pytest.mark.slow
 def test_a_task_gets_every_frame(board):
     board.stream = board.frame
     board.hello_s = 0.1
@@ -70,11 +72,9 @@ def test_a_task_gets_every_frame(board):
     assert numbers == [(numbers[0] + step) % 256 for step in range(30)]
 
 
-@pytest.mark.parametrize("way", ["process", "thread"])
-def test_a_board_that_is_unplugged_is_told_of_after_its_frames(board, way):
-    with contactfpga.open(board.path, reader=way, timeout=LONG) as host:
-        sent = board.frame()
-        board.send(sent)
+def test_a_board_that_is_unplugged_is_told_of_after_its_frames(board):
+    with opened(board) as host:
+        board.send(board.frame())
         wait_until(lambda: host.stats.frames >= 2)
         board.unplug()
         with pytest.raises(contactfpga.PortLost, match=r"is gone .*; plug the board in and open it again"):
@@ -83,6 +83,7 @@ def test_a_board_that_is_unplugged_is_told_of_after_its_frames(board, way):
             host.read(LONG)
 
 
+@pytest.mark.slow
 def test_the_process_ends_with_the_board(board):
     host = opened(board)
     (number,) = reader_processes(board.path)
@@ -117,7 +118,7 @@ def owner(board, *more):
             process.kill()
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("how", sample([signal.SIGKILL, signal.SIGTERM], quick=[signal.SIGKILL], slow=[signal.SIGTERM]))
 def test_it_ends_with_its_owner_however_that_ends(board, how):
     with owner(board) as (process, number):
         process.send_signal(how)
@@ -127,6 +128,7 @@ def test_it_ends_with_its_owner_however_that_ends(board, how):
         assert len(host.read(LONG)) == 1
 
 
+@pytest.mark.slow
 def test_it_ends_with_a_killed_owner_that_has_a_child_of_its_own(board):
     """The child has the other end of the reader's socket, and goes on."""
     with owner(board, "import os\nif not os.fork(): os.close(1), time.sleep(10), os._exit(0)") as (process, number):
@@ -145,6 +147,7 @@ def test_its_end_is_told_of(board):
             host.read(LONG)
 
 
+@pytest.mark.slow
 def test_in_a_child_the_board_is_closed(board):
     with opened(board) as host:
         frames = host.subscribe()
@@ -197,6 +200,7 @@ def test_descriptors_and_memory_stay_as_they_were(board):
     assert not reader_processes(board.path)
 
 
+@pytest.mark.slow
 def test_a_port_is_open_once(board):
     with opened(board):
         for reader in ("thread", "process"):
@@ -206,6 +210,7 @@ def test_a_port_is_open_once(board):
         opened(board)
 
 
+@pytest.mark.slow
 def test_what_the_process_records_is_what_a_thread_records(board, tmp_path):
     file = tmp_path / "bytes.rec"
     with opened(board, record=file) as host:
@@ -240,6 +245,7 @@ def test_a_port_that_is_not_there_is_told_of_as_ever():
         contactfpga.open("/dev/nothing", reader="process")
 
 
+@pytest.mark.slow
 def test_losses_and_restarts_are_logged(board, caplog):
     caplog.set_level("INFO", "contactfpga")
     with opened(board) as host:
@@ -288,6 +294,7 @@ def told(item):
     return {name: value for name, value in values.items() if not name.startswith(("host", "arrived"))}
 
 
+@pytest.mark.slow
 def test_the_newest_frame_needs_no_other_thread(board):
     """While a thread holds the lock that all calls of a thread's reader share."""
     board.stream = board.frame
@@ -323,6 +330,7 @@ def test_several_threads_read_one_board(board):
         assert host.stats.lost == 0
 
 
+@pytest.mark.slow
 def test_a_skin_is_expected_of_the_board(board):
     with pytest.raises(contactfpga.SkinMismatch, match="was built from"):
         opened(board, skin=Skin(rows=8))

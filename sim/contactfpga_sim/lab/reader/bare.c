@@ -1,9 +1,9 @@
 /* What a C program needs from the last byte to its own code: reads a port, decodes, and notes when it had each newest
  * frame.
  *
- *     bare PORT FRAMES STEP_US FILE
+ *     bare PORT STEP_US FILE
  *
- * It ends with the frame that has this number, and writes pairs of doubles: the number, and CLOCK_MONOTONIC in s.
+ * It ends when no frame comes for 0.8 s, and writes pairs of doubles: the number, and CLOCK_MONOTONIC in s.
  */
 #define _DEFAULT_SOURCE
 #include <fcntl.h>
@@ -26,10 +26,10 @@ static double now(void) {
 }
 
 int main(int count, char **words) {
-    if (count != 5) return 2;
+    if (count != 4) return 2;
     int port = open(words[1], O_RDWR | O_NOCTTY);
-    uint64_t last = strtoull(words[2], NULL, 10), step_us = strtoull(words[3], NULL, 10);
-    FILE *file = fopen(words[4], "wb");
+    uint64_t step_us = strtoull(words[2], NULL, 10);
+    FILE *file = fopen(words[3], "wb");
     struct termios raw;
     if (port < 0 || !file || tcgetattr(port, &raw)) return 1;
     cfmakeraw(&raw);
@@ -43,7 +43,7 @@ int main(int count, char **words) {
         if (write(port, request, length) != (ssize_t)length) return 1;
     }
     struct pollfd ready = {port, POLLIN, 0};
-    while (poll(&ready, 1, 10000) > 0) {
+    while (poll(&ready, 1, reader.greeted ? 800 : 60000) > 0) {
         ssize_t size = read(port, buffer, sizeof buffer);
         if (size <= 0) return 1;
         bool came = false;
@@ -51,7 +51,6 @@ int main(int count, char **words) {
         if (!came) continue;
         double found[2] = {(double)(reader.frame.time_us / step_us), now()};
         fwrite(found, sizeof found, 1, file);
-        if (reader.frame.time_us / step_us >= last) break;
     }
     if (fclose(file)) return 1;
     struct timespec used;

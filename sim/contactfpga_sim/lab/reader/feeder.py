@@ -41,12 +41,14 @@ def frames(low: int, touched: bool) -> list[bytes]:
 
 
 class Feeder:
-    """Boards that answer requests until they are told to go, and then write ``count`` frames each."""
+    """Boards that answer requests until they are told to go, and then write frames for
+    so many seconds."""
 
-    def __init__(self, boards: int, pace: Pace, count: int, touched: bool = True):
+    def __init__(self, boards: int, pace: Pace, seconds: float, touched: bool = True):
         for low in range(8):  # which the process that is forked need not make
             frames(low, touched)
-        self._pace, self._count, self._touched = pace, count, touched
+        count = int(pace.per_second * seconds)
+        self._pace, self._seconds, self._touched = pace, seconds, touched
         context: Any = multiprocessing.get_context("fork")
         pairs = [os.openpty() for _ in range(boards)]
         for _, slave in pairs:
@@ -59,6 +61,8 @@ class Feeder:
         """Number of the first frame of each board after it was told to go."""
         self.written_s = context.RawArray("d", count)
         """When each frame was about to be written, to the first board, on ``time.monotonic``."""
+        self.end = context.RawValue("q", -1)
+        """Frames of each board that were written; -1: not all of them are."""
         self.greeted = context.RawValue("q", 0)
         """Requests that were answered."""
         self.process = context.Process(target=self._run, daemon=True)
@@ -90,11 +94,12 @@ class Feeder:
         time.sleep(60.0)  # a port that is closed would take what was not read with it
 
     def _stream(self, lows: list[int], sent: list[int]) -> None:
-        size, pause_s, count = self._pace.at_once, self._pace.pause_s, self._count
+        size, pause_s = self._pace.at_once, self._pace.pause_s
         made = [frames(low, self._touched) for low in lows]
-        due_s = time.monotonic()
-        for place in range(0, count, size):
-            chosen = range(place, min(place + size, count))
+        begun_s = due_s = time.monotonic()
+        end = 0
+        while end + size <= len(self.written_s) and time.monotonic() < begun_s + self._seconds:
+            chosen = range(end, end + size)
             for board, master in enumerate(self._masters):
                 data = b"".join([made[board][(sent[board] + number) % FRAMES] for number in chosen])
                 if not board:
@@ -103,12 +108,21 @@ class Feeder:
                         self.written_s[number] = now_s
                 while data:
                     data = data[os.write(master, data) :]
+            end += size
             due_s += pause_s
             left_s = due_s - time.monotonic()
             if left_s > 0:
                 time.sleep(left_s)
             else:
                 due_s = time.monotonic()  # what came too late is not made up for
+        self.end.value = end
+
+    def begin(self) -> None:
+        """Have them write, once each has been asked."""
+        while self.greeted.value < len(self.ports):
+            time.sleep(0.01)
+        time.sleep(0.1)
+        self.go.set()
 
     def close(self) -> None:
         """End the boards."""

@@ -23,6 +23,10 @@ SECONDS = 1.5
 """Of each stream."""
 LEFT_OUT = 0.15
 """The share of a stream's beginning that does not count."""
+OPEN_S = 60.0
+"""How long a board may take to answer, on a machine that is busy."""
+ENDED_S = 0.8
+"""A stream has ended when no frame came for so long."""
 READERS = ("thread", "process")
 
 
@@ -51,7 +55,7 @@ def bare_program() -> Iterator[Path]:
 def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
     """Of frames with these numbers at these moments."""
     places = numbers - feeder.first[0]
-    counted = places > len(feeder.written_s) * LEFT_OUT
+    counted = (places > feeder.end.value * LEFT_OUT) & (places < feeder.end.value)
     places, seconds = places[counted], seconds[counted]
     span = seconds[-1] - seconds[0]
     return Found((seconds - np.array(feeder.written_s)[places]) * 1e6, (len(seconds) - 1) / span)
@@ -59,35 +63,30 @@ def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
 
 def bare(program: Path, pace: Pace) -> Found:
     """The C program's."""
-    count = int(pace.per_second * SECONDS)
-    with contextlib.closing(Feeder(1, pace, count)) as feeder, tempfile.NamedTemporaryFile() as file:
-        # A frame or two go out before the stream; so many frames of it are not waited for.
-        command = [program, feeder.ports[0], str(count - 2), str(STEP_US), file.name]
-        with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL) as running:
-            while not feeder.greeted.value:
-                time.sleep(0.01)
-            time.sleep(0.1)
-            feeder.go.set()
-            assert running.wait(60) == 0
+    with contextlib.closing(Feeder(1, pace, SECONDS)) as feeder, tempfile.NamedTemporaryFile() as file:
+        command = [str(program), feeder.ports[0], str(STEP_US), file.name]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
+            feeder.begin()
+            assert running.wait(OPEN_S) == 0
         numbers, seconds = np.fromfile(file.name).reshape(-1, 2).T
-    return _times(numbers.astype(int), seconds, feeder)
+        return _times(numbers.astype(int), seconds, feeder)
 
 
 def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
     """The driver's; ``busy``: while another Python thread computes."""
-    count = int(pace.per_second * SECONDS)
     numbers: list[int] = []
     seconds: list[float] = []
-    with contextlib.closing(Feeder(1, pace, count)) as feeder:
-        with contactfpga.open(feeder.ports[0], SKIN, timeout=10.0, reader=reader) as board, computing(busy):
+    with contextlib.closing(Feeder(1, pace, SECONDS)) as feeder:
+        with contactfpga.open(feeder.ports[0], SKIN, timeout=OPEN_S, reader=reader) as board, computing(busy):
             take: Callable[[float], contactfpga.Zones] = getattr(board, call)
-            feeder.go.set()
-            last = count - 2
-            while not numbers or numbers[-1] < last:
-                numbers.append(take(10.0).time_us // STEP_US)
-                seconds.append(time.monotonic())
+            feeder.begin()
+            with contextlib.suppress(contactfpga.ReadTimeout):
+                while True:
+                    numbers.append(take(ENDED_S).time_us // STEP_US)
+                    seconds.append(time.monotonic())
+            del numbers[len(seconds) :]
             assert not board.stats.lost
-    return _times(np.array(numbers), np.array(seconds), feeder)
+        return _times(np.array(numbers), np.array(seconds), feeder)
 
 
 @contextlib.contextmanager

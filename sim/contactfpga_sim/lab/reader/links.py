@@ -37,14 +37,13 @@ class Share(NamedTuple):
 
 def measured(reader: str, links: int, call: str) -> Share:
     """``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
-    count = int(PACE.per_second * SECONDS)
-    with contextlib.closing(Feeder(links, PACE, count)) as feeder, contextlib.ExitStack() as opened:
+    with contextlib.closing(Feeder(links, PACE, SECONDS)) as feeder, contextlib.ExitStack() as opened:
         with ThreadPoolExecutor(4) as workers:
             boards = list(workers.map(lambda port: _opened(port, reader), feeder.ports))
         for board in boards:
             opened.callback(board.close)
-        queues = [board.subscribe(count) for board in boards]
-        feeder.go.set()
+        queues = [board.subscribe(int(PACE.per_second * SECONDS)) for board in boards]
+        feeder.begin()
         time.sleep(0.2)
         before = [board.stats.frames for board in boards]
         used, others, begun = time.process_time(), _children_s(), time.monotonic()

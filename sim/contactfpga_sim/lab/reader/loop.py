@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import contactfpga
 from contactfpga_sim.lab.reader.feeder import Feeder, Pace
-from contactfpga_sim.lab.reader.latency import computing
+from contactfpga_sim.lab.reader.latency import OPEN_S, computing
 from contactfpga_sim.lab.speed.driver import SKIN
 from contactfpga_sim.lab.tracking.reflex import example
 
@@ -31,16 +31,15 @@ class Missed(NamedTuple):
 def measured(reader: str, busy: bool, switch_s: float) -> Missed:
     """``switch_s``: Python's switch interval."""
     loop, usual = example(), sys.getswitchinterval()
-    count = int(PACE.per_second * SECONDS)
     begun: list[float] = []
     silent = 0
-    with contextlib.closing(Feeder(1, PACE, count, touched=False)) as feeder:
-        with contactfpga.open(feeder.ports[0], SKIN, timeout=10.0, reader=reader) as board, computing(busy):
+    with contextlib.closing(Feeder(1, PACE, SECONDS, touched=False)) as feeder:
+        with contactfpga.open(feeder.ports[0], SKIN, timeout=OPEN_S, reader=reader) as board, computing(busy):
             sys.setswitchinterval(switch_s)
             try:
-                feeder.go.set()
+                feeder.begin()
                 board.latest(10.0)
-                end = time.monotonic() + SECONDS - 0.3
+                end = time.monotonic() + SECONDS - 0.5
 
                 def step() -> None:
                     begun.append(time.monotonic())
