@@ -43,7 +43,7 @@ int main(int count, char **words) {
         if (write(port, request, length) != (ssize_t)length) return 1;
     }
     struct pollfd ready = {port, POLLIN, 0};
-    while (poll(&ready, 1, reader.greeted ? 800 : 60000) > 0) {
+    while (poll(&ready, 1, reader.stats.frames > 20 ? 800 : 60000) > 0) {
         ssize_t size = read(port, buffer, sizeof buffer);
         if (size <= 0) return 1;
         bool came = false;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import multiprocessing
 import os
 import select
@@ -10,7 +9,7 @@ import time
 import tty
 from typing import Any, NamedTuple
 
-from contactfpga_sim.lab.speed.driver import FRAMES, SKIN, frame, greeting
+from contactfpga_sim.lab.speed.driver import SKIN, frame, greeting
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import heard
 
@@ -24,31 +23,30 @@ class Pace(NamedTuple):
     per_second: int
     at_once: int
     """In one write, as a port of USB hands them over."""
+    seconds: float
+    """Of a stream."""
+
+    @property
+    def step_us(self) -> int:
+        """From frame to frame, on the board's clock."""
+        return round(1e6 / self.per_second)
 
     @property
     def pause_s(self) -> float:
         return self.at_once / self.per_second
 
 
-PACES = Pace(1_000, 1), Pace(10_000, 1), Pace(72_000, 18)
+PACES = Pace(1_000, 1, 1.5), Pace(10_000, 1, 1.0), Pace(72_000, 18, 0.5)
 """The reference sheet with a slow and a fast scan, and what 12 Mbaud carry."""
-
-
-@functools.cache
-def frames(low: int, touched: bool) -> list[bytes]:
-    """All frames of a board that last heard a number with these lowest bits."""
-    return [frame(number, low, int(touched)) for number in range(FRAMES)]
 
 
 class Feeder:
     """Boards that answer requests until they are told to go, and then write frames for
-    so many seconds."""
+    as long as their pace says."""
 
-    def __init__(self, boards: int, pace: Pace, seconds: float, touched: bool = True):
-        for low in range(8):  # which the process that is forked need not make
-            frames(low, touched)
-        count = int(pace.per_second * seconds)
-        self._pace, self._seconds, self._touched = pace, seconds, touched
+    def __init__(self, boards: int, pace: Pace, touched: bool = True):
+        count = int(pace.per_second * pace.seconds)
+        self._pace, self._touched = pace, touched
         context: Any = multiprocessing.get_context("fork")
         pairs = [os.openpty() for _ in range(boards)]
         for _, slave in pairs:
@@ -80,14 +78,14 @@ class Feeder:
                     taken[board] += 1
                     lows[board] = one.number % 8
                     said = greeting(one.number) if one.hello and not sent[board] else b""
-                    os.write(master, said + frames(lows[board], self._touched)[sent[board]])
+                    os.write(master, said + self._frame(sent[board], lows[board]))
                     sent[board] += 1
                     self.greeted.value += 1
             if time.monotonic() > alive_s + ALIVE_S:
                 alive_s = time.monotonic()
                 for board, master in enumerate(self._masters):
                     if taken[board]:
-                        os.write(master, frames(lows[board], self._touched)[sent[board]])
+                        os.write(master, self._frame(sent[board], lows[board]))
                         sent[board] += 1
         self.first[:] = sent
         self._stream(lows, sent)
@@ -95,13 +93,14 @@ class Feeder:
 
     def _stream(self, lows: list[int], sent: list[int]) -> None:
         size, pause_s = self._pace.at_once, self._pace.pause_s
-        made = [frames(low, self._touched) for low in lows]
+        count = len(self.written_s) + max(sent)
+        made = {low: [self._frame(number, low) for number in range(count)] for low in set(lows)}
         begun_s = due_s = time.monotonic()
         end = 0
-        while end + size <= len(self.written_s) and time.monotonic() < begun_s + self._seconds:
+        while end + size <= len(self.written_s) and time.monotonic() < begun_s + self._pace.seconds:
             chosen = range(end, end + size)
             for board, master in enumerate(self._masters):
-                data = b"".join([made[board][(sent[board] + number) % FRAMES] for number in chosen])
+                data = b"".join([made[lows[board]][sent[board] + number] for number in chosen])
                 if not board:
                     now_s = time.monotonic()
                     for number in chosen:
@@ -116,6 +115,9 @@ class Feeder:
             else:
                 due_s = time.monotonic()  # what came too late is not made up for
         self.end.value = end
+
+    def _frame(self, number: int, low: int) -> bytes:
+        return frame(number, low, int(self._touched), self._pace.step_us)
 
     def begin(self) -> None:
         """Have them write, once each has been asked."""

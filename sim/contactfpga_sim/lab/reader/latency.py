@@ -17,16 +17,16 @@ import numpy as np
 import contactfpga
 from contactfpga.errors import MissingTool
 from contactfpga_sim.lab.reader.feeder import Feeder, Pace
-from contactfpga_sim.lab.speed.driver import SKIN, STEP_US
+from contactfpga_sim.lab.speed.driver import SKIN
 
-SECONDS = 1.5
-"""Of each stream."""
 LEFT_OUT = 0.15
 """The share of a stream's beginning that does not count."""
 OPEN_S = 60.0
 """How long a board may take to answer, on a machine that is busy."""
 ENDED_S = 0.8
 """A stream has ended when no frame came for so long."""
+BEGUN = 20
+"""Frames after which a stream has begun; a few come while the board makes the others."""
 READERS = ("thread", "process")
 
 
@@ -63,8 +63,8 @@ def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
 
 def bare(program: Path, pace: Pace) -> Found:
     """The C program's."""
-    with contextlib.closing(Feeder(1, pace, SECONDS)) as feeder, tempfile.NamedTemporaryFile() as file:
-        command = [str(program), feeder.ports[0], str(STEP_US), file.name]
+    with contextlib.closing(Feeder(1, pace)) as feeder, tempfile.NamedTemporaryFile() as file:
+        command = [str(program), feeder.ports[0], str(pace.step_us), file.name]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
             feeder.begin()
             assert running.wait(OPEN_S) == 0
@@ -76,13 +76,13 @@ def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
     """The driver's; ``busy``: while another Python thread computes."""
     numbers: list[int] = []
     seconds: list[float] = []
-    with contextlib.closing(Feeder(1, pace, SECONDS)) as feeder:
+    with contextlib.closing(Feeder(1, pace)) as feeder:
         with contactfpga.open(feeder.ports[0], SKIN, timeout=OPEN_S, reader=reader) as board, computing(busy):
             take: Callable[[float], contactfpga.Zones] = getattr(board, call)
             feeder.begin()
             with contextlib.suppress(contactfpga.ReadTimeout):
                 while True:
-                    numbers.append(take(ENDED_S).time_us // STEP_US)
+                    numbers.append(take(ENDED_S if len(seconds) > BEGUN else OPEN_S).time_us // pace.step_us)
                     seconds.append(time.monotonic())
             del numbers[len(seconds) :]
             assert not board.stats.lost

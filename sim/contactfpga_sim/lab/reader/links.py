@@ -13,10 +13,9 @@ import numpy as np
 
 import contactfpga
 from contactfpga_sim.lab.reader.feeder import Feeder, Pace
-from contactfpga_sim.lab.speed.driver import SKIN, STEP_US
+from contactfpga_sim.lab.speed.driver import SKIN
 
-PACE = Pace(1_000, 1)
-SECONDS = 3.0
+PACE = Pace(1_000, 1, 3.0)
 LOOP_S = 0.01
 """How often each link is looked at."""
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -37,18 +36,18 @@ class Share(NamedTuple):
 
 def measured(reader: str, links: int, call: str) -> Share:
     """``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
-    with contextlib.closing(Feeder(links, PACE, SECONDS)) as feeder, contextlib.ExitStack() as opened:
+    with contextlib.closing(Feeder(links, PACE)) as feeder, contextlib.ExitStack() as opened:
         with ThreadPoolExecutor(4) as workers:
             boards = list(workers.map(lambda port: _opened(port, reader), feeder.ports))
         for board in boards:
             opened.callback(board.close)
-        queues = [board.subscribe(int(PACE.per_second * SECONDS)) for board in boards]
+        queues = [board.subscribe(int(PACE.per_second * PACE.seconds)) for board in boards]
         feeder.begin()
         time.sleep(0.2)
         before = [board.stats.frames for board in boards]
         used, others, begun = time.process_time(), _children_s(), time.monotonic()
         ages: list[float] = []
-        while (now := time.monotonic()) < begun + SECONDS - 0.5:
+        while (now := time.monotonic()) < begun + PACE.seconds - 0.5:
             for board, queue in zip(boards, queues):
                 ages.append(_age_s(board, queue, call, feeder))
             time.sleep(max(0.0, now + LOOP_S - time.monotonic()))
@@ -72,7 +71,7 @@ def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str,
     else:
         frames = queue.batch(0.0, 10.0).frames
         time_us, arrived_s = int(frames["time_us"][-1]), float(frames["arrived_s"][-1])
-    place = time_us // STEP_US - feeder.first[0]
+    place = time_us // PACE.step_us - feeder.first[0]
     if not 0 <= place < len(feeder.written_s) or arrived_s is None:
         return 0.0
     return time.monotonic() - feeder.written_s[place]

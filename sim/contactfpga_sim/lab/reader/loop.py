@@ -14,8 +14,7 @@ from contactfpga_sim.lab.reader.latency import OPEN_S, computing
 from contactfpga_sim.lab.speed.driver import SKIN
 from contactfpga_sim.lab.tracking.reflex import example
 
-PACE = Pace(1_000, 1)
-SECONDS = 2.0
+PACE = Pace(1_000, 1, 2.0)
 
 
 class Missed(NamedTuple):
@@ -33,13 +32,13 @@ def measured(reader: str, busy: bool, switch_s: float) -> Missed:
     loop, usual = example(), sys.getswitchinterval()
     begun: list[float] = []
     silent = 0
-    with contextlib.closing(Feeder(1, PACE, SECONDS, touched=False)) as feeder:
+    with contextlib.closing(Feeder(1, PACE, touched=False)) as feeder:
         with contactfpga.open(feeder.ports[0], SKIN, timeout=OPEN_S, reader=reader) as board, computing(busy):
             sys.setswitchinterval(switch_s)
             try:
                 feeder.begin()
                 board.latest(10.0)
-                end = time.monotonic() + SECONDS - 0.5
+                end = time.monotonic() + PACE.seconds - 0.5
 
                 def step() -> None:
                     begun.append(time.monotonic())

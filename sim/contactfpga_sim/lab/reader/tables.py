@@ -11,7 +11,7 @@ from contactfpga_sim.lab.reader import latency, links, loop
 from contactfpga_sim.lab.reader.feeder import PACES, Pace
 from contactfpga_sim.lab.reader.latency import READERS, Found
 
-ROUNDS = 2
+ROUNDS = 1
 LINKS = (16, "latest"), (16, "batch"), (64, "latest")
 
 
