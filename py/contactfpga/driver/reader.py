@@ -76,7 +76,7 @@ class Shared(NamedTuple):
 
     @classmethod
     def of(cls, descriptor: int) -> Shared:
-        """Of the memory behind a descriptor."""
+        """Of the memory that a descriptor leads to."""
         memory = memoryview(mmap.mmap(descriptor, MEMORY_BYTES))
         return cls(Slot(memory[:_STATS_BYTES]), Slot(memory[_STATS_BYTES:_RING_AT]), Ring(memory[_RING_AT:]))
 
@@ -151,7 +151,7 @@ class ReaderLink(Link):
         self._units = self.conversation.units = NotedUnits(self.conversation.stats)
         self._sheet: Sheet | None = None
         self._number = 0
-        self._counted: tuple[object, ...] = ()
+        self._counted: tuple[Any, ...] = ()
         shared.ring.begin()
         self._show_facts()
         self._publish()
@@ -253,7 +253,7 @@ def pickled(facts: Facts) -> bytes:
 _COUNTED = operator.attrgetter(*COUNTED)
 
 
-def counters_in(stats: Stats, net: NetCounters | None) -> tuple[object, ...]:
+def counters_in(stats: Stats, net: NetCounters | None) -> tuple[Any, ...]:
     """Counters but those that each frame changes, as plain values that are no longer changed."""
     return _COUNTED(stats), dict(stats.damaged), None if net is None else tuple(vars(net).values())
 

@@ -30,7 +30,7 @@ def check_of(data: bytes | memoryview) -> int:
 
 
 class Slot:
-    """Bytes behind a sequence lock: :meth:`read` gives the whole of what one :meth:`write` put there.
+    """Bytes with a sequence lock: :meth:`read` gives the whole of what one :meth:`write` put there.
 
     The first word counts: odd while the slot is written. The second one holds the length and the check sum.
     """
