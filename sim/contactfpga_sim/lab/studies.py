@@ -248,19 +248,6 @@ _ALL = (
         },
     ),
     Study(
-        "reader",
-        title="From the last byte to user code, with either reader",
-        page="performance.md",
-        minutes=3,
-        sections={
-            "reader_rest": Section("tables:rest_table"),
-            "reader_busy": Section("tables:busy_table"),
-            "reader_loop": Section("tables:loop_table"),
-            "reader_links": Section("tables:links_table"),
-        },
-        needs=("cc", "c/contactfpga.h"),
-    ),
-    Study(
         "recordings",
         title="Size of recordings, and loss by a killed program",
         page="recordings.md",

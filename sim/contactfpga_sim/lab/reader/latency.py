@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 import contactfpga
-from contactfpga.errors import MissingTool
+from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga_sim.lab.reader.feeder import Feeder, Pace
 from contactfpga_sim.lab.speed.driver import SKIN
 
@@ -57,6 +57,8 @@ def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
     places = numbers - feeder.first[0]
     counted = (places > feeder.end.value * LEFT_OUT) & (places < feeder.end.value)
     places, seconds = places[counted], seconds[counted]
+    if len(seconds) < 2:
+        raise ContactFPGAError("too few calls returned; measure when less runs beside it")
     span = seconds[-1] - seconds[0]
     return Found((seconds - np.array(feeder.written_s)[places]) * 1e6, (len(seconds) - 1) / span)
 
