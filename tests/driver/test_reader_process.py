@@ -22,6 +22,7 @@ from terminals import environment
 import contactfpga
 from contactfpga import Skin
 from contactfpga.driver import remote
+from contactfpga.driver.reader import MEMORY_BYTES
 from contactfpga.driver.ringqueue import RingQueue
 
 pytestmark = pytest.mark.skipif(bool(remote.unavailable()), reason="this system has no reader process")
@@ -196,7 +197,7 @@ def test_descriptors_and_memory_stay_as_they_were(board):
             most = memory_kb()
     assert len(descriptors()) == len(before)
     assert threading.active_count() == threads
-    assert memory_kb() - most < 3 * remote.MEMORY_BYTES / 1024
+    assert memory_kb() - most < 3 * MEMORY_BYTES / 1024
     assert not reader_processes(board.path)
 
 
