@@ -19,6 +19,9 @@ SILENCE_S = 0.005
 """The oldest that the newest frame may be. The board must send every frame (`send = "always"`): one that sends changes
 only is silent while nothing changes."""
 
+LOOK_S = 1e-6
+"""How long a look takes that waits for nothing."""
+
 
 class Stop(NamedTuple):
     """Why the loop ended."""
@@ -37,9 +40,11 @@ def guard(board: contactfpga.Board, step: Callable[[], None]) -> Stop:
     while True:
         step()
         due_s = max(due_s + PERIOD_S, board.clock())  # a step that took too long is not made up for
-        while (left_s := due_s - board.clock()) > 0:
+        left_s = LOOK_S
+        while left_s > 0:
+            left_s = due_s - board.clock()
             try:
-                zones = board.latest(left_s)
+                zones = board.latest(max(left_s, LOOK_S))  # however late it is, what came is looked at
             except contactfpga.ReadTimeout:
                 break
             heard_s = board.clock() if zones.arrived_s is None else zones.arrived_s

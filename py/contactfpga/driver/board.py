@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast, runtime_checkable
 
 from contactfpga.driver.events import SideEvent
 from contactfpga.driver.facts import BoardFacts
@@ -20,8 +20,10 @@ from contactfpga.wire.command import Command
 from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
-from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.driver.remote import RemoteLink
 
 QUEUE = 16_384
 """Frames that wait for :meth:`Board.next` at most."""
@@ -41,8 +43,13 @@ class Board(BoardFacts):
     that was already waiting. In ``async with`` it is an :class:`AsyncBoard`.
     """
 
-    def __init__(self, transport: Transport, skin: Skin | None = None, opened: Callable[[Board], object] | None = None):
-        link = Link(transport, skin)
+    def __init__(
+        self,
+        port: Transport | RemoteLink,
+        skin: Skin | None = None,
+        opened: Callable[[Board], object] | None = None,
+    ):
+        link = cast("RemoteLink", port) if hasattr(port, "wait_for") else Link(port, skin)
         super().__init__(link, Subscription(link, QUEUE), skin)
         if opened is not None:
             opened(self)
@@ -85,8 +92,7 @@ class Board(BoardFacts):
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
         if self.live:
-            if not self._link.transport.threaded:
-                self._link.take_what_came()
+            self._link.take_what_came()
             self._frames.keep_last()
         return self._frames.next(timeout) if max_age_s is None else self._frames.newest(max_age_s, checked(timeout))
 
@@ -205,7 +211,7 @@ class AsyncBoard(BoardFacts):
     commands, which wait.
     """
 
-    def __init__(self, board: Board, link: Link, frames: Subscription, expected: Skin | None):
+    def __init__(self, board: Board, link: Link | RemoteLink, frames: Subscription, expected: Skin | None):
         super().__init__(link, frames, expected)
         self.board = board
         """The board that this one wraps. Its methods block."""
@@ -256,32 +262,33 @@ SLOT_BITS = 5000
 
 
 class _SlotListener:
-    """A listener that waits for all slots of one test."""
+    """Waits for all slots of one test."""
 
-    all_events = True
-
-    def __init__(self, count: int):
+    def __init__(self, link: Link | RemoteLink, count: int, attempt_s: float):
         self.whole: tuple[SelfTestSlot, ...] | None = None
-        self.count = count
-        self.attempt_s = ATTEMPT_S
+        self.attempt_s = attempt_s
+        self._count = count
         self._so_far: list[SelfTestSlot] = []
+        self._queue = link.queue(QUEUE, all_events=True)
 
-    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
+    def look(self) -> bool | None:
+        """Whether all have come."""
+        while (item := self._queue.pop()) is not None:
+            self._take(item)
+        return True if self.whole is not None else None
+
+    def _take(self, item: Zones | SideEvent | ContactFPGAError) -> None:
         if not isinstance(item, SelfTestSlot):
             return
         if item.number == 0 or item.number != len(self._so_far):
             self._so_far = []
         if item.number == len(self._so_far):
             self._so_far.append(item)
-        if len(self._so_far) == self.count:
+        if len(self._so_far) == self._count:
             self.whole = tuple(self._so_far)
 
-    def look(self) -> bool | None:
-        """Whether all have come."""
-        return True if self.whole is not None else None
 
-
-def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
+def _run_self_test(link: Link | RemoteLink, timeout: float) -> tuple[SelfTestSlot, ...]:
     """All slots of a test that begins after this call. Raises :class:`ReadTimeout`, and as a command does."""
     deadline = link.clock() + timeout
     while True:
@@ -292,19 +299,13 @@ def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
         except ReadTimeout as error:
             if link.clock() >= deadline:
                 raise ReadTimeout(f"{error}; the self-test was not heard as a whole") from None
-        finally:
-            with link.changed:
-                link.listeners.discard(slots)
         if slots.whole is not None:
             return slots.whole
 
 
-def _listen_for_slots(link: Link) -> _SlotListener:
-    with link.changed:
-        hello = link.conversation.hello
-        if hello is None:
-            raise ContactFPGAError(f"{link.transport.name}: no hello has come yet")
-        slots = _SlotListener(1 + hello.sheet.rows + hello.sheet.columns)
-        slots.attempt_s = max(ATTEMPT_S, slots.count * SLOT_BITS / hello.baud)
-        link.listeners.add(slots)
-    return slots
+def _listen_for_slots(link: Link | RemoteLink) -> _SlotListener:
+    hello = link.conversation.hello
+    if hello is None:
+        raise ContactFPGAError(f"{link.transport.name}: no hello has come yet")
+    count = 1 + hello.sheet.rows + hello.sheet.columns
+    return _SlotListener(link, count, max(ATTEMPT_S, count * SLOT_BITS / hello.baud))

@@ -14,13 +14,15 @@ from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
-from contactfpga.driver.transport import SimulatedPort, Transport, connect
+from contactfpga.driver.transport import SimulatedPort, connect
 from contactfpga.errors import BoardClosed, PortBusy, PortLost, SkinMismatch
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
+READERS = ("thread", "process")
+"""What may read a port."""
 
 
 def open(
@@ -31,6 +33,7 @@ def open(
     record: str | Path | Tap | None = None,
     timeout: float = 1.0,
     trust: bool = False,
+    reader: str = "thread",
 ) -> Board:
     """Open a board and wait for its hello.
 
@@ -49,13 +52,17 @@ def open(
     second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
     ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
     ``timeout`` in seconds, for the hello. ``trust``: files of Skins may name modules, which are imported and so run
-    (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`.
+    (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`. ``reader``: ``"thread"`` reads the port in a
+    thread of this process, ``"process"`` in a process of its own, so that frames come soon while other Python threads
+    compute (docs/use.md).
 
     Raises :class:`AddressError`, :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`,
     :class:`OnlyNoise`, :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a
     Skin that cannot work, and OSError, such as FileNotFoundError, for its file.
     """
     timeout = checked(timeout)
+    if reader not in READERS:
+        raise ValueError(f"reader is {shown(reader)}; it must be one of {', '.join(READERS)}")
     if skin is not None and not isinstance(skin, Skin):
         skin = Skin.load(skin, trust)
     if baud is None:
@@ -71,19 +78,11 @@ def open(
         port = os.fspath(port)
     with trusted(trust):
         try:
-            transport = _connected(port, skin, baud)
+            board = _opened(port, skin, baud, record, reader)
         except PortBusy:
             if not _given_back():
                 raise
-            transport = _connected(port, skin, baud)
-    try:
-        if record is not None:
-            tap = FileTap(record) if isinstance(record, (str, Path)) else record
-            transport = RecordingTransport(transport, tap)
-        board = Board(transport, skin, record.opened if isinstance(record, Opening) else None)
-    except BaseException:
-        transport.close()
-        raise
+            board = _opened(port, skin, baud, record, reader)
     try:
         board.greet(timeout)
     except BaseException as error:
@@ -95,12 +94,26 @@ def open(
     return board
 
 
-def _connected(port: str | SimulatedPort | None, skin: Skin | None, baud: int) -> Transport:
+def _opened(
+    port: str | SimulatedPort | None, skin: Skin | None, baud: int, record: str | Path | Tap | None, reader: str
+) -> Board:
     if port is None or (isinstance(port, str) and searched(port)):
         from contactfpga.driver import finding  # all boards, which a named port has no use for
 
         port = finding.find(port, skin, baud)
-    return connect(port, baud)
+    if reader == "process":
+        from contactfpga.driver import remote  # processes, which a thread has no use for
+
+        return Board(remote.open_link(port, baud, skin, record), skin)
+    transport = connect(port, baud)
+    try:
+        if record is not None:
+            tap = FileTap(record) if isinstance(record, (str, Path)) else record
+            transport = RecordingTransport(transport, tap)
+        return Board(transport, skin, record.opened if isinstance(record, Opening) else None)
+    except BaseException:
+        transport.close()
+        raise
 
 
 _boards: dict[str | None, Board] = {}

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from contactfpga.driver.events import Silence, checked_deadline
 from contactfpga.driver.link import Link
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription
-from contactfpga.driver.transport import counters_of
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
@@ -17,11 +16,14 @@ from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.units import UnitHistory
 
+if TYPE_CHECKING:
+    from contactfpga.driver.remote import RemoteLink
+
 
 class BoardFacts:
     """An open port, what its board said about itself, and queues of its frames."""
 
-    def __init__(self, link: Link, frames: Subscription, expected: Skin | None):
+    def __init__(self, link: Link | RemoteLink, frames: Subscription, expected: Skin | None):
         self._link, self._frames, self._expected = link, frames, expected
 
     def __repr__(self) -> str:
@@ -120,7 +122,7 @@ class BoardFacts:
         """Counters since the port was opened."""
         stats = self._link.conversation.stats
         stats.dropped = self._frames.dropped
-        stats.net = counters_of(self._link.transport)
+        stats.net = self._link.net
         return stats
 
     def clock(self) -> float:

@@ -102,6 +102,16 @@ def hello(board: Board) -> Iterator[Finding]:
     yield Finding("ok", f"{board.port} says hello: {facts}")
 
 
+def reader(board: Board) -> Iterator[Finding]:
+    """Who reads the port, and who else can."""
+    from contactfpga.driver import remote  # processes, which no other look has a use for
+
+    if why := remote.refusal(board.port):
+        yield Finding("note", f"{board.port} is read by a thread; open(port, reader='process') cannot read it: {why}")
+    else:
+        yield Finding("ok", f"{board.port} is read by a thread; open(port, reader='process') can read it as well")
+
+
 def clock(board_s: float, host_s: float) -> Iterator[Finding]:
     """Whether the board's clock agrees with this computer's, as far as this much time can show."""
     if host_s > 0 and abs(off := board_s / host_s - 1) > CLOCK_ERROR + JITTER_S / host_s:

@@ -7,15 +7,24 @@ import logging
 import math
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.events import SideEvent, Silence
-from contactfpga.driver.stats import NetCounters, refused
+from contactfpga.driver.framequeue import FrameQueue
+from contactfpga.driver.stats import NetCounters, Stats, refused
 from contactfpga.driver.transport import Transport, counters_of
-from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
+from contactfpga.errors import (
+    BoardClosed,
+    BoardSilent,
+    ContactFPGAError,
+    NoSuchCommand,
+    OnlyNoise,
+    PortLost,
+    ReadTimeout,
+)
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.faults import Faults
@@ -42,16 +51,6 @@ Result = Zones | SideEvent | ContactFPGAError | Hello | bool
 """What is waited for."""
 
 
-class Listener(Protocol):
-    """Takes what comes over a port."""
-
-    all_events: bool
-    """Also what is told between frames."""
-
-    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
-        """Add what came; the lock :attr:`Link.changed` is held."""
-
-
 class _Waiter:
     """A call of :meth:`Board.read` that waits for its frame."""
 
@@ -76,7 +75,7 @@ class Link:
         self.conversation = Conversation(transport.name, skin, transport.live, getattr(transport, "rng", None))
         self.changed = threading.Condition()
         """To be held while any state is looked at."""
-        self.listeners: weakref.WeakSet[Listener] = weakref.WeakSet()
+        self._queues: weakref.WeakSet[FrameQueue] = weakref.WeakSet()
         self.last: Zones | Run | None = None
         """What came last."""
         self.last_s = transport.clock()
@@ -98,6 +97,20 @@ class Link:
         """Begin to read, once those listen who want to hear all from the first byte on."""
         if self.transport.threaded:
             threading.Thread(target=self._read_all, name=f"reader of {self.transport.name}", daemon=True).start()
+
+    def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
+        """A queue for what comes from now on, as long as it is kept; with all events first the faults that the board
+        told last."""
+        queue = FrameQueue(maxsize, all_events)
+        with self.changed:
+            self._queues.add(queue)
+            if all_events and self.conversation.lines.told:
+                queue.put(self.conversation.lines.told)
+        return queue
+
+    def leave(self, queue: object) -> None:
+        """Put nothing more into this queue; the lock is held."""
+        self._queues.discard(queue)  # type: ignore[arg-type]
 
     def clock(self) -> float:
         """Seconds on the clock that timeouts run on."""
@@ -137,7 +150,10 @@ class Link:
         try:
             with self.changed:
                 self.check_open()
-                self._check_command(command)
+                name = self.transport.name
+                if not self.transport.live:
+                    raise NoSuchCommand(f"{name} is a recording, which takes no {command}; open the board's port")
+                check_command(name, self.conversation.hello, command)
                 waiter = _Waiter(self.conversation.command(command, self.transport.clock(), deadline))
                 self._waiters.append(waiter)
             try:
@@ -146,24 +162,13 @@ class Link:
             except ReadTimeout:
                 if self._denied() == denied:
                     raise
-                step = "start it with `contactfpga publish --allow-commands` if it shall"
-                raise NoSuchCommand(f"{self.transport.name}: its publisher passes on no commands; {step}") from None
+                raise denied_error(self.transport.name) from None
             finally:
                 with self.changed:
                     self._waiters.remove(waiter)
                     self.conversation.end_command()
         finally:
             self._commanding.release()
-
-    def _check_command(self, command: Command) -> None:
-        name, hello = self.transport.name, self.conversation.hello
-        if not self.transport.live:
-            raise NoSuchCommand(f"{name} is a recording, which takes no {command}; open the board's port")
-        if hello is None or command.what in hello.commands:
-            return
-        known = COMMANDS.get(command.what)
-        step = f"build its Skin with {known[1]}" if known else f"it takes {sorted(hello.commands) or 'none'}"
-        raise NoSuchCommand(f"{name}: this board takes no {command}; {step}")
 
     def silence(self, since: float) -> Silence:
         """How long no frame has come, where someone waits since that moment; the lock is held."""
@@ -231,11 +236,17 @@ class Link:
                     raise self._failure.with_traceback(None)
                 left = deadline - self.transport.clock()
                 if left <= 0:
-                    raise timed_out(self.transport.name, timeout, self.conversation, start, counters_of(self.transport))
+                    raise timed_out(self.transport.name, timeout, self.conversation, start, self.net)
                 if self.transport.threaded or self._reading is not None:
                     self.changed.wait(min(left, 1.0) if self.transport.threaded else READ_S)
                 else:
                     self._read_once(min(left, SIMULATED_READ_S))
+
+    def linger(self, until: float, seconds: float) -> None:
+        """Let all come that comes until then, at most so many seconds. Raises what :meth:`wait_for` does but
+        :class:`ReadTimeout`; whatever is lost, the next call says so."""
+        with contextlib.suppress(ReadTimeout, PortLost):
+            self.wait_for(lambda: None, until, seconds)
 
     def _read_once(self, seconds: float) -> int:
         """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
@@ -256,12 +267,15 @@ class Link:
         return len(data)
 
     def _breaks(self) -> int:
-        counters = counters_of(self.transport)
-        return 0 if counters is None else counters.passed_breaks
+        return 0 if self.net is None else self.net.passed_breaks
+
+    @property
+    def net(self) -> NetCounters | None:
+        """What is counted about the network; None: there is none."""
+        return counters_of(self.transport)
 
     def _denied(self) -> int:
-        counters = counters_of(self.transport)
-        return 0 if counters is None else counters.denied
+        return 0 if self.net is None else self.net.denied
 
     def _take(self, data: bytes) -> None:
         for event in self.conversation.receive_runs(data, self.transport.clock()):
@@ -271,6 +285,9 @@ class Link:
             self._send()
 
     def take_what_came(self) -> None:
+        """Read what is there, where nobody else does."""
+        if self.transport.threaded:
+            return
         with self.changed:
             self.check_open()
             while self._reading is None and self._read_once(0.0):
@@ -284,9 +301,9 @@ class Link:
             self._log_fault(f"fault: {', '.join(event.names)}" if event else "")
         item = event.zones if isinstance(event, Arrival) else event
         between = isinstance(item, SideEvent)
-        for listener in self.listeners:
-            if listener.all_events or not between:
-                listener.put(item)
+        for queue in self._queues:
+            if queue.all_events or not between:
+                queue.put(item)
         if between:
             return
         if isinstance(item, (Zones, Run)):
@@ -355,7 +372,34 @@ class Link:
                 self._send()
 
 
-def timed_out(name: str, timeout: float, said: Conversation, start: int, net: NetCounters | None) -> ReadTimeout:
+def check_command(name: str, hello: Hello | None, command: Command) -> None:
+    """Raises :class:`NoSuchCommand` where a board with this hello does not take the command."""
+    if hello is None or command.what in hello.commands:
+        return
+    known = COMMANDS.get(command.what)
+    step = f"build its Skin with {known[1]}" if known else f"it takes {sorted(hello.commands) or 'none'}"
+    raise NoSuchCommand(f"{name}: this board takes no {command}; {step}")
+
+
+def denied_error(name: str) -> NoSuchCommand:
+    """The error of a command that a publisher did not pass on."""
+    step = "start it with `contactfpga publish --allow-commands` if it shall"
+    return NoSuchCommand(f"{name}: its publisher passes on no commands; {step}")
+
+
+class Said(Protocol):
+    """What of a conversation tells why no frame came."""
+
+    @property
+    def stats(self) -> Stats:
+        """What came."""
+
+    @property
+    def numbers(self) -> Collection[int]:
+        """Of sheets that packets said while no hello had come."""
+
+
+def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounters | None) -> ReadTimeout:
     """The error of a port on which no frame came within ``timeout`` seconds; ``start``: bytes that had come before.
     ``net``: what is counted about the network; None: there is none."""
     stats = said.stats

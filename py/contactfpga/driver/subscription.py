@@ -2,132 +2,21 @@
 
 from __future__ import annotations
 
-import collections
-import contextlib
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
-from typing import Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.link import Link
-from contactfpga.errors import BoardClosed, ContactFPGAError, NoData, PortLost, ReadTimeout, ReplayEnded
+from contactfpga.errors import BoardClosed, ContactFPGAError, NoData, ReadTimeout, ReplayEnded
 from contactfpga.inputs.values import is_finite
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.zones.batch import Batch
-from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
 
-
-class FrameQueue:
-    """At most ``maxsize`` frames, errors and what is told between frames wait; beyond, the oldest are dropped. The
-    board's lock is held."""
-
-    def __init__(self, maxsize: int):
-        self.maxsize = maxsize
-        self.dropped = 0
-        """Frames that were not taken in time."""
-        self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
-        self._taken = 0  # frames of the run in front
-        self._length = 0
-
-    def __len__(self) -> int:
-        return self._length
-
-    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
-        """Add what came."""
-        self._items.append(item)
-        self._length += _count(item)
-        while self._length > self.maxsize:
-            self.dropped += self._drop(self._length - self.maxsize)
-
-    def put_back(self, zones: Zones) -> None:
-        """Have this frame come next."""
-        self._unwrap()
-        self._items.appendleft(zones)
-        self._length += 1
-
-    def pop(self) -> Zones | SideEvent | ContactFPGAError | None:
-        """What comes next; None where nothing waits."""
-        if not self._items:
-            return None
-        self._length -= 1
-        item = self._items[0]
-        if not isinstance(item, Run):
-            self._items.popleft()
-            return item
-        zones = item[self._taken]
-        self._taken += 1
-        if self._taken == len(item):
-            self._items.popleft()
-            self._taken = 0
-        return zones
-
-    def pop_frames(self) -> list[Zones | Run]:
-        """All frames that wait, up to the first error."""
-        self._unwrap()
-        found: list[Zones | Run] = []
-        while self._items and isinstance(item := self._items[0], (Zones, Run)):
-            found.append(item)
-            self._items.popleft()
-            self._length -= _count(item)
-        return found
-
-    def first_error(self) -> ContactFPGAError | None:
-        """The error that comes next, if one does; it stays."""
-        return self._items[0] if self._items and isinstance(self._items[0], ContactFPGAError) else None
-
-    def skip_to(self, zones: Zones) -> None:
-        """Drop this frame, which is in no run, and all that came before it."""
-        if not any(item is zones for item in self._items):
-            return
-        while self._items[0] is not zones:
-            self._drop(self._length)
-        self._drop(1)
-
-    def keep_last(self) -> None:
-        """Drop all but what came last, or up to the first error, which is raised."""
-        while self._length > 1:
-            error = self.first_error()
-            self._drop(self._length - 1)
-            if error is not None:
-                raise error
-        self._unwrap()  # so that the others do not become Python's numbers with it
-
-    def drop_older(self, moment: float) -> None:
-        """Drop a frame that waits alone and came before that moment."""
-        item = self._items[0] if self._length == 1 else None
-        if isinstance(item, Zones) and item.arrived_s is not None and item.arrived_s < moment:
-            self.clear()
-
-    def clear(self) -> None:
-        """Drop everything."""
-        self._items.clear()
-        self._taken = self._length = 0
-
-    def _drop(self, most: int) -> int:
-        """Drop what comes first, and of a run at most ``most`` frames; returns how many frames were dropped."""
-        item = self._items[0]
-        count = min(most, _count(item) - self._taken)
-        self._length -= count
-        self._taken += count
-        if self._taken == _count(item):
-            self._items.popleft()
-            self._taken = 0
-        return count if isinstance(item, (Zones, Run)) else 0
-
-    def _unwrap(self) -> None:
-        """Take the frames out of the run in front that were taken from it."""
-        if self._taken:
-            run = self._items[0]
-            assert isinstance(run, Run)
-            self._items[0] = run.after(self._taken)
-            self._taken = 0
-
-
-def _count(item: Zones | Run | SideEvent | ContactFPGAError) -> int:
-    return len(item) if isinstance(item, Run) else 1
-
+if TYPE_CHECKING:
+    from contactfpga.driver.remote import RemoteLink
 
 Item = TypeVar("Item")
 
@@ -140,17 +29,15 @@ class Listening(Generic[Item]):
 
     all_events = False
 
-    def __init__(self, link: Link, maxsize: int, board: object = None, deadline_s: float | None = None):
+    def __init__(self, link: Link | RemoteLink, maxsize: int, board: object = None, deadline_s: float | None = None):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
             raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
-        self._frames = FrameQueue(maxsize)
         self._link = link
         self._board = board  # stays open as long as someone may take frames here
         self._closed = False
         self._deadline_s = deadline_s if link.transport.live else None
         self._since = self._noticed = link.transport.clock()
-        with link.changed:
-            link.listeners.add(self)
+        self._frames = link.queue(maxsize, self.all_events)
 
     @property
     def maxsize(self) -> int:
@@ -183,7 +70,7 @@ class Listening(Generic[Item]):
         """Take no more."""
         with self._link.changed:
             self._closed = True
-            self._link.listeners.discard(self)
+            self._link.leave(self._frames)
             self._frames.clear()
             self._link.changed.notify_all()
 
@@ -258,12 +145,6 @@ class Listening(Generic[Item]):
             raise BoardClosed(f"{self._link.transport.name}: this subscription was closed; subscribe again")
         return self._frames.pop()
 
-    # ---- for the board
-
-    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
-        """Add what came; the board's lock is held."""
-        self._frames.put(item)
-
 
 class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
     """Everything that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one.
@@ -280,12 +161,6 @@ class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
     """
 
     all_events = True
-
-    def __init__(self, link: Link, maxsize: int, board: object = None, deadline_s: float | None = None):
-        super().__init__(link, maxsize, board, deadline_s)
-        with link.changed:
-            if link.conversation.lines.told:
-                self.put(link.conversation.lines.told)
 
     def _silent(self, silence: Silence) -> Silence:
         return silence
@@ -308,8 +183,7 @@ class Subscription(Listening[Zones]):
         link, until = self._link, self._link.clock() + max_s
         self._wait(timeout)
         if link.transport.live:  # of a recording, what was read at once
-            with contextlib.suppress(ReadTimeout, PortLost):  # whatever is lost, the next call says so
-                link.wait_for(lambda: None, until, max_s)
+            link.linger(until, max_s)
         with link.changed:
             frames = self._frames.pop_frames()
         return Batch.of(frames or [self.next(timeout)])

@@ -91,9 +91,9 @@ class SerialTransport:
             self._port.open()
         except self._errors as error:
             if "locked" in str(error):
-                raise PortBusy(f"{name} is in use: {_user(name)}") from None
+                raise PortBusy(f"{name} is in use: {user_of(name)}") from None
             raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; {_next_step(error, name)}") from None
-        _SERIAL.add(self)
+        OPEN_PORTS.add(self)
         forks.watch(self)
 
     def read(self, timeout_s: float) -> bytes:
@@ -113,7 +113,7 @@ class SerialTransport:
         return time.monotonic()
 
     def close(self) -> None:
-        _SERIAL.discard(self)
+        OPEN_PORTS.discard(self)
         with contextlib.suppress(*self._errors):  # gone already, which is what closing wants
             self._port.close()
 
@@ -132,14 +132,20 @@ def _quieten(library: str) -> None:
         logger.setLevel(logging.WARNING)
 
 
-_SERIAL: weakref.WeakSet[SerialTransport] = weakref.WeakSet()
-"""What is open in this process."""
+class Named(Protocol):
+    """What has a name."""
+
+    name: str
 
 
-def _user(name: str) -> str:
+OPEN_PORTS: weakref.WeakSet[Named] = weakref.WeakSet()
+"""Serial ports that are open in this process, or for it."""
+
+
+def user_of(name: str) -> str:
     """Who has a serial port open, and what to do about it."""
     place = os.path.realpath(name)
-    if all(os.path.realpath(one.name) != place for one in _SERIAL):
+    if all(os.path.realpath(one.name) != place for one in OPEN_PORTS):
         return "another program reads this port; close it first"
     return "this program opened it already; go on with that board, or close it first, as `with` does"
 

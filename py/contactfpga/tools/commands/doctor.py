@@ -157,6 +157,7 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             report.stats = board.stats
             report.add(health.hello(board))
+            report.add(health.reader(board))
             report.add(health.count(board, args.seconds or COUNTED_S, args.timeout))
             report.lines = None if board.faults is None else list(board.faults.names)
     except (ContactFPGAError, ValueError) as error:

@@ -40,7 +40,7 @@ PACED, PACE_S = 18, 250e-6
 ROUNDS = 20
 
 
-def frame(number: int, low: int, fingers: int = 1) -> bytes:
+def frame(number: int, low: int, fingers: int = 1, step_us: int = STEP_US) -> bytes:
     """Fingertips of 3x3 cells, 4 rows apart, that move along their rows."""
     known = facts(SKIN)
     x, y = 1 + number // 40 % (SKIN.columns - 2), SKIN.rows // 2
@@ -52,7 +52,7 @@ def frame(number: int, low: int, fingers: int = 1) -> bytes:
         records += join(sums)[0].to_bytes(known.item_bytes, "little")
     trailer, width = join(
         (
-            (number * STEP_US % 2**24, 24),
+            (number * step_us % 2**24, 24),
             (number % 256, 8),
             (low, 3),
             (9 * fingers, known.area_bits),

@@ -1,0 +1,134 @@
+"""Boards on pseudo-terminals, in a process of their own: each frame's moment is noted before it is written."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import select
+import time
+import tty
+from typing import Any, NamedTuple
+
+from contactfpga_sim.lab.speed.driver import SKIN, frame, greeting
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import heard
+
+ALIVE_S = 0.25
+"""How often a board that was not told to go sends a frame."""
+
+
+class Pace(NamedTuple):
+    """How frames are written."""
+
+    per_second: int
+    at_once: int
+    """In one write, as a port of USB hands them over."""
+    seconds: float
+    """Of a stream."""
+
+    @property
+    def step_us(self) -> int:
+        """From frame to frame, on the board's clock."""
+        return round(1e6 / self.per_second)
+
+    @property
+    def pause_s(self) -> float:
+        return self.at_once / self.per_second
+
+
+PACES = Pace(1_000, 1, 1.5), Pace(10_000, 1, 1.0), Pace(72_000, 18, 0.5)
+"""The reference sheet with a slow and a fast scan, and what 12 Mbaud carry."""
+
+
+class Feeder:
+    """Boards that answer requests until they are told to go, and then write frames for
+    as long as their pace says."""
+
+    def __init__(self, boards: int, pace: Pace, touched: bool = True):
+        count = int(pace.per_second * pace.seconds)
+        self._pace, self._touched = pace, touched
+        context: Any = multiprocessing.get_context("fork")
+        pairs = [os.openpty() for _ in range(boards)]
+        for _, slave in pairs:
+            tty.setraw(slave)
+        self._masters = [master for master, _ in pairs]
+        self._slaves = [slave for _, slave in pairs]
+        self.ports = [os.ttyname(slave) for slave in self._slaves]
+        self.go = context.Event()
+        self.first = context.RawArray("q", boards)
+        """Number of the first frame of each board after it was told to go."""
+        self.written_s = context.RawArray("d", count)
+        """When each frame was about to be written, to the first board, on ``time.monotonic``."""
+        self.end = context.RawValue("q", -1)
+        """Frames of each board that were written; -1: not all of them are."""
+        self.greeted = context.RawValue("q", 0)
+        """Requests that were answered."""
+        self.process = context.Process(target=self._run, daemon=True)
+        self.process.start()
+
+    def _run(self) -> None:
+        asked = [b""] * len(self._masters)
+        taken, lows, sent = [0] * len(asked), [0] * len(asked), [0] * len(asked)
+        alive_s = time.monotonic()
+        while not self.go.is_set():
+            for master in select.select(self._masters, [], [], 0.01)[0]:
+                board = self._masters.index(master)
+                asked[board] += os.read(master, 4096)
+                for one in heard([(0, asked[board])], facts(SKIN).bit_clocks).requests[taken[board] :]:
+                    taken[board] += 1
+                    lows[board] = one.number % 8
+                    said = greeting(one.number) if one.hello and not sent[board] else b""
+                    os.write(master, said + self._frame(sent[board], lows[board]))
+                    sent[board] += 1
+                    self.greeted.value += 1
+            if time.monotonic() > alive_s + ALIVE_S:
+                alive_s = time.monotonic()
+                for board, master in enumerate(self._masters):
+                    if taken[board]:
+                        os.write(master, self._frame(sent[board], lows[board]))
+                        sent[board] += 1
+        self.first[:] = sent
+        self._stream(lows, sent)
+        time.sleep(60.0)  # a port that is closed would take what was not read with it
+
+    def _stream(self, lows: list[int], sent: list[int]) -> None:
+        size, pause_s = self._pace.at_once, self._pace.pause_s
+        count = len(self.written_s) + max(sent)
+        made = {low: [self._frame(number, low) for number in range(count)] for low in set(lows)}
+        begun_s = due_s = time.monotonic()
+        end = 0
+        while end + size <= len(self.written_s) and time.monotonic() < begun_s + self._pace.seconds:
+            chosen = range(end, end + size)
+            for board, master in enumerate(self._masters):
+                data = b"".join([made[lows[board]][sent[board] + number] for number in chosen])
+                if not board:
+                    now_s = time.monotonic()
+                    for number in chosen:
+                        self.written_s[number] = now_s
+                while data:
+                    data = data[os.write(master, data) :]
+            end += size
+            due_s += pause_s
+            left_s = due_s - time.monotonic()
+            if left_s > 0:
+                time.sleep(left_s)
+            else:
+                due_s = time.monotonic()  # what came too late is not made up for
+        self.end.value = end
+
+    def _frame(self, number: int, low: int) -> bytes:
+        return frame(number, low, int(self._touched), self._pace.step_us)
+
+    def begin(self) -> None:
+        """Have them write, once each has been asked."""
+        while self.greeted.value < len(self.ports):
+            time.sleep(0.01)
+        time.sleep(0.1)
+        self.go.set()
+
+    def close(self) -> None:
+        """End the boards."""
+        self.process.kill()
+        self.process.join()
+        for descriptor in self._masters + self._slaves:
+            os.close(descriptor)

@@ -1,0 +1,55 @@
+"""The control loop of ``examples/reflex.py`` beside a Python thread that computes: deadlines missed, and frames that
+were taken for silence."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from typing import NamedTuple
+
+import contactfpga
+from contactfpga_sim.lab.reader.feeder import Feeder, Pace
+from contactfpga_sim.lab.reader.latency import OPEN_S, computing
+from contactfpga_sim.lab.speed.driver import SKIN
+from contactfpga_sim.lab.tracking.reflex import example
+
+PACE = Pace(1_000, 1, 2.0)
+
+
+class Missed(NamedTuple):
+    """What came of the loop's deadlines."""
+
+    deadlines: int
+    missed: int
+    """Those in whose period no step began."""
+    silent: int
+    """How often it stopped because it had no frame that was new enough, though the board sent one every ms."""
+
+
+def measured(reader: str, busy: bool, switch_s: float) -> Missed:
+    """``switch_s``: Python's switch interval."""
+    loop, usual = example(), sys.getswitchinterval()
+    begun: list[float] = []
+    silent = 0
+    with contextlib.closing(Feeder(1, PACE, touched=False)) as feeder:
+        with contactfpga.open(feeder.ports[0], SKIN, timeout=OPEN_S, reader=reader) as board, computing(busy):
+            sys.setswitchinterval(switch_s)
+            try:
+                feeder.begin()
+                board.latest(10.0)
+                end = time.monotonic() + PACE.seconds - 0.5
+
+                def step() -> None:
+                    begun.append(time.monotonic())
+                    if begun[-1] > end:
+                        raise StopIteration
+
+                with contextlib.suppress(StopIteration):
+                    while True:
+                        silent += loop.guard(board, step).reason == "silence"
+            finally:
+                sys.setswitchinterval(usual)
+    periods = {int((moment - begun[0]) / loop.PERIOD_S) for moment in begun}
+    deadlines = int((begun[-1] - begun[0]) / loop.PERIOD_S) + 1
+    return Missed(deadlines, deadlines - len(periods), silent)

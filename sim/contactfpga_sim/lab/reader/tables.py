@@ -1,0 +1,110 @@
+"""How soon frames reach user code with either reader: `python -m contactfpga_sim.lab.reader.tables`, in the folder of
+the sources.
+
+Methods take turns, so that what else the machine does is spread over all of them. Times are this machine's, and no
+figure that a test could hold; on one that is busy compare within a row.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.reader import latency, links, loop
+from contactfpga_sim.lab.reader.feeder import PACES, Pace
+from contactfpga_sim.lab.reader.latency import READERS, Found
+
+ROUNDS = 1
+LINKS = (16, "latest"), (16, "batch"), (64, "latest")
+
+
+def times(streams: list[Found]) -> tuple[float, float]:
+    """Median and 99 % in ms, over all rounds."""
+    us = np.concatenate([one.us for one in streams])
+    return float(np.percentile(us, 50)) / 1e3, float(np.percentile(us, 99)) / 1e3
+
+
+def shown(streams: list[Found]) -> str:
+    """Both for a table."""
+    return " / ".join(f"{value:.3g}" for value in times(streams)) + " ms"
+
+
+def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
+    """From the last byte to user code while nothing else computes in the process."""
+    rows = [
+        [
+            "frames per second",
+            "C program",
+            *(f'`reader="{reader}"`' for reader in READERS),
+            "their medians, as multiples of C",
+        ]
+    ]
+    with latency.bare_program() as program:
+        for pace in paces:
+            found: dict[str, list[Found]] = {"c": [], **{reader: [] for reader in READERS}}
+            for _ in range(rounds):
+                found["c"].append(latency.bare(program, pace))
+                for reader in READERS:
+                    found[reader].append(latency.driver(reader, pace, busy=False))
+            ratios = [times(found[reader])[0] / times(found["c"])[0] for reader in READERS]
+            rows.append(
+                [f"{pace.per_second:,}", *map(shown, found.values()), ", ".join(f"{one:.1f}" for one in ratios)]
+            )
+    return f"{writer.table_of(rows)}\n\n{conditions()}"
+
+
+def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
+    """The same beside a thread that computes."""
+    rows = [["frames per second", "call", *(f'`reader="{reader}"`' for reader in READERS), "calls per second"]]
+    for pace in paces:
+        for call in ("latest", "next") if pace is paces[0] else ("latest",):
+            found: dict[str, list[Found]] = {reader: [] for reader in READERS}
+            for _ in range(rounds):
+                for reader in READERS:
+                    found[reader].append(latency.driver(reader, pace, busy=True, call=call))
+            calls = [f"{np.mean([one.calls for one in some]):.0f}" for some in found.values()]
+            rows.append([f"{pace.per_second:,}", f"`{call}()`", *map(shown, found.values()), ", ".join(calls)])
+    return writer.table_of(rows)
+
+
+def loop_table() -> str:
+    """Deadlines of a loop of 1 kHz."""
+    rows = [["beside it", "switch interval", "reader", "deadlines missed", "stops on silence that was none"]]
+    for busy, switch_s in ((False, 0.005), (True, 0.005), (True, 0.0005)):
+        for reader in READERS:
+            found = loop.measured(reader, busy, switch_s)
+            beside = "a thread that computes" if busy else "nothing"
+            missed = f"{found.missed:,} of {found.deadlines:,}"
+            rows.append([beside, f"{switch_s * 1e3:g} ms", f"`{reader}`", missed, str(found.silent)])
+    return writer.table_of(rows)
+
+
+def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
+    """Many links in one process."""
+    rows = [["links of 1 kHz", "each 10 ms", "reader", "the process", "its readers", "frames that came in time", "age"]]
+    for count, call in asked:
+        for reader in READERS:
+            found = links.measured(reader, count, call)
+            shares = [f"{100 * share:.0f} %" for share in (found.used, found.readers, found.came)]
+            rows.append([str(count), f"`{call}()`", f"`{reader}`", *shares, f"{found.age_ms:.1f} ms"])
+    return writer.table_of(rows)
+
+
+def conditions() -> str:
+    """What else the machine did."""
+    load = os.getloadavg()[0]
+    return f"Measured with {os.cpu_count()} cores and a load of {load:.1f} at the end of this table."
+
+
+def main() -> int:
+    """Print the tables, each as soon as it is made."""
+    for table in (rest_table, busy_table, loop_table, links_table):
+        print(f"{table()}\n", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    interrupt.leave(interrupt.guarded(main))

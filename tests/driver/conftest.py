@@ -1,0 +1,23 @@
+"""Tests of a board on a pseudo-terminal run with either reader; see :func:`contactfpga.open`."""
+
+import pytest
+
+from contactfpga.driver import driver, remote
+
+WITH_EITHER = ("test_driver", "test_driver_frames", "test_silence", "test_recording")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if metafunc.module.__name__.rpartition(".")[2] in WITH_EITHER and "board" in metafunc.fixturenames:
+        metafunc.fixturenames.append("default_reader")
+        readers = ["thread"]
+        if not remote.unavailable():
+            readers.append(pytest.param("process", marks=pytest.mark.slow))
+        metafunc.parametrize("default_reader", readers, indirect=True)
+
+
+@pytest.fixture
+def default_reader(request, monkeypatch):
+    """Who reads where a test does not say it."""
+    monkeypatch.setitem(driver.open.__kwdefaults__, "reader", request.param)
+    return request.param
