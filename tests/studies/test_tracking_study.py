@@ -9,9 +9,8 @@ import pytest
 from sample import sample
 from study_pages import outdated
 
-from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance.scans import RECORDINGS
-from contactfpga_sim.lab.tracking import breaks, scenes, scores, tables
+from contactfpga_sim.lab.tracking import scenes, scores, tables
 from contactfpga_sim.lab.tracking.scores import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -132,43 +131,6 @@ def test_a_row_of_the_scores_is_up_to_date():
 def test_all_scores_are_up_to_date():
     pytest.importorskip("norfair")
     assert not outdated("tracking", "scores")
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", breaks.KNOBS)
-def test_the_breaks_are_up_to_date(name):
-    lines = PAGE.read_text(encoding="utf-8").splitlines()
-    for row in tables.break_rows(breaks.KNOBS[name]):
-        assert writer.line(row) in lines
-
-
-@pytest.mark.slow  # 40 s
-@pytest.mark.parametrize("seed", [1, 2])
-def test_breaks_have_their_closed_forms_on_other_seeds(seed):
-    """Gate 20 mm; a speed is believed for 50 ms; a frame shows a place to half a pitch, and a bounce to a frame."""
-    for method in breaks.METHODS:
-        rates = breaks.AT_ONCE.sweep(method, seed, 30)
-        assert rates[-1].value == pytest.approx(20.0, abs=PITCH_MM / 2)
-    for name, mm in (("`Tracker`", 20 + 500 * 0.05), ("nearest zone", 20)):
-        ms = mm / 500 * 1000
-        assert breaks.LOST.rate(name, ms - 2 * PITCH_MM, seed, 20).right >= 19
-        assert breaks.LOST.rate(name, ms + 2 * PITCH_MM, seed, 20).right < 10
-    for method, hold in (("`Tracker`, `hold_ms = 5`", 5.0), ("`Tracker`, `hold_ms = 20`", 20.0), ("nearest zone", 0.5)):
-        assert breaks.BOUNCE.sweep(method, seed, 10)[-1].value == hold
-
-
-def test_a_rate_has_wilsons_interval_and_a_sweep_ends_where_too_few_are_right():
-    knob = breaks.BOUNCE
-    rates = knob.sweep("nearest zone", placements=5)
-    assert [(rate.value, rate.right, rate.holds) for rate in rates] == [(0.0, 5, True), (0.5, 0, False)]
-    assert str(breaks.Rate(1.0, 95, 100)) == "95 % (88.8 to 97.8)"
-
-
-def test_placements_are_others_for_each_number_and_seed():
-    found = [breaks._made(breaks.CROSS.scene, 1, seed, number, 8.0) for seed in (0, 1) for number in (0, 1)]
-    places = {tuple(tuple(zone.records.tolist()[0]) for zone in made[:40]) for made in found}
-    assert len(places) > 1
-    assert len({made[0].time_us for made in found}) == 4
 
 
 def test_ten_thousand_frames_per_second_with_two_contacts():
