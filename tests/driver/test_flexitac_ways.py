@@ -1,5 +1,5 @@
-"""A FlexiTac sheet whose line loses and changes bytes, by the ways a user takes: commands, recordings, the network, ROS 2
-and the view."""
+"""A FlexiTac sheet whose line loses and changes bytes, by the ways a user takes: commands, recordings, the network,
+ROS 2 and the view."""
 
 import collections
 import json

@@ -26,7 +26,7 @@ WIDE = SKIN.replace(columns=60, settle_us=20.0)
 Y_MM = 73.0
 HZ = 1000.0
 
-MOST = 480
+MOST = rated.LOOKS[-1]
 """Placements of a value at most: one that is not decided by then counts as broken."""
 
 Ids = list[list[int]]
@@ -107,9 +107,7 @@ def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
         return {method: [(value, rate.right, rate.of) for value, rate in rates] for method, rates in found.items()}
 
     plain = kept.kept("breaks", key, new)
-    return {
-        method: [(value, rated.Rate(right, of)) for value, right, of in rates] for method, rates in plain.items()
-    }
+    return {method: [(value, rated.Rate(right, of)) for value, right, of in rates] for method, rates in plain.items()}
 
 
 def sweeps() -> dict[str, dict[str, Rates]]:
@@ -181,7 +179,7 @@ SPEEDING, AT_ONCE = (
         name=name,
         title=f"A finger that slides, {how}",
         axis="mm per frame",
-        values=tuple(float(step) for step in range(4, 68, 4)),
+        values=tuple(float(step) for step in range(12, 68, 4)),
         scene=functools.partial(_slide, from_rest=from_rest),
         right=_one_id,
         methods=METHODS,
@@ -217,7 +215,7 @@ MEET = Knob(
     name="meet",
     title="Two fingers of 16 mm that meet and part, at 250 frames per second",
     axis="distance of their middles, mm",
-    values=tuple(float(value) for value in range(32, 6, -2)),
+    values=tuple(float(value) for value in range(28, 6, -2)),
     scene=_pair,
     right=lambda ids, _: ids[0] == ids[-1],
     methods=METHODS,
@@ -236,7 +234,7 @@ CROSS = Knob(
     name="cross",
     title="Two fingers of 16 mm that pass each other at 1 m/s each",
     axis="distance of their lanes, mm",
-    values=tuple(float(value) for value in range(32, -2, -2)),
+    values=tuple(float(value) for value in range(28, -2, -2)),
     scene=_lanes,
     right=lambda ids, _: ids[0] == ids[-1][::-1],
     methods=METHODS,
@@ -286,9 +284,9 @@ BOUNCE = Knob(
 
 
 def _stuck(count: float, rng: Random) -> Made:
-    """A finger slides along a row with stuck switches 40 mm apart, at 300 mm/s, and off it."""
+    """A finger slides along a row with stuck switches 40 mm apart, at 300 mm/s, and 20 mm past the fourth."""
     spots = [(7, 10 + 4 * number) for number in range(int(count))]
-    return _frames([_finger([0.0, 1.4], [40.0, 460.0], _moved(rng))], _times(1.39, rng, 250.0), spots)
+    return _frames([_finger([0.0, 0.7], [40.0, 250.0], _moved(rng))], _times(0.696, rng, 250.0), spots)
 
 
 def _slides_over(ids: Ids, count: float) -> bool:
@@ -299,7 +297,7 @@ STUCK = Knob(
     name="stuck",
     title="A finger that slides over stuck switches, at 250 frames per second",
     axis="how many are stuck",
-    values=tuple(float(value) for value in range(10)),
+    values=tuple(float(value) for value in range(5)),
     scene=_stuck,
     right=_slides_over,
     methods=METHODS,
@@ -321,7 +319,7 @@ LOST = Knob(
     name="lost",
     title="A finger that slides at 500 mm/s while frames are lost, at 500 frames per second",
     axis="ms from a frame to the next",
-    values=tuple(float(value) for value in range(2, 142, 4)),
+    values=tuple(float(value) for value in range(22, 122, 4)),
     scene=_gap,
     right=_one_id,
     methods=METHODS,
