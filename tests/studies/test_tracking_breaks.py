@@ -8,7 +8,8 @@ from study_pages import DOCS, section
 
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import rated
-from contactfpga_sim.lab.tracking import breaks, tables
+from contactfpga_sim.lab.tracking import breaks, scenes, tables
+from contactfpga_sim.model.scenes.contacts import Contact, disc
 
 QUICK = ["slide at once", "bounce"]
 ALL = [pytest.param(name, marks=[] if name in QUICK else pytest.mark.campaign) for name in breaks.KNOBS]
@@ -62,6 +63,13 @@ def test_placements_are_others_for_each_number_and_seed():
     made = [breaks.CROSS.scene(8.0, np.random.default_rng([1, seed, number])) for seed in (0, 1) for number in (0, 1)]
     assert len({one[0].time_us for one in made}) == 4
     assert len({tuple(tuple(zone.records.tolist()[0]) for zone in one[:40]) for one in made}) > 1
+
+
+def test_fingers_of_the_breaks_close_the_switches_that_the_scenes_fingers_do(rng):
+    for _ in range(50):
+        x, y = rng.uniform(20, 500), rng.uniform(20, 140)
+        finger = scenes.Finger(Contact(shape=disc(scenes.FINGER_MM), x_mm=x, y_mm=y))
+        assert (breaks.under(np.array([x]), y)[0] == finger.cells(0.0, breaks.WIDE)).all()
 
 
 PITCH_MM, RADIUS_MM, GATE_MM = 10.0, 8.0, 20.0
@@ -201,6 +209,6 @@ def test_rates_are_those_of_the_geometry(name, method, value):
 def test_the_page_states_the_constants_of_the_study():
     page = (DOCS / "tracking.md").read_text(encoding="utf-8")
     words = " ".join(page[page.index("## Where it breaks") : page.index("figures: breaks ")].split())
-    assert breaks.MOST == rated.LOOKS[-1]
+    assert rated.LOOKS[-1] == breaks.MOST
     for stated in (f"{100 * rated.LEVEL:.0f} of 100", "{}, {}, {} and {:,}".format(*rated.LOOKS), f"z = {rated.Z}"):
         assert stated in words

@@ -1,13 +1,14 @@
 """How the tracker is judged: the truth of its scenes, the scores beside the baseline, and where it breaks."""
 
 import importlib.util
+import itertools
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from sample import sample
-from study_pages import outdated
+from study_pages import outdated, section
 
 from contactfpga_sim.lab.performance.scans import RECORDINGS
 from contactfpga_sim.lab.tracking import scenes, scores, tables
@@ -16,6 +17,7 @@ from contactfpga_sim.lab.tracking.scores import Nearest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/tracking.md"
 PITCH_MM = 10.0
+PAGE_RATES = ("100", "1,000", "10,000")
 NAMES = [name for name in scores.TRACKERS if name != "Norfair" or importlib.util.find_spec("norfair")]
 """Norfair is compared where it is installed."""
 
@@ -93,6 +95,22 @@ def test_the_tracker_is_behind_no_other_beyond_the_interval(family):
         assert gained + half >= -1e-9, other
 
 
+def test_on_the_page_it_is_behind_no_other_at_any_rate():
+    rows = [line[2:-2].split(" | ") for line in section("tracking.md", "ahead").splitlines()[2:]]
+    assert {(row[0].strip("`"), row[1]) for row in rows} == set(itertools.product(scenes.FAMILIES, PAGE_RATES))
+    for row in rows:
+        for gained, half in (map(float, cell.split(" ± ")) for cell in row[2:]):
+            assert gained + half >= 0, row
+
+
+def test_on_the_page_it_is_ahead_in_the_mean_at_each_rate():
+    lines = section("tracking.md", "scores").splitlines()
+    means = [line[2:-2].split(" | ") for line in lines if line.startswith("| mean of all | ")]
+    assert [row[1] for row in means] == ["25", *PAGE_RATES]
+    for ours, *others in ([float(cell.strip("*")) for cell in row[2:6]] for row in means):
+        assert ours > max(others)
+
+
 @pytest.mark.slow  # 60 s
 def test_the_tracker_is_ahead_in_the_mean():
     pytest.importorskip("motmetrics")
@@ -112,9 +130,32 @@ def test_constant_velocity_goes_on_where_its_speed_puts_it():
         assert found == ids
 
 
-def test_an_interval_is_students():
-    values = np.array([0.9, 0.7, 0.8, np.nan])
-    assert scores.half(values) == pytest.approx(4.303 * 0.1 / math.sqrt(3), rel=1e-3)
+def scored(each, counted):
+    """Scenes with these scores, that count for so much."""
+    known = [(one, count) for one, count in zip(each, counted) if count]
+    mean = sum(one * count for one, count in known) / sum(counted)
+    return scores.Score(100, 0.0, mean, 0, each, counted)
+
+
+def test_the_interval_of_scenes_that_count_alike_is_students():
+    found = scored((0.9, 0.7, 0.8, math.nan), (10.0, 10.0, 10.0, 0.0))
+    assert found.half == pytest.approx(4.303 * 0.1 / math.sqrt(3), rel=1e-3)
+
+
+def test_the_interval_of_scenes_that_count_otherwise_covers_as_often_as_it_says(rng):
+    """Scores of 0 or 1, of scenes of any length."""
+    covered = 0
+    for _ in range(1000):
+        counted = tuple(rng.uniform(50, 150) for _ in range(40))
+        found = scored(tuple(float(rng.random() < 0.7) for _ in counted), counted)
+        covered += abs(found.idf1 - 0.7) <= found.half
+    assert 0.92 < covered / 1000 < 0.975
+
+
+def test_who_is_ahead_in_every_scene_by_the_same_is_ahead_for_sure():
+    each, counted = np.array([0.2, 0.5, 0.9]), (10.0, 20.0, 30.0)
+    gained, half = scores.ahead(scored(tuple(each + 0.1), counted), scored(tuple(each), counted))
+    assert (gained, half) == (pytest.approx(0.1), pytest.approx(0.0, abs=1e-12))
 
 
 @pytest.mark.slow  # 5 s

@@ -16,9 +16,8 @@ from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab import kept, pool
 from contactfpga_sim.lab.failures import rated
-from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Finger, Random, zones_of
+from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_of
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
-from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)
 """For slides that a smaller sheet has no room for."""
@@ -119,27 +118,23 @@ def sweeps() -> dict[str, dict[str, Rates]]:
     return {name: sweep(name) for name in KNOBS}
 
 
-def _finger(times: Sequence[float], xs: Sequence[float], rng_mm: Sequence[float], y_mm: float = Y_MM) -> Finger:
-    x = Track(tuple(times), tuple(each + float(rng_mm[0]) for each in xs))
-    return Finger(
-        Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y_mm + float(rng_mm[1])), begins_s=times[0], ends_s=times[-1]
-    )
-
-
 def _moved(rng: Random) -> tuple[float, float]:
     """How far a scene is moved, in mm."""
     x, y = rng.uniform(0, SKIN.pitch_x_mm), rng.uniform(0, SKIN.pitch_y_mm)
     return float(x), float(y)
 
 
-def _frames(fingers: Sequence[Finger], times: Sequence[float], stuck: Sequence[tuple[int, int]] = ()) -> Made:
-    found = []
-    for now in times:
-        cells = sum((finger.cells(now, WIDE) for finger in fingers), start=fingers[0].cells(-1.0, WIDE))
-        for row, column in stuck:
-            cells[row, column] = True
-        found.append(zones_of(cells, round(now * 1e6), WIDE)[0])
-    return tuple(found)
+def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
+    """(n, rows, columns) bool: the switches that a finger closes at n places, as without a cover: those under it."""
+    columns, rows = WIDE.pitch_x_mm * np.arange(WIDE.columns), WIDE.pitch_y_mm * np.arange(WIDE.rows)
+    across, along = columns - xs_mm[:, None, None], rows[:, None] - y_mm
+    closed: np.ndarray = across**2 + along**2 <= FINGER_MM**2
+    return closed
+
+
+def _frames(times: Sequence[float], cells: np.ndarray) -> Made:
+    """The frames of (n, rows, columns) bool cells."""
+    return tuple(zones_of(one, round(now * 1e6), WIDE)[0] for now, one in zip(times, cells))
 
 
 def _ids(update: Update, frames: Sequence[Zones]) -> Ids:
@@ -170,8 +165,8 @@ def _slide(step_mm: float, rng: Random, from_rest: bool) -> Made:
     for step in steps:
         if xs[-1] + step < 570:
             xs.append(xs[-1] + step)
-    times = [number / 100 for number in range(len(xs))]
-    return _frames([_finger([*times, times[-1] + 1], [*xs, xs[-1]], _moved(rng))], times)
+    x_mm, y_mm = _moved(rng)
+    return _frames([number / 100 for number in range(len(xs))], under(x_mm + np.array(xs), Y_MM + y_mm))
 
 
 SPEEDING, AT_ONCE = (
@@ -204,11 +199,11 @@ SPEEDING, AT_ONCE = (
 def _pair(distance_mm: float, rng: Random) -> Made:
     """They come from 60 mm apart, stay 0.1 s at this distance, and go back, at 400 mm/s toward each other."""
     travel = (60 - distance_mm) / 400
-    times = [0.0, travel, travel + 0.1, 2 * travel + 0.1, 2 * travel + 0.2]
-    left = [103.0 - half / 2 for half in (60, distance_mm, distance_mm, 60, 60)]
-    moved = _moved(rng)
-    fingers = [_finger(times, left, moved), _finger(times, [206.0 - x for x in left], moved)]
-    return _frames(fingers, _times(times[-1] - 0.01, rng, 250.0))
+    x_mm, y_mm = _moved(rng)
+    now = _times(2 * travel + 0.19, rng, 250.0)
+    apart = np.interp(now, np.cumsum([0.0, travel, 0.1, travel]), [60, distance_mm, distance_mm, 60])
+    both = [under(103 + x_mm + way * apart / 2, Y_MM + y_mm) for way in (-1, 1)]
+    return _frames(now, both[0] | both[1])
 
 
 MEET = Knob(
@@ -225,9 +220,11 @@ MEET = Knob(
 
 
 def _lanes(gap_mm: float, rng: Random) -> Made:
-    times, moved = [0.0, 0.12], _moved(rng)
-    lanes = ([40.0, 160.0], Y_MM - gap_mm / 2), ([163.0, 43.0], Y_MM + gap_mm / 2)
-    return _frames([_finger(times, way, moved, y_mm) for way, y_mm in lanes], _times(0.118, rng))
+    x_mm, y_mm = _moved(rng)
+    now = _times(0.118, rng)
+    far = 60 - 1000 * np.array(now)
+    both = [under(100 + x_mm - way * far, Y_MM + y_mm - way * gap_mm / 2) for way in (-1, 1)]
+    return _frames(now, both[0] | both[1])
 
 
 CROSS = Knob(
@@ -245,12 +242,10 @@ CROSS = Knob(
 
 def _open(open_ms: float, rng: Random) -> Made:
     """A finger whose switches open once for this long, at 2,000 frames per second."""
-    finger = _finger([0.0, 0.2], [73.0, 73.0], _moved(rng))
-    still, empty = finger.cells(0.0, WIDE), finger.cells(-1.0, WIDE)
-    return tuple(
-        zones_of(empty if 0.02 <= now < 0.02 + open_ms / 1000 else still, round(now * 1e6), WIDE)[0]
-        for now in _times(0.06, rng, 2000.0)
-    )
+    x_mm, y_mm = _moved(rng)
+    now = np.array(_times(0.06, rng, 2000.0))
+    lifted = (now >= 0.02) & (now < 0.02 + open_ms / 1000)
+    return _frames(now.tolist(), under(np.full(len(now), 73 + x_mm), Y_MM + y_mm) & ~lifted[:, None, None])
 
 
 def _holding(hold_ms: float) -> Update:
@@ -285,8 +280,11 @@ BOUNCE = Knob(
 
 def _stuck(count: float, rng: Random) -> Made:
     """A finger slides along a row with stuck switches 40 mm apart, at 300 mm/s, and 20 mm past the fourth."""
-    spots = [(7, 10 + 4 * number) for number in range(int(count))]
-    return _frames([_finger([0.0, 0.7], [40.0, 250.0], _moved(rng))], _times(0.696, rng, 250.0), spots)
+    x_mm, y_mm = _moved(rng)
+    now = _times(0.696, rng, 250.0)
+    cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)
+    cells[:, 7, [10 + 4 * number for number in range(int(count))]] = True
+    return _frames(now, cells)
 
 
 def _slides_over(ids: Ids, count: float) -> bool:
@@ -308,11 +306,11 @@ STUCK = Knob(
 
 def _gap(ms: float, rng: Random) -> Made:
     """A finger slides for 0.1 s, for this long from a frame to the next, and for 0.1 s more."""
-    finger = _finger([0.0, 1.0], [30.0, 530.0], _moved(rng))
-    times = _times(0.2, rng, 500.0)
-    half = len(times) // 2
-    gap = ms / 1000 - (times[half] - times[half - 1])
-    return _frames([finger], [*times[:half], *(now + gap for now in times[half:])])
+    x_mm, y_mm = _moved(rng)
+    now = np.array(_times(0.2, rng, 500.0))
+    half = len(now) // 2
+    now[half:] += ms / 1000 - (now[half] - now[half - 1])
+    return _frames(now.tolist(), under(30 + x_mm + 500 * now, Y_MM + y_mm))
 
 
 LOST = Knob(
