@@ -25,7 +25,7 @@ WIDE = SKIN.replace(columns=60, settle_us=20.0)
 Y_MM = 73.0
 HZ = 1000.0
 
-MOST = rated.LOOKS[-1]
+MOST = 480
 """Placements of a value at most: one that is not decided by then counts as broken."""
 
 Ids = list[list[int]]
@@ -210,7 +210,7 @@ MEET = Knob(
     name="meet",
     title="Two fingers of 16 mm that meet and part, at 250 frames per second",
     axis="distance of their middles, mm",
-    values=tuple(float(value) for value in range(28, 6, -2)),
+    values=tuple(float(value) for value in range(28, 6, -4)),
     scene=_pair,
     right=lambda ids, _: ids[0] == ids[-1],
     methods=METHODS,
@@ -231,7 +231,7 @@ CROSS = Knob(
     name="cross",
     title="Two fingers of 16 mm that pass each other at 1 m/s each",
     axis="distance of their lanes, mm",
-    values=tuple(float(value) for value in range(28, -2, -2)),
+    values=tuple(float(value) for value in range(28, -2, -4)),
     scene=_lanes,
     right=lambda ids, _: ids[0] == ids[-1][::-1],
     methods=METHODS,
@@ -243,8 +243,8 @@ CROSS = Knob(
 def _open(open_ms: float, rng: Random) -> Made:
     """A finger whose switches open once for this long, at 2,000 frames per second."""
     x_mm, y_mm = _moved(rng)
-    now = np.array(_times(0.06, rng, 2000.0))
-    lifted = (now >= 0.02) & (now < 0.02 + open_ms / 1000)
+    now = np.array(_times(0.04, rng, 2000.0))
+    lifted = (now >= 0.01) & (now < 0.01 + open_ms / 1000)
     return _frames(now.tolist(), under(np.full(len(now), 73 + x_mm), Y_MM + y_mm) & ~lifted[:, None, None])
 
 
@@ -261,7 +261,7 @@ BOUNCE = Knob(
     name="bounce",
     title="A contact that bounces, at 2,000 frames per second",
     axis="time for which it is open, ms",
-    values=(0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 4.5, 5.0, 6.0, 8.0, 10.0, 15.0, 19.0, 19.5, 20.0, 25.0, 30.0),
+    values=(0.0, 0.5, 2.0, 4.0, 4.5, 5.0, 10.0, 19.0, 19.5, 20.0, 25.0),
     scene=_open,
     right=_one_id,
     methods={
@@ -281,7 +281,7 @@ BOUNCE = Knob(
 def _stuck(count: float, rng: Random) -> Made:
     """A finger slides along a row with stuck switches 40 mm apart, at 300 mm/s, and 20 mm past the fourth."""
     x_mm, y_mm = _moved(rng)
-    now = _times(0.696, rng, 250.0)
+    now = _times(0.69, rng, 125.0)
     cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)
     cells[:, 7, [10 + 4 * number for number in range(int(count))]] = True
     return _frames(now, cells)
@@ -293,7 +293,7 @@ def _slides_over(ids: Ids, count: float) -> bool:
 
 STUCK = Knob(
     name="stuck",
-    title="A finger that slides over stuck switches, at 250 frames per second",
+    title="A finger that slides over stuck switches, at 125 frames per second",
     axis="how many are stuck",
     values=tuple(float(value) for value in range(5)),
     scene=_stuck,
@@ -317,7 +317,7 @@ LOST = Knob(
     name="lost",
     title="A finger that slides at 500 mm/s while frames are lost, at 500 frames per second",
     axis="ms from a frame to the next",
-    values=tuple(float(value) for value in range(22, 122, 4)),
+    values=tuple(float(value) for value in range(30, 122, 4)),
     scene=_gap,
     right=_one_id,
     methods=METHODS,
