@@ -1,5 +1,6 @@
 """Sphinx configuration."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
 
+from contactfpga import __version__
 from contactfpga.helptext import HEAD
 
 sys.path.append(str(Path(__file__).parent / "try"))
@@ -21,7 +23,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
-html_title = "contactfpga"
+html_title = f"contactfpga {__version__}"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
 html_math_renderer = "mathml"
@@ -55,6 +57,16 @@ def read_sections(app: Sphinx, what: str, name: str, obj: Any, options: Any, lin
         lines[:] = GoogleDocstring(list(lines), Config(), None, what, name, obj, options).lines()
 
 
+def group_pages(app: Sphinx, name: str, source: list[str]) -> None:
+    """The sidebar from the tables of the index: each of its sections is a group, with the pages that its rows begin
+    with. So the index is plain Markdown, which a repository's browser shows as well."""
+    if name == "index":
+        for section in re.split(r"^## ", source[0], flags=re.MULTILINE)[1:]:
+            pages = re.findall(r"^\| \[[^]]*\]\((\w+)\.md\)", section, re.MULTILINE)
+            lines = [":hidden:", f":caption: {section.splitlines()[0]}", "", *pages]
+            source[0] += "\n".join(["\n```{toctree}", *lines, "```\n"])
+
+
 def write_try(app: Sphinx, error: Exception | None) -> None:
     """The page that runs a board in the browser, beside the others; it is one file."""
     if error is None and app.builder.format == "html":
@@ -62,6 +74,7 @@ def write_try(app: Sphinx, error: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> None:
+    app.connect("source-read", group_pages)
     app.connect("build-finished", write_try)
     app.connect("autodoc-process-docstring", read_sections)
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))

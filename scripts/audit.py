@@ -20,7 +20,7 @@ from pathlib import Path
 
 import verification
 
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import beside, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 from contactfpga_sim.verify.mutants import campaign
@@ -90,7 +90,7 @@ def table(study: Study, name: str) -> Finding:
         part = StudyRun(study).call(study.sections[name].sample)
     except ImportError as error:
         return Finding(what, f"not looked at: {error}")
-    text = writer.sections((ROOT / "docs" / page).read_text(encoding="utf-8"))[name].text
+    text = beside.whole(ROOT / "docs" / page, name)
     agrees = f"\n{part}\n" in f"\n{text}\n"
     return Finding(what, f"agrees, {len(part.splitlines())} lines" if agrees else "differs", wrong=not agrees)
 

@@ -49,7 +49,7 @@ def _with_fields(own: str, kind: type) -> str:
     found: dict[str, Field] = {}
     for each in kind.__mro__:
         if each.__module__.startswith("contactfpga"):
-            found = {field.name: field for field in _fields(each)} | found
+            found = {field.name: field for field in fields(each)} | found
     if not found:
         return own
     lines = [HEAD]
@@ -60,7 +60,7 @@ def _with_fields(own: str, kind: type) -> str:
     return f"{inspect.cleandoc(own)}\n\n" + "\n".join(lines)
 
 
-def _fields(kind: type) -> Iterator[Field]:
+def fields(kind: type) -> Iterator[Field]:
     """Those that the source of a class declares, none where there is no source."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(kind)))

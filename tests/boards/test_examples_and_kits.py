@@ -49,6 +49,17 @@ def test_an_example_names_its_board_and_is_accepted_by_it(path, monkeypatch, cap
     assert "contact" in capsys.readouterr().out
 
 
+def test_the_page_of_examples_has_each_file_with_a_command_that_is_one(capsys):
+    page = (examples().parent / "docs/examples.md").read_text(encoding="utf-8")
+    files = {path.relative_to(examples().parent).as_posix() for path in examples().rglob("*.*") if path.is_file()}
+    assert {name for name in files if "__pycache__" not in name} == set(re.findall(r"`(examples/[\w./-]+)`[,| ]", page))
+    commands = re.findall(r"\| `(\w+) ([^`]*)` \|$", page, re.MULTILINE)
+    assert len(commands) == len(re.findall(r"^\| `", page, re.MULTILINE)) > 15
+    for program, arguments in commands:
+        if program == "contactfpga":
+            cli._parser().parse_args(shlex.split(arguments))
+
+
 @pytest.mark.parametrize("name", BOARDS)
 def test_the_own_sheet_of_a_board_states_a_circuit_that_works(name):
     board = BOARDS[name]

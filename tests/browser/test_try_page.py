@@ -9,7 +9,7 @@ from try_page import assemble
 pytest.importorskip("viser")
 pytest.importorskip("playwright")
 
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 from scipy import ndimage
 
 from contactfpga.design import kits
@@ -36,15 +36,6 @@ def file(tmp_path_factory):
     file = tmp_path_factory.mktemp("try") / "try.html"
     file.write_text(assemble.page(), encoding="utf-8")
     return file
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    switches = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"]
-    with sync_playwright() as playwright:
-        program = playwright.chromium.launch(executable_path=browser.program(), args=switches)
-        yield program
-        program.close()
 
 
 @pytest.fixture

@@ -283,7 +283,7 @@ def test_predictions_are_graded(measured, verdict):
 @pytest.mark.slow
 def test_the_report_holds_what_was_found_and_fitted():
     found, bench = brought_up(circuit=CIRCUIT, scatter=0.03, only=[times.settling, times.circuit])
-    made = report.Report(kits.kit("starter"), SKIN, datetime.date(2026, 11, 24))
+    made = report.BringUpReport(kits.kit("starter"), SKIN, datetime.date(2026, 11, 24))
     made.steps, made.fitted = [*found.values()], bench.fitted
     made.grades = report.graded({"settle_us": prediction(high=99.0)}, found["settle times"].measured)
     text = made.to_markdown()

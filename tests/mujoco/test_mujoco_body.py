@@ -158,7 +158,7 @@ def test_each_touch_of_four_links_is_where_mujoco_has_it(robot):
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_the_places_of_480_touches_are_as_the_page_says(robot):
-    """docs/mujoco.md: 60 poses with two touches on each of four links."""
+    """docs/collisions.md: 60 poses with two touches on each of four links."""
     rng, links = np.random.default_rng(100), Body.load(robot).links
     errors, stated, normals = [], [], []
     for _ in range(60):

@@ -66,5 +66,5 @@ def test_its_place_is_where_the_rod_is_and_the_sheets_too(arm):
 @pytest.mark.campaign  # 6 minutes
 @pytest.mark.timeout(3600)
 def test_the_table_is_the_pages():
-    page = (Path(__file__).parents[2] / "docs" / "mujoco.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "collisions.md").read_text()
     assert writer.sections(page)["observer"].text == observer_table()

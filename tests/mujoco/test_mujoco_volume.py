@@ -1,4 +1,4 @@
-"""The figures of docs/mujoco.md: places of 480 touches on JVRC-1, pushes of 2,040 contacts on six pressure units."""
+"""The figures of docs/collisions.md: places of 480 touches on JVRC-1, pushes of 2,040 contacts on six units."""
 
 import numpy as np
 import pytest

@@ -5,6 +5,7 @@ import doctest
 import importlib.util
 import io
 import re
+import runpy
 import shlex
 from pathlib import Path
 
@@ -16,31 +17,49 @@ from contactfpga.tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ALL_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-EXAMPLE = re.compile(r"^ *(?:>>> |\$ contactfpga .*\n *\S)", re.MULTILINE)
+GENERATED = {page.name for page in ALL_PAGES if page.name.startswith("api")}
+"""Their text is that of the docstrings."""
+EXAMPLE = re.compile(r"^ *(?:>>> |\$ (?:contactfpga|python) .*\n *\S)", re.MULTILINE)
 PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if EXAMPLE.search(page.read_text(encoding="utf-8")))
 
 
 def test_the_pages_have_examples():
-    assert {"README.md", "docs/use.md", "docs/skin.md", "docs/starter.md"} <= set(PAGES)
+    assert {"README.md", "docs/use.md", "docs/skin.md", "docs/starter.md", "docs/stop.md"} <= set(PAGES)
 
 
-SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/watch.md"}
-"""Their examples compile boards of their own."""
+SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/stop.md", "docs/watch.md"}
+"""Their examples compile boards of their own, or run an arm for seconds."""
+NEEDED = {"docs/ros.md": ("cyclonedds",), "docs/stop.md": ("cyclonedds", "mujoco")}
+"""Packages of extras, without which a page is left out."""
 
 
 class Session(doctest.DocTestParser):
-    """A page from top to bottom: Python, and each command after ``$ `` whose output follows; ``...`` stands for any."""
+    """A page from top to bottom: Python, and each command or file of Python after ``$ `` whose output follows; ``...``
+    stands for any."""
 
     def parse(self, string, name="<string>"):
         python = r"\1>>> run(r'''\2''')  # doctest: +ELLIPSIS\n"
-        return super().parse(re.sub(r"^( *)\$ contactfpga (.*)\n(?= *\S)", python, string, flags=re.MULTILINE), name)
+        command = r"^( *)\$ ((?:contactfpga|python) .*)\n(?= *\S)"
+        return super().parse(re.sub(command, python, string, flags=re.MULTILINE), name)
 
 
-def run(arguments: str) -> None:
+def run(command: str) -> None:
     """A command, in this process; without the spaces with which tables fill their lines."""
+    program, *arguments = shlex.split(command)
     with contextlib.redirect_stdout(io.StringIO()) as shown:
-        assert cli.main(shlex.split(arguments)) == 0
+        if program == "contactfpga":
+            assert cli.main(arguments) == 0
+        else:
+            run_file(arguments)
     print(re.sub(r" +$", "", shown.getvalue(), flags=re.MULTILINE), end="")
+
+
+def run_file(arguments: list[str]) -> None:
+    """A file of Python, as a program."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", arguments)
+        patch.setattr("sys.exit", lambda status=None: status and pytest.fail(f"{arguments}: exit status {status}"))
+        runpy.run_path(arguments[0], run_name="__main__")
 
 
 def examples_of(page: Path) -> doctest.TestResults:
@@ -50,6 +69,8 @@ def examples_of(page: Path) -> doctest.TestResults:
 @pytest.mark.usefixtures("_closed_ports")
 @pytest.mark.parametrize("page", sample(PAGES, quick={*PAGES} - SLOW, slow=SLOW))
 def test_examples_print_what_they_say(page, tmp_path, monkeypatch):
+    for package in NEEDED.get(page, ()):
+        pytest.importorskip(package)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
@@ -66,8 +87,15 @@ def test_a_command_with_another_output_is_seen(tmp_path):
     assert examples_of(page) == doctest.TestResults(failed=0, attempted=1)
 
 
+def test_a_file_with_another_output_is_seen(tmp_path):
+    file, page = tmp_path / "file.py", tmp_path / "page.md"
+    file.write_text("import sys\nprint(sys.argv[1])\nsys.exit(0)")
+    page.write_text(f"    $ python {file} one\n    one\n    $ python {file} one\n    two\n")
+    assert examples_of(page) == doctest.TestResults(failed=1, attempted=2)
+
+
 def documented(page: str) -> set[str]:
-    """Names that the directives of the interface's page take: one by one, or all of a module that are its own."""
+    """Names that the directives of the interface's pages take: one by one, or all of a module that are its own."""
     found = set(re.findall(r"^\.\. auto(?:class|function):: (\S+)$", page, re.MULTILINE))
     for module in re.findall(r"^\.\. automodule:: (\S+)\n   :members:$", page, re.MULTILINE):
         values = vars(importlib.import_module(module)).items()
@@ -75,22 +103,27 @@ def documented(page: str) -> set[str]:
     return found
 
 
-def test_the_interface_page_has_every_public_name():
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+def test_the_interface_pages_have_every_public_name():
+    page = "\n".join(page.read_text(encoding="utf-8") for page in ALL_PAGES if page.name in GENERATED)
     names = {f"contactfpga.{name}" for name in contactfpga.__all__}
     assert names - documented(page) == {"contactfpga.__version__"}
     assert "contactfpga.__version__" in page
 
 
 def test_each_documented_module_has_its_heading():
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    page = "\n".join(page.read_text(encoding="utf-8") for page in ALL_PAGES if page.name in GENERATED)
     for module in re.findall(r"^\.\. automodule:: (\S+)$", page, re.MULTILINE):
         assert re.search(rf"^#+ {re.escape(module)}$", page, re.MULTILINE), module
 
 
-@pytest.mark.parametrize("page", sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "index.md"))
-def test_each_page_is_in_a_group_of_the_index(page):
-    assert f"\n{page.removesuffix('.md')}\n" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
+GROUPS = ["Start", "Guide", "Hardware", "Reference", "Internals", "Evidence"]
+
+
+def test_each_page_is_in_one_group_of_the_index():
+    index = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (.*)", index, re.MULTILINE) == GROUPS
+    rows = re.findall(r"^\| \[.+\]\((\S+)\) \| \S.+ \|$", index, re.MULTILINE)
+    assert sorted(rows) == sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "index.md")
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
@@ -104,6 +137,40 @@ def words(page: Path) -> str:
     text = page.read_text(encoding="utf-8")
     text = re.sub(r"<!-- (?:figures|pins): \w+(?: of \w+)? -->.*?<!-- end -->", "", text, flags=re.DOTALL)
     return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("page", [page for page in ALL_PAGES if page.name not in GENERATED], ids=lambda path: path.name)
+def test_a_page_is_plain_markdown(page):
+    """Hosts of repositories show directives and targets of Sphinx as code, and no links to them."""
+    text = page.read_text(encoding="utf-8")
+    assert [line for line in text.splitlines() if SPHINX.search(line)] == []
+
+
+SPHINX = re.compile(r"^\s*(?:`{3,}|:{3,}|~{3,}) *\{|^\([\w-]+\)= *$|(?<!`)\{[a-z]+\}`|^%|^\+{3}")
+
+
+@pytest.mark.parametrize(
+    "line", ["```{image} a.svg", "  :::{note}", "(unseen)=", "see {ref}`unseen`", "% a remark", "+++"]
+)
+def test_a_line_of_sphinx_is_seen(line):
+    assert SPHINX.search(line)
+    assert not SPHINX.search(f"say {line.replace('`', '')}")
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_links_into_pages_lead_to_headings(page):
+    """By the rule of GitHub, whose names of headings Sphinx makes, too."""
+    links = re.findall(r"\]\(((?:\w[\w./-]*\.md)?)#([^)\s]+)\)", page.read_text(encoding="utf-8"))
+    found = {name: headings(page.parent / name if name else page) for name in {name for name, _ in links}}
+    wrong = {f"{name}#{place}" for name, place in links if place not in found[name] and name not in GENERATED}
+    assert wrong == set()
+
+
+def headings(page: Path) -> set[str]:
+    """The names by which a page's headings are linked to."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    heads = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", head) for head in re.findall(r"^#+ (.*)", text, re.MULTILINE)]
+    return {re.sub(r"[^\w\- ]", "", head.strip().lower()).replace(" ", "-") for head in heads}
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)

@@ -3,8 +3,10 @@
 import re
 from pathlib import Path
 
+import matplotlib
 import pytest
 import svg_texts
+from matplotlib.figure import Figure
 from sample import sample
 
 from contactfpga import picture_style
@@ -47,6 +49,18 @@ def test_what_is_drawn_lies_on_the_card(path):
         return
     first = re.search(r'<(?:rect|path)[^>]*?fill(?:="|: )(#\w+)', text)
     assert first[1] == picture_style.CARD
+
+
+def test_ids_do_not_depend_on_the_last_digit_of_a_coordinate(tmp_path):
+    def drawn(left):
+        with matplotlib.rc_context(picture_style.SETTINGS):
+            figure = Figure((4, 2))
+            figure.add_axes((left, 0.2, 0.5, 0.5)).plot([0, 1])
+            return picture_style.save(figure, tmp_path / "one.svg").read_text(encoding="utf-8")
+
+    assert drawn(0.2) == drawn(0.2 + 1e-15)
+    assert drawn(0.2) != drawn(0.3)
+    assert {"i0", "i1", "i2"} == set(re.findall(r'id="(i\d+)"', drawn(0.2)))
 
 
 def test_words_that_lie_on_others_are_seen(tmp_path):

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from contactfpga.tools.console.outputs import OutputError
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import beside, writer
 
 PAGE = "a\n<!-- figures: one -->\nold\n<!-- end -->\nb\n<!-- figures: two -->\nkept\n<!-- end -->\n"
 
@@ -47,6 +47,20 @@ def test_a_page_is_looked_for_before_anything_is_measured_for_it(tmp_path):
     assert not list(tmp_path.iterdir())
     (tmp_path / "page.md").write_text(PAGE)
     assert writer.page(tmp_path / "page.md").read_text() == PAGE
+
+
+LONG = '    a command\n\n| a | b |\n|---|---|\n| 1, 2 |  |\n| 3 | x y |\n| 4 | "z" |\n\n| c |\n|---|\n| 5 |\n\nafter'
+
+
+def test_a_long_table_is_in_a_file_beside_the_page(tmp_path):
+    file = tmp_path / "tables" / "page-one.csv"
+    text = beside.part(LONG, "x|z", file)
+    assert text.splitlines()[2:8] == ["| a | b |", "|---|---|", "| 3 | x y |", '| 4 | "z" |', "", text.splitlines()[7]]
+    assert text.splitlines()[7] == "All [3 rows](tables/page-one.csv)."
+    assert text.partition("csv).\n")[2] == LONG.partition('"z" |\n')[2]
+    assert file.read_text() == 'a,b\n"1, 2",\n3,x y\n4,"""z"""\n'
+    (tmp_path / "page.md").write_text(f"a\n<!-- figures: one -->\n{text}\n<!-- end -->\nb\n")
+    assert beside.whole(tmp_path / "page.md", "one") == LONG
 
 
 @pytest.mark.slow

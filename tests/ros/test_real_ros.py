@@ -127,3 +127,17 @@ def test_the_node_refuses_parameters_that_cannot_be(ros):
             assert "zones_hz is 0.0; it must be above 0 and at most 100000" in node.stderr.readline()
         finally:
             node.terminate()
+
+
+def test_the_example_stops_on_contact(ros, port):
+    domain = DOMAINS[ros.distribution] + 40
+    publisher = [ros.python, "-m", "contactfpga_ros.skin", "--ros-args", "-p", f"port:={port}"]
+    command = [*map(str, (ros.python, ROOT / "examples" / "ros_stop.py"))]
+    with (
+        running(publisher, ros.variables(domain)),
+        subprocess.Popen(command, env=ros.variables(domain), stderr=subprocess.PIPE, text=True) as node,
+    ):
+        try:
+            assert "stop: contact" in node.stderr.readline()
+        finally:
+            node.terminate()

@@ -1,4 +1,4 @@
-"""The page on the cover: its tables are those that the code gives, and the rules that fail do."""
+"""The pages on the cover: their tables are those that the code gives, and the rules that fail do."""
 
 import itertools
 import math
@@ -37,18 +37,19 @@ def test_errors_in_the_other_tables_are_up_to_date(name):
         # the last column is a time; of an error near rounding only its order is the same everywhere
         return [[re.sub(r"\d(?=e-1)", "", cell) for cell in row[:-1]] for row in cells(table)]
 
-    assert comparable(section("cover.md", name)) == comparable(RUN.text(name))
-    assert all(row[-1].endswith(" µs") for row in cells(section("cover.md", name))[2:])
+    shown = section(RUN.study.page_of(name), name)
+    assert comparable(shown) == comparable(RUN.text(name))
+    assert all(row[-1].endswith(" µs") for row in cells(shown)[2:])
 
 
 def test_the_largest_errors_against_the_boundary_elements_are_those_that_the_page_states():
-    rows = [[float(cell.split()[0]) for cell in row] for row in cells(section("cover.md", "elements"))[2:]]
+    rows = [[float(cell.split()[0]) for cell in row] for row in cells(section("paper.md", "elements"))[2:]]
     assert len(rows) == len(caps.THICKNESSES_MM) * len(caps.SIDES_MM)
     assert max(abs(flush) for _, _, flush, *_ in rows) < 2
     assert all(abs(error) < 13 for _, side, _, *errors in rows for error in errors if side >= 6)
     assert max(rigid for _, side, _, rigid, _ in rows if side == 4) > 20
     error = caps._off(5.0, 8.0, math.inf, proud=False)
-    assert f"{100 * error:+.1f} %" == cells(section("cover.md", "elements"))[2 + 6][2]
+    assert f"{100 * error:+.1f} %" == cells(section("paper.md", "elements"))[2 + 6][2]
 
 
 def test_proud_caps_close_lighter_than_flush_faces():
@@ -60,7 +61,7 @@ def test_proud_caps_close_lighter_than_flush_faces():
     assert float(found["6.4 mm", "tiles:", "the"][8].split()[0]) <= 2.0
     assert f"The table has {found['10 mm', 'flush', 'face'][5]} for a finger" in PAGE
     button, too_much = (float(found["10 mm", "proud", "button"][5].split()[0]), 1.24)
-    assert "5 mm | 4 mm | -0.2 % | +24.0 %" in section("cover.md", "elements")
+    assert "5 mm | 4 mm | -0.2 % | +24.0 %" in section("paper.md", "elements")
     assert 4 < too_much * button < 5
     assert "the model would say 4 to 5 N" in PAGE
 

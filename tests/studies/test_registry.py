@@ -7,11 +7,11 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from study_pages import DOCS
+from study_pages import DOCS, section
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
-from contactfpga_sim.lab import meaning, studies, writer
+from contactfpga_sim.lab import beside, meaning, studies, writer
 from contactfpga_sim.lab.registry import Section, Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -71,7 +71,47 @@ def test_a_part_of_each_section_that_is_quick_to_make_is_up_to_date(study, name)
     if absent:
         pytest.skip(f"needs {', '.join(absent)}")
     part = StudyRun(study).call(study.sections[name].sample)
-    assert f"\n{part}\n" in f"\n{writer.sections((DOCS / study.page_of(name)).read_text())[name].text}\n"
+    assert f"\n{part}\n" in f"\n{section(study.page_of(name), name)}\n"
+
+
+MOST_ROWS = 22
+"""Of a table that a command writes into a page: one for each knob of the failures."""
+READ_WHOLE = {"skin.md: fields", "kits.md: parts", "kits.md: predictions"}
+"""A reader looks up any row of these."""
+
+
+def test_long_tables_are_in_files_beside_the_pages():
+    rows = {
+        f"{study.page_of(name)}: {name}": longest(writer.sections((DOCS / study.page_of(name)).read_text())[name].text)
+        for study in DECLARED
+        for name in study.sections
+    }
+    assert {name for name, count in rows.items() if count > MOST_ROWS} == READ_WHOLE
+
+
+def longest(text):
+    """Rows of the longest table."""
+    return max((table.count("\n") - 2 for table in re.findall(r"(?:^\|.*\|\n)+", f"{text}\n", re.MULTILINE)), default=0)
+
+
+@pytest.mark.parametrize(
+    ("study", "name"),
+    [(study, name) for study in DECLARED for name, section in study.sections.items() if section.kept],
+    ids=lambda value: value if isinstance(value, str) else value.name,
+)
+def test_a_page_keeps_the_rows_that_its_study_declares(study, name, tmp_path):
+    page = study.page_of(name)
+    file = tmp_path / f"{Path(page).stem}-{name}.csv"
+    text = beside.part(section(page, name), study.sections[name].kept, file)
+    assert text == writer.sections((DOCS / page).read_text())[name].text
+    assert file.read_text() == (DOCS / beside.FOLDER / file.name).read_text()
+    assert 0 < longest(text) < longest(section(page, name))
+
+
+def test_each_file_beside_the_pages_belongs_to_a_section():
+    kept = {f"{Path(study.page_of(name)).stem}-{name}.csv" for study in DECLARED for name in study.sections
+            if study.sections[name].kept}  # fmt: skip
+    assert {path.name for path in (DOCS / beside.FOLDER).iterdir()} == kept
 
 
 # ---- a toy study: its declaration and its function

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
-from contactfpga_sim.lab import meaning, pool, studies, writer
+from contactfpga_sim.lab import beside, meaning, pool, studies, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")
@@ -51,6 +51,8 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
             print(f"{page}: {name} stays as it is without {', '.join(absent)}", flush=True)
             continue
         text = run.text(name)
+        if section.kept:
+            text = beside.part(text, section.kept, DOCS / beside.FOLDER / f"{Path(page).stem}-{name}.csv")
         writer.write(DOCS / page, {name: lambda text=text: text}, meaning.fingerprint(study, name))  # type: ignore[misc]
         print(f"{page}: {name}", flush=True)
     if study.pictures:

@@ -28,6 +28,8 @@ class Section:
     """As :attr:`Study.needs`. Where one is absent, the section stays as it is."""
     sample: str = ""
     """A function that gives in less than a minute a part of the text, such as a row; it takes nothing."""
+    kept: str = ""
+    """A regular expression that finds something in the rows of its longest table that a page keeps; empty: in all."""
     of_netlists: bool = False
     """It says what :mod:`.size` measures, so netlists decide whether it is out of date, and not all code it reaches."""
 

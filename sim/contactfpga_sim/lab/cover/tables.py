@@ -1,4 +1,4 @@
-"""The tables and pictures of docs/cover.md."""
+"""The tables and pictures of docs/cover.md and docs/paper.md."""
 
 from __future__ import annotations
 

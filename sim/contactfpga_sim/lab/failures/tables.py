@@ -95,7 +95,9 @@ def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
 
 def pictures() -> str:
     """A heading and a picture for each knob."""
-    return "\n".join(f"({knob.name})=\n\n![{knob.title}](images/failures/{knob.name}.svg)\n" for knob in KNOBS.values())
+    return "\n".join(
+        f"### `{knob.name}`\n\n![{knob.title}](images/failures/{knob.name}.svg)\n" for knob in KNOBS.values()
+    )
 
 
 def compute() -> dict[str, dict[str, Sweep]]:

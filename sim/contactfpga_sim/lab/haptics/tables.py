@@ -159,7 +159,7 @@ def breaks_table() -> str:
 def breaks_pictures() -> str:
     """A heading and a picture for each."""
     return "\n".join(
-        f"({knob.name})=\n\n![{knob.title}](images/haptics/{knob.name}.svg)\n" for knob in breaks.KNOBS.values()
+        f"### `{knob.name}`\n\n![{knob.title}](images/haptics/{knob.name}.svg)\n" for knob in breaks.KNOBS.values()
     )
 
 

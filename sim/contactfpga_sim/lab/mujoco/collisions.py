@@ -289,7 +289,7 @@ def compare(collisions: int = 200, free_runs: int = 100) -> Compared:
 
 
 def observer_table() -> str:
-    """For docs/mujoco.md."""
+    """For docs/collisions.md."""
     found = compare()
     count = len(found.sheet)
     head = ["", "sheet", "observer", "neither"]

@@ -1,0 +1,48 @@
+"""Long tables of pages: a page keeps the rows that matter, and a file beside it has all, as comma-separated values."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+
+from contactfpga.inputs.files import write_text
+from contactfpga_sim.lab import writer
+
+FOLDER = "tables"
+"""In the folder of the pages."""
+_TABLE = re.compile(r"(?:^\|.*\|(?:\n|\Z))+", re.MULTILINE)
+_HEAD = 2
+"""Lines of a table above its rows."""
+_PARTED = re.compile(rf"^(?:\|.*\n)+\nAll \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE)
+
+
+def part(text: str, kept: str, file: Path) -> str:
+    """A section with those rows of its longest table that the regular expression ``kept`` finds something in, and a
+    link to all of them, which are written to the file."""
+    table = max(_TABLE.findall(text), key=len).rstrip("\n")
+    lines = table.splitlines()
+    rows = lines[_HEAD:]
+    shown = [row for row in rows if re.search(kept, row)]
+    file.parent.mkdir(exist_ok=True)
+    write_text(file, _csv(lines))
+    link = f"All [{len(rows)} rows]({FOLDER}/{file.name})."
+    return text.replace(table, "\n".join([*lines[:_HEAD], *shown, "", link]), 1)
+
+
+def whole(page: Path, name: str) -> str:
+    """A section of a page as its study made it, with all rows of its tables."""
+    text = writer.sections(page.read_text(encoding="utf-8"))[name].text
+    return _PARTED.sub(lambda found: _table((page.parent / found[1]).read_text(encoding="utf-8")), text)
+
+
+def _csv(lines: list[str]) -> str:
+    text = io.StringIO()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in (lines[0], *lines[_HEAD:])]
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def _table(text: str) -> str:
+    return writer.table_of(list(csv.reader(io.StringIO(text))))

@@ -1,0 +1,17 @@
+"""A browser for the tests of pages."""
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """Headless Chromium without a network."""
+    from playwright.sync_api import sync_playwright
+
+    from contactfpga_sim.lab.view import browser
+
+    switches = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"]
+    with sync_playwright() as playwright:
+        program = playwright.chromium.launch(executable_path=browser.program(), args=switches)
+        yield program
+        program.close()
