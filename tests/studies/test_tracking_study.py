@@ -1,22 +1,23 @@
 """How the tracker is judged: the truth of its scenes, the scores beside the baseline, and where it breaks."""
 
 import importlib.util
+import itertools
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from sample import sample
-from study_pages import outdated
+from study_pages import outdated, section
 
-from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance.scans import RECORDINGS
-from contactfpga_sim.lab.tracking import breaks, scenes, scores, tables
+from contactfpga_sim.lab.tracking import scenes, scores, tables
 from contactfpga_sim.lab.tracking.scores import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/tracking.md"
 PITCH_MM = 10.0
+PAGE_RATES = ("100", "1,000", "10,000")
 NAMES = [name for name in scores.TRACKERS if name != "Norfair" or importlib.util.find_spec("norfair")]
 """Norfair is compared where it is installed."""
 
@@ -94,6 +95,22 @@ def test_the_tracker_is_behind_no_other_beyond_the_interval(family):
         assert gained + half >= -1e-9, other
 
 
+def test_on_the_page_it_is_behind_no_other_at_any_rate():
+    rows = [line[2:-2].split(" | ") for line in section("tracking.md", "ahead").splitlines()[2:]]
+    assert {(row[0].strip("`"), row[1]) for row in rows} == set(itertools.product(scenes.FAMILIES, PAGE_RATES))
+    for row in rows:
+        for gained, half in (map(float, cell.split(" ± ")) for cell in row[2:]):
+            assert gained + half >= 0, row
+
+
+def test_on_the_page_it_is_ahead_in_the_mean_at_each_rate():
+    lines = section("tracking.md", "scores").splitlines()
+    means = [line[2:-2].split(" | ") for line in lines if line.startswith("| mean of all | ")]
+    assert [row[1] for row in means] == ["25", *PAGE_RATES]
+    for ours, *others in ([float(cell.strip("*")) for cell in row[2:6]] for row in means):
+        assert ours > max(others)
+
+
 @pytest.mark.slow  # 60 s
 def test_the_tracker_is_ahead_in_the_mean():
     pytest.importorskip("motmetrics")
@@ -113,9 +130,32 @@ def test_constant_velocity_goes_on_where_its_speed_puts_it():
         assert found == ids
 
 
-def test_an_interval_is_students():
-    values = np.array([0.9, 0.7, 0.8, np.nan])
-    assert scores.half(values) == pytest.approx(4.303 * 0.1 / math.sqrt(3), rel=1e-3)
+def scored(each, counted):
+    """Scenes with these scores, that count for so much."""
+    known = [(one, count) for one, count in zip(each, counted) if count]
+    mean = sum(one * count for one, count in known) / sum(counted)
+    return scores.Score(100, 0.0, mean, 0, each, counted)
+
+
+def test_the_interval_of_scenes_that_count_alike_is_students():
+    found = scored((0.9, 0.7, 0.8, math.nan), (10.0, 10.0, 10.0, 0.0))
+    assert found.half == pytest.approx(4.303 * 0.1 / math.sqrt(3), rel=1e-3)
+
+
+def test_the_interval_of_scenes_that_count_otherwise_covers_as_often_as_it_says(rng):
+    """Scores of 0 or 1, of scenes of any length."""
+    covered = 0
+    for _ in range(1000):
+        counted = tuple(rng.uniform(50, 150) for _ in range(40))
+        found = scored(tuple(float(rng.random() < 0.7) for _ in counted), counted)
+        covered += abs(found.idf1 - 0.7) <= found.half
+    assert 0.92 < covered / 1000 < 0.975
+
+
+def test_who_is_ahead_in_every_scene_by_the_same_is_ahead_for_sure():
+    each, counted = np.array([0.2, 0.5, 0.9]), (10.0, 20.0, 30.0)
+    gained, half = scores.ahead(scored(tuple(each + 0.1), counted), scored(tuple(each), counted))
+    assert (gained, half) == (pytest.approx(0.1), pytest.approx(0.0, abs=1e-12))
 
 
 @pytest.mark.slow  # 5 s
@@ -132,43 +172,6 @@ def test_a_row_of_the_scores_is_up_to_date():
 def test_all_scores_are_up_to_date():
     pytest.importorskip("norfair")
     assert not outdated("tracking", "scores")
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", breaks.KNOBS)
-def test_the_breaks_are_up_to_date(name):
-    lines = PAGE.read_text(encoding="utf-8").splitlines()
-    for row in tables.break_rows(breaks.KNOBS[name]):
-        assert writer.line(row) in lines
-
-
-@pytest.mark.slow  # 40 s
-@pytest.mark.parametrize("seed", [1, 2])
-def test_breaks_have_their_closed_forms_on_other_seeds(seed):
-    """Gate 20 mm; a speed is believed for 50 ms; a frame shows a place to half a pitch, and a bounce to a frame."""
-    for method in breaks.METHODS:
-        rates = breaks.AT_ONCE.sweep(method, seed, 30)
-        assert rates[-1].value == pytest.approx(20.0, abs=PITCH_MM / 2)
-    for name, mm in (("`Tracker`", 20 + 500 * 0.05), ("nearest zone", 20)):
-        ms = mm / 500 * 1000
-        assert breaks.LOST.rate(name, ms - 2 * PITCH_MM, seed, 20).right >= 19
-        assert breaks.LOST.rate(name, ms + 2 * PITCH_MM, seed, 20).right < 10
-    for method, hold in (("`Tracker`, `hold_ms = 5`", 5.0), ("`Tracker`, `hold_ms = 20`", 20.0), ("nearest zone", 0.5)):
-        assert breaks.BOUNCE.sweep(method, seed, 10)[-1].value == hold
-
-
-def test_a_rate_has_wilsons_interval_and_a_sweep_ends_where_too_few_are_right():
-    knob = breaks.BOUNCE
-    rates = knob.sweep("nearest zone", placements=5)
-    assert [(rate.value, rate.right, rate.holds) for rate in rates] == [(0.0, 5, True), (0.5, 0, False)]
-    assert str(breaks.Rate(1.0, 95, 100)) == "95 % (88.8 to 97.8)"
-
-
-def test_placements_are_others_for_each_number_and_seed():
-    found = [breaks._made(breaks.CROSS.scene, 1, seed, number, 8.0) for seed in (0, 1) for number in (0, 1)]
-    places = {tuple(tuple(zone.records.tolist()[0]) for zone in made[:40]) for made in found}
-    assert len(places) > 1
-    assert len({made[0].time_us for made in found}) == 4
 
 
 def test_ten_thousand_frames_per_second_with_two_contacts():

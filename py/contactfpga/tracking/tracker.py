@@ -50,7 +50,7 @@ class Tracker:
             low, high, unit = LIMITS[name]
             if not is_finite(value) or not low <= value <= high:
                 raise ValueError(f"{name} is {shown(value)}; it must be a number from {low:g} to {high:,g} {unit}")
-        self._gate_mm, self._move_mm = float(gate_mm), float(move_mm)
+        self._gate_mm, self._move_mm = gate_mm * (1 + 1e-9), float(move_mm)  # a zone at the gate is within it
         self._hold_us, self._shared_us = hold_ms * 1e3, shared_ms * 1e3
         self._next_id = 1
         self._time_us = -1

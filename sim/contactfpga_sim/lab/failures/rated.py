@@ -37,6 +37,11 @@ class Rate:
         """The least and the largest share that are likely."""
         return wilson(self.right, self.of, Z)
 
+    def reaches(self, level: float) -> bool | None:
+        """Whether the share is this level or more; None while the level lies within the interval."""
+        low, high = self.interval
+        return True if low >= level else False if high < level else None
+
     def __str__(self) -> str:
         low, high = (100 * share for share in self.interval)
         return f"{100 * self.right / self.of:.3g} % ({low:.1f} to {high:.1f})"
@@ -65,10 +70,10 @@ class Rated:
         for look in LOOKS:
             found += self.draws(value, rng, look - len(found))
             rate = Rate(sum(one.right for one in found), len(found))
-            low, high = rate.interval
-            if low >= self.level or high < self.level or look >= self.most:
+            holds = rate.reaches(self.level)
+            if holds is not None or look >= self.most:
                 break
-        return _together(found, rate, low >= self.level, self.telling)
+        return _together(found, rate, bool(holds), self.telling)
 
 
 def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:

@@ -23,6 +23,7 @@ from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
+from contactfpga_sim.lab import kept, pool
 from contactfpga_sim.lab.tracking import scenes
 from contactfpga_sim.lab.tracking.scenes import FrameTruth, Place, zones_of
 from contactfpga_sim.model.scenes.recordings import Recording
@@ -164,7 +165,9 @@ class Score:
     idf1: float
     switches: int
     idf1_each: tuple[float, ...] = ()
-    """Of each scene."""
+    """Of each scene; nan where nothing could be told apart."""
+    counted: tuple[float, ...] = ()
+    """What each scene counts for: its judged places, of contacts and of ids."""
 
     @property
     def switches_per_1000(self) -> float:
@@ -174,7 +177,13 @@ class Score:
     @property
     def half(self) -> float:
         """Half of the 95 % interval of IDF1, over the scenes."""
-        return half(np.array(self.idf1_each))
+        return half(self.pulls)
+
+    @property
+    def pulls(self) -> np.ndarray:
+        """By how much each scene moves IDF1; they add up to 0."""
+        share = np.array(self.counted) / np.sum(self.counted)
+        return np.where(share > 0, share * (np.nan_to_num(self.idf1_each) - self.idf1), np.nan)
 
     @property
     def cells(self) -> tuple[str, str, str]:
@@ -182,12 +191,13 @@ class Score:
         return f"{100 * self.mota:.1f}", f"{100 * self.idf1:.1f}", f"{self.switches_per_1000:.1f}"
 
 
-def half(values: np.ndarray) -> float:
-    """Half of the 95 % interval of a mean, by Student's t. A scene in which nothing can be told apart has no score."""
+def half(pulls: np.ndarray) -> float:
+    """Half of the 95 % interval of a mean of scenes, weighted by what they count for, by Student's t; nan: nothing."""
     from scipy.stats import t
 
-    values = values[~np.isnan(values)]
-    return float(t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+    pulls = pulls[~np.isnan(pulls)]
+    count = len(pulls)
+    return float(t.ppf(0.975, count - 1) * math.sqrt(count / (count - 1) * np.sum(pulls**2)))
 
 
 Judged = tuple[dict[int, Place], dict[int, Place]]
@@ -218,12 +228,14 @@ def score(histories: Sequence[Sequence[Judged]], near_mm: float = NEAR_MM) -> Sc
         for truth, said in history:
             distances = [[_near(math.dist(one, other), near_mm) for other in said.values()] for one in truth.values()]
             made[-1].update(list(truth), list(said), distances)
-    metrics = ["num_frames", "mota", "idf1", "num_switches"]
+    metrics = ["num_frames", "mota", "idf1", "num_switches", "num_objects", "num_predictions"]
     names = [str(number) for number in range(len(made))]
     table = motmetrics.metrics.create().compute_many(made, metrics=metrics, names=names, generate_overall=True)
     total = table.loc["OVERALL"]
     each = tuple(float(value) for value in table.loc[names, "idf1"])
-    return Score(int(total["num_frames"]), float(total["mota"]), float(total["idf1"]), int(total["num_switches"]), each)
+    counted = tuple(float(value) for value in table.loc[names, "num_objects"] + table.loc[names, "num_predictions"])
+    sums = int(total["num_frames"]), float(total["mota"]), float(total["idf1"]), int(total["num_switches"])
+    return Score(*sums, each, counted)
 
 
 def _near(distance: float, limit: float) -> float:
@@ -317,7 +329,7 @@ RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
 JUDGED_RATES = RATES_HZ[1:]
 """At which the tracker must not be behind another one."""
 
-MOST_FRAMES = 2_000
+MOST_FRAMES = 6_000
 """Of a scene."""
 
 SCENES = 12
@@ -332,7 +344,13 @@ Scores = dict[str, Score]
 
 @functools.cache
 def of_family(family: str, rate_hz: float, count: int = SCENES, names: tuple[str, ...] = tuple(TRACKERS)) -> Scores:
-    """On random scenes; the same ones at every rate."""
+    """On random scenes; the same ones at every rate. What was scored before is kept."""
+    key = repr((kept.made_by(__name__), family, rate_hz, count, names))
+    found = kept.kept("tracking", key, lambda: _scored(family, rate_hz, count, names))
+    return {name: Score(**one) for name, one in found.items()}
+
+
+def _scored(family: str, rate_hz: float, count: int, names: Iterable[str]) -> dict[str, dict[str, Any]]:
     seed, seconds = zlib.crc32(family.encode()), min(scenes.SECONDS, MOST_FRAMES / rate_hz)
     said: dict[str, list[list[Judged]]] = {name: [] for name in names}
     for number in range(count):
@@ -340,13 +358,12 @@ def of_family(family: str, rate_hz: float, count: int = SCENES, names: tuple[str
         frames = list(scenes.played(fingers, rate_hz, seconds=seconds))
         for name, histories in said.items():
             histories.append(followed(TRACKERS[name](), frames, rate_hz))
-    return {name: score(histories) for name, histories in said.items()}
+    return {name: dataclasses.asdict(score(histories)) for name, histories in said.items()}
 
 
 def ahead(ours: Score, other: Score) -> tuple[float, float]:
-    """By how much the first one's IDF1 is above the other's, scene by scene, and half of its 95 % interval."""
-    gained = np.array(ours.idf1_each) - np.array(other.idf1_each)
-    return float(np.nanmean(gained)), half(gained)
+    """By how much the first one's IDF1 is above the other's on the same scenes, and half of its 95 % interval."""
+    return ours.idf1 - other.idf1, half(ours.pulls - other.pulls)
 
 
 @functools.cache
@@ -361,4 +378,9 @@ def of_recording(path: Path, every: int) -> Scores:
 
 def all_scenes() -> dict[tuple[str, float], Scores]:
     """Every family at every rate."""
-    return {key: of_family(*key) for key in itertools.product(scenes.FAMILIES, RATES_HZ)}
+    keys = list(itertools.product(scenes.FAMILIES, RATES_HZ))
+    with pool.executor() as workers, pool.progress() as step:
+        for one in [workers.submit(of_family, *key) for key in keys]:
+            one.result()
+            step("scores", len(keys))
+    return {key: of_family(*key) for key in keys}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -121,19 +121,20 @@ BREAKS = ("knob", "method", "right in 95 % up to", "right there", "right at the 
 
 def breaks_table() -> str:
     """Where ids are lost."""
-    return writer.table_of([BREAKS, *(row for knob in breaks.KNOBS.values() for row in break_rows(knob))])
+    found = breaks.sweeps()
+    return writer.table_of([BREAKS, *(row for name in found for row in break_rows(breaks.KNOBS[name], found[name]))])
 
 
-def break_rows(knob: breaks.Knob) -> Iterator[tuple[str, ...]]:
+def break_rows(knob: breaks.Knob, found: Mapping[str, breaks.Rates]) -> Iterator[tuple[str, ...]]:
     """A knob's lines; what they have in common is said in the first one."""
-    for number, method in enumerate(knob.methods):
-        rates = knob.sweep(method)
-        held = [rate for rate in rates if rate.holds]
-        until = f"**{held[-1].value:g}**" if held else "nowhere"
-        until = until if len(held) < len(rates) else f"{until}, all there are"
-        after = f"{rates[-1].value:g}: {rates[-1]}" if len(held) < len(rates) else ""
+    for number, (method, rates) in enumerate(found.items()):
+        held = [(value, rate) for value, rate in rates if breaks.holds(rate)]
+        until, there = (f"**{held[-1][0]:g}**", str(held[-1][1])) if held else ("nowhere", "")
+        if len(held) == len(rates):
+            until += ", all there are"
+        after = f"{rates[-1][0]:g}: {rates[-1][1]}" if len(held) < len(rates) else ""
         first = (f"{knob.title}: {knob.axis}", knob.helps) if number == 0 else ("", "")
-        yield first[0], method, until, str(held[-1]) if held else "", after, knob.closed.get(method, ""), first[1]
+        yield first[0], method, until, there, after, knob.closed.get(method, ""), first[1]
 
 
 def speed_table() -> str:

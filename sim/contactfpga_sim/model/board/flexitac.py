@@ -40,7 +40,7 @@ class FlexitacSheet:
         self.port = os.ttyname(self._slave)
         """Path of the serial port."""
         self.seconds = 0.0
-        """Time of the scene."""
+        """Time of the scene; it stands while nobody reads."""
 
     def frame(self, seconds: float) -> bytes:
         """What is sent of one frame; bytes are lost and wrong by chance."""
@@ -65,4 +65,4 @@ class FlexitacSheet:
         while not self._stopping.wait(1 / self._hz):
             with contextlib.suppress(BlockingIOError):  # nobody reads
                 os.write(self._master, self.frame(self.seconds))
-            self.seconds += 1 / self._hz
+                self.seconds += 1 / self._hz

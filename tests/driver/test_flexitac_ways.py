@@ -1,0 +1,145 @@
+"""A FlexiTac sheet whose line loses and changes bytes, by the ways a user takes: commands, recordings, the network,
+ROS 2 and the view."""
+
+import collections
+import json
+import time
+
+import numpy as np
+import pytest
+
+import contactfpga
+from contactfpga_sim.model.board.flexitac import COLUMNS, ROWS, FlexitacSheet
+
+ROW, COLUMN, PITCH_MM = 6, 20, 3.0
+PLACE_MM = COLUMN * PITCH_MM, ROW * PITCH_MM
+CELLS = 13
+"""Of a disc of radius 2 cells."""
+
+
+def touched(seconds):
+    """The force of a disc on a cell, from 1 s after somebody began to read."""
+    rows, columns = np.mgrid[:ROWS, :COLUMNS]
+    return ((rows - ROW) ** 2 + (columns - COLUMN) ** 2 <= 4) * float(seconds > 1.0)
+
+
+@pytest.fixture
+def address():
+    """Of 514 bytes of a frame, one is lost in one of 6 frames, and one is wrong in one of 10."""
+    with FlexitacSheet(touched, lost=1 / 3000, wrong=1 / 5000) as sheet:
+        yield f"flexitac://{sheet.port}?frames=10"
+
+
+def usual(frames):
+    """The zone that most frames with any have: its x and y in mm, and its cells. Frames: lists of these."""
+    ((zone, times),) = collections.Counter(zone for zones in frames for zone in zones).most_common(1)
+    assert times > 0.7 * sum(map(bool, frames))  # a wrong byte may change a cell of a frame
+    return zone
+
+
+def of_json(text):
+    """Frames of ``zones --json``, as :func:`usual` takes them."""
+    lines = [json.loads(line) for line in text.splitlines()]
+    return [[(zone["x_mm"], zone["y_mm"], zone["area_cells"]) for zone in line["zones"]] for line in lines]
+
+
+def test_zones_and_tracks_by_command(address, run):
+    status, said, errors = run("zones", address, "--tracks", "--json", "--seconds", "3")
+    assert status == 0, errors
+    assert usual(of_json(said)) == (*PLACE_MM, CELLS)
+    ids = [track["id"] for line in map(json.loads, said.splitlines()) for track in line["tracks"]]
+    assert collections.Counter(ids).most_common(1)[0][1] > 60
+
+
+def test_a_recording_by_command_is_shown_again(address, run, tmp_path):
+    file = tmp_path / "flexitac.rec"
+    status, said, errors = run("zones", address, "--json", "--seconds", "3", "--record", file)
+    assert status == 0, errors
+    status, again, errors = run("zones", f"replay://{file}", "--json")
+    assert status == 0, errors
+    seen = {frame["time_us"]: frame["zones"] for frame in map(json.loads, said.splitlines())}
+    kept = {frame["time_us"]: frame["zones"] for frame in map(json.loads, again.splitlines())}
+    assert seen.items() <= kept.items()
+    assert usual(of_json(again)) == (*PLACE_MM, CELLS)
+
+
+def test_recorded_as_mcap_and_exported(address, run, tmp_path):
+    pytest.importorskip("mcap")
+    file, table = tmp_path / "flexitac.mcap", tmp_path / "flexitac.csv"
+    status, _, errors = run("record", file, address, "--seconds", "3")
+    assert status == 0, errors
+    status, _, errors = run("export", file, table)
+    assert status == 0, errors
+    rows = [line.split(",") for line in table.read_text().splitlines()]
+    at = [rows[0].index(name) for name in ("x_mm", "y_mm", "area_cells")]
+    zones = [tuple(float(row[column]) for column in at) for row in rows[1:]]
+    found = [[zone] for zone in zones if zone[2]]
+    assert usual(found) == (*PLACE_MM, CELLS)
+
+
+def zones_of(board, seconds):
+    """Its frames for some time, as :func:`usual` takes them."""
+    found, until = [], time.monotonic() + seconds
+    while time.monotonic() < until:
+        found.append([(zone.x_mm, zone.y_mm, zone.area_cells) for zone in board.next(10.0)])
+    return found
+
+
+def test_over_the_network(address):
+    pytest.importorskip("zenoh")
+    from net_processes import free_endpoint, publish
+
+    with publish(address, "--listen", free_endpoint()) as publisher:
+        assert publisher.line.startswith("zenoh://"), publisher.end()
+        with contactfpga.open(publisher.line, timeout=60.0) as board:
+            assert (board.sheet.rows, board.sheet.columns, board.sheet.pitch_x_mm) == (ROWS, COLUMNS, PITCH_MM)
+            board.next(30.0)
+            assert usual(zones_of(board, 2.0)) == (*PLACE_MM, CELLS)
+            assert sum(board.stats.damaged.values()) > 3
+
+
+def test_as_ros_topics(address):
+    pytest.importorskip("cyclonedds")
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+    from net_processes import Child
+
+    from contactfpga.robot.ros import dds
+    from contactfpga.robot.ros.settings import TOPICS
+
+    domain, topic, found = 86, TOPICS["zones"], []  # a domain of this test alone
+    with dds.Publisher("other", domain) as other:  # a participant that finds those on this computer
+        named = Topic(other._participant, "rt/tactile/zones", dds.idl_type(topic.type))
+        reader = DataReader(other._participant, named, qos=dds.qos_of(topic))
+        with Child("-m", "contactfpga", "ros", address, "--domain", domain, "--namespace", "tactile") as command:
+            assert "publishing /tactile/zones" in command.line, command.end()
+            until = time.monotonic() + 30
+            while sum(bool(each.zones) for each in found) < 100 and time.monotonic() < until:
+                found += reader.take(100)
+                time.sleep(0.01)
+    zones = [[(round(1e3 * one.x, 3), round(1e3 * one.y, 3), one.area_cells) for one in each.zones] for each in found]
+    assert usual(zones) == (*PLACE_MM, CELLS)
+
+
+def test_in_the_view(address):
+    pytest.importorskip("viser")
+    pytest.importorskip("websockets")
+    from viewed import Page, camera
+
+    from contactfpga.tools.view import opening
+    from contactfpga_sim.lab.view.browser import running
+
+    with opening.opened(opening.ViewRequest(address, timeout=10.0), http_port=0) as shown, running(shown):
+        assert shown.hand is None, "nobody presses a real sheet with the mouse"
+        with Page(shown.web.get_port(), shown.guard) as page:
+            page.hear(lambda message: message["type"] == "ReplayDoneMessage")
+            page.say(camera((0.05, 0.02, 1.0)))
+            drawn = [_barycenters(page) for _ in range(10)]
+    wanted = tuple(np.float32(mm / 1000) for mm in PLACE_MM)
+    assert any(any(np.allclose(one[:2], wanted, atol=1e-6) for one in each) for each in drawn)
+
+
+def _barycenters(page):
+    """(n, 3) in m: the next that are drawn."""
+    message = page.hear(lambda one: one.get("name") == "/sheet/barycenters" and one.get("props", {}).get("points"))
+    return np.frombuffer(message["props"]["points"], np.float32).reshape(-1, 3)
