@@ -105,6 +105,13 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "diagrams",
+        title="Diagrams of the whole, of the skin, a touch, the wiring and a packet",
+        page="index.md",
+        minutes=0.5,
+        pictures="pictures:draw",
+    ),
+    Study(
         "failures",
         title="One knob after another until something breaks",
         page="failures.md",
