@@ -93,11 +93,22 @@ def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
     return writer.table(UNNOTICED, lines)
 
 
+SAID = {
+    "capacity": "No picture: the frame carries eight zones, however many there are.",
+    "project_reversal": "No picture: with and without guard lines the limit is the same.",
+    "diodes_reversal": "The picture is that of [`diodes`](#diodes).",
+    "broken_reversal": "The picture is that of [`broken`](#broken).",
+    "stuck_reversal": "The picture is that of [`stuck`](#stuck), without a mask.",
+    "host": "No picture: beyond the limit, frames are lost and counted.",
+    "silence": "No picture: the newest frame is as old as the silence is long.",
+}
+"""In place of a picture that would repeat another one, or a sentence."""
+
+
 def pictures() -> str:
-    """A heading and a picture for each knob."""
-    return "\n".join(
-        f"### `{knob.name}`\n\n![{knob.title}](images/failures/{knob.name}.svg)\n" for knob in KNOBS.values()
-    )
+    """A heading for each knob, and a picture or what is said in its place."""
+    shown = {name: f"![{knob.title}](images/failures/{name}.svg)" for name, knob in KNOBS.items()} | SAID
+    return "\n".join(f"### `{name}`\n\n{what}\n" for name, what in shown.items())
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
@@ -125,6 +136,6 @@ def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
 
 
 def draw_for_page(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """The same in a folder of their own among the pictures of the pages."""
+    """The same in a folder of their own among the pictures of the pages, without those that :data:`SAID` replaces."""
     (folder / "failures").mkdir(exist_ok=True)
-    return draw(folder / "failures", sweeps)
+    return draw(folder / "failures", {name: methods for name, methods in sweeps.items() if name not in SAID})
