@@ -31,9 +31,10 @@ def draw(path: Path) -> Path:
             for column in range(SIZE + 1):
                 if (row, column) != (SIZE, SIZE):
                     _cell(axes, row, column)
+        _gaps(axes)
         _words(axes)
         axes.set_xlim(-1.2, _x(SIZE) + 1.6)
-        axes.set_ylim(_y(SIZE) - 1.8, TOP + 2.0)
+        axes.set_ylim(_y(SIZE) - 1.7, TOP + 2.0)
         return style.save(figure, path)
 
 
@@ -103,6 +104,14 @@ def _cell(axes: Any, row: int, column: int) -> None:
     _line(axes, [(place - 0.13, y + 0.2), (place + 0.13, y + 0.2)], color)
     _line(axes, [(place, y + 0.2), (place, y)], color)
     _dot(axes, place, y, color)
+
+
+def _gaps(axes: Any) -> None:
+    """Where lines between the first ones and the last one are left out."""
+    for index in range(SIZE + 1):
+        for x, y, turn in ((_x(SIZE - 1) - 0.4, _y(index), 0), (_x(index), _y(SIZE - 1) + 1.2, 90)):
+            gap = {"boxstyle": "square,pad=0.05", "fc": style.CARD, "ec": "none"}
+            axes.text(x, y, "···", ha="center", va="center", rotation=turn, fontweight="bold", bbox=gap, zorder=4)
 
 
 def _words(axes: Any) -> None:
