@@ -165,6 +165,18 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "inexact",
+        title="Faults of labellers of others, in models of them",
+        page="rivals.md",
+        minutes=2,
+        sections={
+            "inexact_frames": Section(
+                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
+            ),
+        },
+        compute="scripts/measure_inexact.py:compute",
+    ),
+    Study(
         "kits",
         title="The kits, from the finger to the host",
         page="kits.md",
@@ -258,18 +270,6 @@ _ALL = (
             "loss": Section("tables:loss_table"),
         },
         extra="test",
-    ),
-    Study(
-        "inexact",
-        title="Faults of labellers of others, in models of them",
-        page="rivals.md",
-        minutes=2,
-        sections={
-            "inexact_frames": Section(
-                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
-            ),
-        },
-        compute="scripts/measure_inexact.py:compute",
     ),
     Study(
         "rivals",
