@@ -158,8 +158,10 @@ _ALL = (
             "felt": Section("tables:felt_table"),
             "pairs": Section("tables:pairs_table"),
             "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table"),
-            "breakpictures": Section("tables:breaks_pictures", sample="tables:breaks_pictures"),
+            "breaks": Section("tables:breaks_table", page="haptics_limits.md"),
+            "breakpictures": Section(
+                "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
+            ),
         },
         pictures="tables:draw",
         extra="test",
