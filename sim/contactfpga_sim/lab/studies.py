@@ -158,8 +158,10 @@ _ALL = (
             "felt": Section("tables:felt_table"),
             "pairs": Section("tables:pairs_table"),
             "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table"),
-            "breakpictures": Section("tables:breaks_pictures", sample="tables:breaks_pictures"),
+            "breaks": Section("tables:breaks_table", page="haptics_limits.md"),
+            "breakpictures": Section(
+                "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
+            ),
         },
         pictures="tables:draw",
         extra="test",
@@ -383,8 +385,8 @@ _ALL = (
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table"),
-            "ahead": Section("tables:ahead_table"),
+            "scores": Section("tables:scores_table", kept=r"\| 100 \||mean"),
+            "ahead": Section("tables:ahead_table", kept=r"\| 100 \|"),
             "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
         },
         pictures="tables:draw",
