@@ -14,7 +14,7 @@ from contactfpga_sim.lab.failures.tables import rows
 from contactfpga_sim.lab.haptics import breaks, felt, pairs, tables
 from contactfpga_sim.lab.haptics.breaks import KNOBS
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics_limits.md").read_text(encoding="utf-8")
 SLOW = ("shape", "skew", "edge")
 ALL = [(name, method) for name, knob in KNOBS.items() for method in knob.runs]
 QUICK = [
@@ -27,7 +27,7 @@ QUICK = [
 
 def on_page(name):
     """The lines of a knob in the page's table."""
-    table = section("haptics.md", "breaks").splitlines()[2:]
+    table = section("haptics_limits.md", "breaks").splitlines()[2:]
     starts = [at for at, line in enumerate(table) if line.startswith("| [")] + [len(table)]
     first = next(at for at in starts if f"(#{name})" in table[at])
     return table[first : starts[starts.index(first) + 1]]

@@ -165,11 +165,25 @@ _ALL = (
             "felt": Section("tables:felt_table"),
             "pairs": Section("tables:pairs_table"),
             "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table"),
-            "breakpictures": Section("tables:breaks_pictures", sample="tables:breaks_pictures"),
+            "breaks": Section("tables:breaks_table", page="haptics_limits.md"),
+            "breakpictures": Section(
+                "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
+            ),
         },
         pictures="tables:draw",
         extra="test",
+    ),
+    Study(
+        "inexact",
+        title="Faults of labellers of others, in models of them",
+        page="rivals.md",
+        minutes=2,
+        sections={
+            "inexact_frames": Section(
+                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
+            ),
+        },
+        compute="scripts/measure_inexact.py:compute",
     ),
     Study(
         "kits",
@@ -265,18 +279,6 @@ _ALL = (
             "loss": Section("tables:loss_table"),
         },
         extra="test",
-    ),
-    Study(
-        "inexact",
-        title="Faults of labellers of others, in models of them",
-        page="rivals.md",
-        minutes=2,
-        sections={
-            "inexact_frames": Section(
-                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
-            ),
-        },
-        compute="scripts/measure_inexact.py:compute",
     ),
     Study(
         "rivals",
@@ -390,8 +392,8 @@ _ALL = (
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table"),
-            "ahead": Section("tables:ahead_table"),
+            "scores": Section("tables:scores_table", kept=r"\| 100 \||mean"),
+            "ahead": Section("tables:ahead_table", kept=r"\| 100 \|"),
             "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
         },
         pictures="tables:draw",

@@ -1,4 +1,4 @@
-"""The tables and pictures of docs/haptics.md."""
+"""The tables and pictures of docs/haptics.md and docs/haptics_limits.md."""
 
 from __future__ import annotations
 
