@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rivals import exactness, linkruncca, placement
+from rivals import exactness, placement
 from rivals.house import Device, Netlists, Size
 from rivals.report import Measured, Row
 from rivals.rival import Rival, RivalError, Sheet
@@ -37,7 +37,7 @@ def measure(rival: Rival, clone: Path, sizes: Sequence[int], devices: Sequence[D
             netlists = placement.ours(labeller, lines)
             found = _placed(lines, labeller, netlists, devices, seeds, collides=False)
             rows.append(Row(lines, f"`{labeller}`", checked, None, found))
-    return Measured(rival, rival.digest(clone), linkruncca.version(), seeds, tuple(rows), digests)
+    return Measured(rival, rival.digest(clone), rival.converter(), seeds, tuple(rows), digests)
 
 
 def _rival(

@@ -85,4 +85,5 @@ LINK_RUN_CCA = Rival(
     blank_columns=2,
     blank_rows=1,
     convert=convert,
+    converter=version,
 )

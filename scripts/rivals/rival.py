@@ -60,6 +60,8 @@ class Rival:
     commit: str = ""
     sources: tuple[str, ...] = ()
     """Files of the clone that are converted."""
+    converter: Callable[[], str] = lambda: "none"
+    """Name and version of the program that ``convert`` runs."""
 
     def sheet(self, size: int) -> Sheet:
         return Sheet(size, self.blank_columns, self.blank_rows)

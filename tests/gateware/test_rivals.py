@@ -153,7 +153,7 @@ def test_a_labeller_that_finds_nothing_is_wrong_in_every_frame_that_has_a_zone(m
     some = frames(50)
     some[7] = False
     assert exactness.check_rival(SILENT, Sheet(4, 2, 1), some).wrong == 49
-    rival = dataclasses.replace(RIVAL, convert=lambda *_: SILENT)
+    rival = dataclasses.replace(RIVAL, convert=lambda *_: SILENT, converter=lambda: "none")
     monkeypatch.setitem(campaign.FRAMES, 4, 0)
     monkeypatch.setattr(campaign, "OURS", ())
     monkeypatch.setattr(Rival, "digest", lambda *_: "")

@@ -269,6 +269,18 @@ _ALL = (
         },
     ),
     Study(
+        "reader",
+        title="From the last byte to user code, by a thread and by a process",
+        page="performance.md",
+        minutes=5,
+        sections={
+            "reader_rest": Section("tables:rest_table"),
+            "reader_busy": Section("tables:busy_table"),
+            "reader_loop": Section("tables:loop_table"),
+            "reader_links": Section("tables:links_table"),
+        },
+    ),
+    Study(
         "recordings",
         title="Size of recordings, and loss by a killed program",
         page="recordings.md",
