@@ -5,12 +5,8 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("sphinx")
-pytest.importorskip("furo")
 pytest.importorskip("viser")
 pytest.importorskip("playwright")
-
-from sphinx.application import Sphinx
 
 from contactfpga_sim.lab.view import browser
 
@@ -30,6 +26,9 @@ MEASURED = "[document.documentElement.scrollWidth, document.documentElement.scro
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
+    pytest.importorskip("furo")
+    from sphinx.application import Sphinx
+
     built = tmp_path_factory.mktemp("site")
     application = Sphinx(DOCS, DOCS, built / "html", built / "doctrees", "html", status=None, warningiserror=True)
     application.build()

@@ -259,15 +259,19 @@ def test_a_click_in_a_browser_stops_the_arm():
     with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
         source = shown.source
         browser.tidy(visitor)  # its notice covers the arm
-        visitor.page.get_by_role("button", name="Start again").click()
 
         def command():
             return source.copies[0].sheets.data.ctrl[0]
 
-        until(visitor, lambda: command() == 0.8)
-        visitor.click(2 * X_MM, 150.0, "arm")  # on top
-        until(visitor, lambda: command() == 0.0)
-        assert source.links["arm"].fingers, "it is the mouse that stopped it, not the bar"
+        def stopped_by_a_click():
+            visitor.page.get_by_role("button", name="Start again").click()
+            until(visitor, lambda: command() == 0.8)
+            visitor.click(2 * X_MM, 150.0, "arm")  # on top
+            until(visitor, lambda: command() == 0.0)
+            return bool(source.links["arm"].fingers)
+
+        # On a busy machine the arm may meet the bar before the click arrives.
+        assert any(stopped_by_a_click() for _ in range(5)), "it is the mouse that stops it, not the bar"
         visitor.page.wait_for_selector("text=1 contact")
         visitor.page.get_by_role("button", name="Start again").click()
         until(visitor, lambda: command() == 0.8 and not source.links["arm"].fingers)
