@@ -251,7 +251,7 @@ def until(visitor, true):
     raise AssertionError("not within 90 s")
 
 
-@pytest.mark.slow  # 20 s
+@pytest.mark.campaign  # on a busy machine the page lags, and the arm is at the bar before the click
 @pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed")
 def test_a_click_in_a_browser_stops_the_arm():
     pytest.importorskip("playwright")
@@ -261,23 +261,20 @@ def test_a_click_in_a_browser_stops_the_arm():
         browser.tidy(visitor)  # its notice covers the arm
 
         def command():
-            return source.copies[0].sheets.data.ctrl[0]
+            copies = source.copies  # none while it starts again
+            return copies[0].sheets.data.ctrl[0] if copies else None
 
-        def stopped_by_a_click():
-            visitor.page.get_by_role("button", name="Start again").click()
-            until(visitor, lambda: command() == 0.8)
-            visitor.click(2 * X_MM, 150.0, "arm")  # on top
-            until(visitor, lambda: command() == 0.0)
-            return bool(source.links["arm"].fingers)
-
-        # On a busy machine the arm may meet the bar before the click arrives.
-        assert any(stopped_by_a_click() for _ in range(5)), "it is the mouse that stops it, not the bar"
+        visitor.page.get_by_role("button", name="Start again").click()
+        until(visitor, lambda: command() == 0.8)
+        visitor.click(2 * X_MM, 150.0, "arm")  # on top
+        until(visitor, lambda: command() == 0.0)
+        assert source.links["arm"].fingers, "it is the mouse that stopped it, not the bar"
         visitor.page.wait_for_selector("text=1 contact")
         visitor.page.get_by_role("button", name="Start again").click()
         until(visitor, lambda: command() == 0.8 and not source.links["arm"].fingers)
 
 
-@pytest.mark.slow  # 40 s
+@pytest.mark.campaign  # the same
 @pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed")
 def test_a_ball_is_dragged_in_the_way_of_three_arms():
     pytest.importorskip("playwright")
@@ -296,5 +293,5 @@ def test_a_ball_is_dragged_in_the_way_of_three_arms():
         until(visitor, lambda: np.linalg.norm(source.obstacle.at_m - before) > 0.04)
         visitor.page.mouse.up()
         assert source.obstacle.at_m == pytest.approx(before + [-0.05, -0.05, 0.0], abs=0.02)
-        until(visitor, lambda: all(copy.most_n["arm"] for copy in source.copies))
+        until(visitor, lambda: source.copies and all(copy.most_n["arm"] for copy in source.copies))
         visitor.page.wait_for_selector("text=ms since the touch")
