@@ -75,6 +75,16 @@ def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(mon
     assert "Tables: 10 of 10 wrong" in capsys.readouterr().out
 
 
+def test_results_of_a_run_of_all_tests_judge_the_claims(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(audit, "run", lambda tests: pytest.fail("the tests ran already"))
+    monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
+    monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
+    monkeypatch.setattr(audit, "PAGE", tmp_path / "audit.md")
+    (tmp_path / "tests.xml").write_text("<testsuite></testsuite>")
+    assert audit.main(["--seed", "1", "--results", str(tmp_path / "tests.xml")]) == 1
+    assert "Claims: 10 of 10 wrong" in capsys.readouterr().out
+
+
 def test_each_claim_names_tests_that_are_there():
     files = {path.stem for path in (audit.ROOT / "tests").rglob("test_*.py")}
     sections = audit.tomllib.loads((audit.ROOT / "tests" / "claims.toml").read_text())["section"]
