@@ -26,6 +26,7 @@ from contactfpga_sim.verify.cosim.compare import compare
 SMALL = {"rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000}
 TILTED = [[1, 1, 1], [127, -127, 3], [0, 0, -5], [1, -2, 1]]
 SKINS = {
+    "guard": Skin(**SMALL | {"baud": 500_000, "send": "on_change"}, units=2, guard=True),
     "sums": Skin(**SMALL, units=3, unit_sums=TILTED),
     "fail safe": Skin(**SMALL | {"clock_hz": 3_000_000, "baud": 750_000}, units=2, fail_safe=True, unit_sums=[[1, -1]]),
     "two copies": Skin(**SMALL, units=2, dual=True, fail_safe=True, unit_sums=[[1, -1]]),
@@ -39,7 +40,6 @@ SKINS = {
         alive=True,
     ),
     "adaptive": Skin(**SMALL | {"settle_us": 30}, units=4, scan="adaptive", unit_sums=[[1, 1, 1, 1]] * 2),
-    "guard": Skin(**SMALL | {"baud": 500_000, "send": "on_change"}, units=2, guard=True),
 }
 ALONE = {
     "one unit": Skin(**SMALL, units=1, unit_sums=[[1], [-1], [2]]),
