@@ -19,7 +19,7 @@ from rivals.house import all_departures, guarded, table_of
 from rivals.inexact import INEXACT, Inexact, Zone
 
 CELLS = 10
-"""On sheets of at most so many cells every frame is tried."""
+"""Every frame is tried on sheets of at most this many cells."""
 SIDE = 32
 """Rows and columns of the sheets of the others, and the most of the larger frames that are tried."""
 NOISE = 100
@@ -67,7 +67,7 @@ def large() -> Iterator[np.ndarray]:
 
 
 def sheets(side: int, cells: int) -> list[tuple[int, int]]:
-    """Sizes of at most so many rows, columns and cells, small ones first."""
+    """Rows and columns of each sheet with at most ``side`` of either and at most ``cells`` cells, small ones first."""
     every = [(rows, columns) for rows in range(1, side + 1) for columns in range(1, side + 1)]
     return sorted((one for one in every if one[0] * one[1] <= cells), key=lambda one: (one[0] * one[1], one))
 

@@ -136,6 +136,7 @@ def test_it_ends_with_a_killed_owner_that_has_a_child_of_its_own(board):
         process.kill()
         process.wait()
         wait_until(lambda: not alive(number), 5)
+        assert not alive(number)
 
 
 def test_its_end_is_told_of(board):

@@ -1,4 +1,4 @@
-"""What waits for one who listens to a board."""
+"""The queue of frames that wait for one listener of a board."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from contactfpga.zones.zone import Zones
 
 
 class FrameQueue:
-    """At most ``maxsize`` frames, errors and what is told between frames wait; beyond, the oldest are dropped. The
-    board's lock is held."""
+    """A queue of at most ``maxsize`` frames, errors and events between frames, which drops the oldest when it is full.
+    The caller holds the board's lock."""
 
     def __init__(self, maxsize: int, all_events: bool = False):
         self.maxsize = maxsize
         self.all_events = all_events
-        """Also what is told between frames."""
+        """Whether the queue also takes events between frames."""
         self.dropped = 0
         """Frames that were not taken in time."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()

@@ -243,8 +243,8 @@ class Link:
                     self._read_once(min(left, SIMULATED_READ_S))
 
     def linger(self, until: float, seconds: float) -> None:
-        """Let all come that comes until then, at most so many seconds. Raises what :meth:`wait_for` does but
-        :class:`ReadTimeout`; whatever is lost, the next call says so."""
+        """Receive until the moment ``until``, for at most ``seconds``. Raises as :meth:`wait_for`, except
+        :class:`ReadTimeout` and :class:`PortLost`, which the next call raises."""
         with contextlib.suppress(ReadTimeout, PortLost):
             self.wait_for(lambda: None, until, seconds)
 
@@ -271,7 +271,7 @@ class Link:
 
     @property
     def net(self) -> NetCounters | None:
-        """What is counted about the network; None: there is none."""
+        """The network's counters, or None for a port without a network."""
         return counters_of(self.transport)
 
     def _denied(self) -> int:
@@ -285,7 +285,7 @@ class Link:
             self._send()
 
     def take_what_came(self) -> None:
-        """Read what is there, where nobody else does."""
+        """Read the bytes that wait at a port which no thread reads."""
         if self.transport.threaded:
             return
         with self.changed:
@@ -392,11 +392,11 @@ class Said(Protocol):
 
     @property
     def stats(self) -> Stats:
-        """What came."""
+        """Counters of the packets that came."""
 
     @property
     def numbers(self) -> Collection[int]:
-        """Of sheets that packets said while no hello had come."""
+        """Numbers of the sheets whose packets came before any hello."""
 
 
 def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounters | None) -> ReadTimeout:

@@ -1,7 +1,7 @@
 """A process that reads one port for another process: it holds the conversation with the board, and puts what comes
 into memory that both share.
 
-:mod:`contactfpga.driver.remote` starts it and takes what it puts there. What it is told comes over a socket; it ends
+:mod:`contactfpga.driver.remote` starts the process and reads the memory. Requests come over a socket. The process ends
 with the process that started it, however that ends.
 """
 
@@ -42,7 +42,7 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitHistory, UnitSamples
 
 RING_BYTES = 4 << 20
-"""Of frames that wait: 16,384 and some more with a few zones each."""
+"""Size of the ring, enough for 16,384 waiting frames with a few zones each."""
 _STATS_BYTES, _FACTS_BYTES = 4096, 128 << 10
 _RING_AT = _STATS_BYTES + _FACTS_BYTES
 MEMORY_BYTES = _RING_AT + Ring.HEAD + RING_BYTES

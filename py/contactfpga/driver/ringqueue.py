@@ -72,7 +72,7 @@ class Cursor:
         self.place, self.taken, self._run = message.end, 0, None
 
     def drop(self, message: Message, most: int) -> int:
-        """Take at most so many frames of a message, or it as a whole if it is no frame; how many that were."""
+        """Take at most ``most`` frames of a message, or all of a message without frames; returns how many it took."""
         if message.frames - self.taken <= most or not message.frames:
             left = max(1, message.frames - self.taken)
             self.skip(message)
@@ -110,7 +110,7 @@ class Cursor:
 
 
 class RingQueue:
-    """What :class:`contactfpga.driver.subscription.FrameQueue` does, with frames that stay in the ring until they are
+    """What :class:`contactfpga.driver.framequeue.FrameQueue` does, with frames that stay in the ring until they are
     taken. At most ``maxsize`` wait, and no more than the ring holds; ``all_events``: also what is told between frames.
     """
 

@@ -1,5 +1,4 @@
-"""How soon frames reach user code with either reader: `python -m contactfpga_sim.lab.reader.tables`, in the folder of
-the sources.
+"""Tables of how soon frames reach user code with either reader.
 
 Methods take turns, so that what else the machine does is spread over all of them. Times are this machine's, and no
 figure that a test could hold; on one that is busy compare within a row.
@@ -11,7 +10,6 @@ import os
 
 import numpy as np
 
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.reader import latency, links, loop
 from contactfpga_sim.lab.reader.feeder import PACES, Pace
@@ -97,14 +95,3 @@ def conditions() -> str:
     """What else the machine did."""
     load = os.getloadavg()[0]
     return f"Measured with {os.cpu_count()} cores and a load of {load:.1f} at the end of this table."
-
-
-def main() -> int:
-    """Print the tables, each as soon as it is made."""
-    for table in (rest_table, busy_table, loop_table, links_table):
-        print(f"{table()}\n", flush=True)
-    return 0
-
-
-if __name__ == "__main__":
-    interrupt.leave(interrupt.guarded(main))
