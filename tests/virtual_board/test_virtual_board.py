@@ -142,15 +142,16 @@ def test_a_slow_board_says_which_clock_would_hold(skin, share, told):
 
 
 def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatch, capsys):
-    monkeypatch.setattr(pty_board, "SLIP_WINDOW_S", 0.3)
-    with PtyBoard(SLOW, "full") as board:
-        run = board._board.advance
+    monkeypatch.setattr(pty_board, "SLIP_WINDOW_S", 0.6)
+    board = PtyBoard(SLOW, "full")
+    run = board._board.advance
 
-        def drag(cycles):
-            time.sleep(3 * cycles / SLOW.clock_hz)
-            run(cycles)
+    def drag(cycles):
+        time.sleep(5 * cycles / SLOW.clock_hz)
+        run(cycles)
 
-        board._board.advance = drag
+    board._board.advance = drag  # before it starts: at most a fifth of real time from the first window on
+    with board:
         deadline, told = time.monotonic() + 20, ""
         while "slower than real time" not in told and time.monotonic() < deadline:
             time.sleep(0.05)
