@@ -1,4 +1,4 @@
-"""Long tables of pages: a page keeps the rows that matter, and a file beside it has all, as comma-separated values."""
+"""Long tables of pages: a page keeps the rows that matter, a CSV file has all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
 
 FOLDER = "tables"
-"""In the folder of the pages."""
+"""Folder of the CSV files within the pages."""
 _TABLE = re.compile(r"(?:^\|.*\|(?:\n|\Z))+", re.MULTILINE)
 _HEAD = 2
 """Lines of a table above its rows."""
@@ -19,8 +19,8 @@ _PARTED = re.compile(rf"^(?:\|.*\n)+\nAll \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)
 
 
 def part(text: str, kept: str, file: Path) -> str:
-    """A section with those rows of its longest table that the regular expression ``kept`` finds something in, and a
-    link to all of them, which are written to the file."""
+    """A section with only the rows of its longest table that match the regular expression ``kept``, and a link to the
+    file with all."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]
@@ -32,7 +32,7 @@ def part(text: str, kept: str, file: Path) -> str:
 
 
 def whole(page: Path, name: str) -> str:
-    """A section of a page as its study made it, with all rows of its tables."""
+    """A section of a page with all rows, as its study made it."""
     text = writer.sections(page.read_text(encoding="utf-8"))[name].text
     return _PARTED.sub(lambda found: _table((page.parent / found[1]).read_text(encoding="utf-8")), text)
 

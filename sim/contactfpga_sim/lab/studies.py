@@ -1,4 +1,4 @@
-"""What each study makes, and what it takes: one entry a study, in the order of their names."""
+"""The studies' outputs and needs, in the order of their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes what `contactfpga fit` chooses for the examples into docs/fit.md."""
+"""Writes the choices of `contactfpga fit` for the examples into docs/fit.md."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga_sim.lab.fit.search import fit
 
 
 def section(arguments: str) -> str:
-    """The command and what it says, but for the settings that Skin itself refuses."""
+    """The command and its output, except settings that Skin itself refuses."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
