@@ -5,12 +5,12 @@ import itertools
 import json
 import math
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from amaranth.back import rtlil
 from fake_board import FakeBoard
+from recorded_frames import recorded
 from sample import sample
 from scipy import ndimage
 
@@ -30,7 +30,6 @@ from contactfpga_sim.verify.cosim.covering import stimulus
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 SHEET = Skin(rows=13, columns=6, pitch_x_mm=3.4, pitch_y_mm=5.0, report="barycenter", barycenter_bits=3)
 
 
@@ -88,11 +87,7 @@ LONG = ("sdh13x6", "feet45x52", "bed64x32", "popu64x27")
 @pytest.mark.recordings
 @pytest.mark.parametrize("name", ["dtmf16x16", *(pytest.param(name, marks=pytest.mark.campaign) for name in LONG)])
 def test_recordings_have_scipys_barycenters_rounded(record_property, name):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"]
+    frames = recorded(name)
     frames = frames[:: max(1, len(frames) // 1000)]
     assert_replayed(frames, 4, most=64)  # the board of the test above where the sheet is the same
     record_property("cases", len(frames))

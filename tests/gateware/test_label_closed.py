@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import zone_oracles
-from zone_oracles import RING, RULES, WOUND, every_frame, recorded, skin_of
+from recorded_frames import recorded
+from zone_oracles import RING, RULES, WOUND, every_frame, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model.golden import all_departures, label

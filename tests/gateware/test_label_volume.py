@@ -2,10 +2,10 @@
 
 import itertools
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_frames import RECORDINGS, recorded
 from sample import sample
 
 from contactfpga.choices.labellers import LABELLERS
@@ -18,8 +18,6 @@ EXACT = tuple(name for name, labeller in LABELLERS.items() if labeller.exact)
 BOTH = pytest.mark.parametrize("labeller", EXACT)
 RULES = (*itertools.product((8, 4), EXACT),)  # each costs a compiler's run for every size of sheet
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 SQUARES = (8, 16, 33, 64)
 RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a tenth
     (1, 1): 200,
@@ -177,11 +175,7 @@ def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivit
     ),
 )
 def test_recordings(benches, record_property, name, connectivity, labeller):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"]
+    frames = recorded(name)
     check_exact(benches(*frames.shape[1:], connectivity, labeller), frames)
     record_property("cases", len(frames))
 

@@ -1,9 +1,6 @@
 """Zones by scipy, of closed sheets on many turns of the sheet side by side and of labellers that are not exact."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 from scipy import ndimage
 
 from contactfpga import Skin
@@ -13,7 +10,6 @@ CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
 RULES = [(connectivity, labeller) for labeller in CLOSED for connectivity in (8, 4)]
 RING, WOUND = -1, -2
 """In place of the sum of the columns."""
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
 def skin_of(rows, columns, connectivity, labeller):
@@ -85,14 +81,6 @@ def every_frame(rows, columns, first=0, count=None):
     cells = rows * columns
     numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
     return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
-
-
-def recorded(name):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        return file["pressed"]
 
 
 def moments(cells):

@@ -3,19 +3,16 @@
 import functools
 import itertools
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_frames import RECORDINGS, recorded
 from sample import sample
 from scipy import ndimage
 
 from contactfpga.tools import cli
 from contactfpga_sim.model.board import replay
 from contactfpga_sim.model.scenes.shapes import variants
-
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 
 
 def scipy_zones(cells, connectivity):
@@ -68,11 +65,7 @@ def test_shapes_that_break_labellers(record_property):
     sample([("dtmf16x16", 3000), *((name, None) for name in RECORDINGS)], quick=[("dtmf16x16", 3000)]),
 )
 def test_recordings_have_scipys_zones(record_property, name, most):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"][:most]
+    frames = recorded(name)[:most]
     assert_zones_are_scipys(frames, 8)
     record_property("cases", len(frames))
 
