@@ -4,7 +4,6 @@ import contextlib
 import itertools
 import json
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from fake_board import FakeBoard
 from recorded_frames import recorded
 from sample import sample
 from scipy import ndimage
+from zone_oracles import nearest, zones_by_scipy
 
 import contactfpga
 from contactfpga import Skin
@@ -33,18 +33,9 @@ pytestmark = pytest.mark.usefixtures("_closed_ports")
 SHEET = Skin(rows=13, columns=6, pitch_x_mm=3.4, pitch_y_mm=5.0, report="barycenter", barycenter_bits=3)
 
 
-def nearest(total, area, bits):
-    """The nearest step of 1/2^bits, half a step upward."""
-    return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
-
-
 def rounded_zones(cells, bits, connectivity=8):
     """Sorted (area, x, y) of scipy's zones, x and y in steps."""
-    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
-    y, x = np.nonzero(labels)
-    number = labels[y, x]
-    sums = [np.bincount(number, weights, count + 1)[1:] for weights in (None, x, y)]
-    zones = zip(*(np.asarray(column, int).tolist() for column in sums))
+    zones = zones_by_scipy(cells, connectivity)
     return sorted((area, nearest(sum_x, area, bits), nearest(sum_y, area, bits)) for area, sum_x, sum_y in zones)
 
 

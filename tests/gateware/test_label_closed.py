@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import zone_oracles
 from recorded_frames import recorded
-from zone_oracles import RING, RULES, WOUND, every_frame, skin_of
+from zone_oracles import RING, RULES, WOUND, cells_of, every_frame, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model.golden import all_departures, label
@@ -35,10 +35,6 @@ SHAPES = {
     "ring with a tail of five turns": ("### " + "#.. .#. ..# " * 5, [(18, RING, 120)]),
     "two arms, either side of the seam": (".#..#.# .####.# #.....# #######", [(17, RING, 30)]),
 }  # fmt: skip
-
-
-def cells_of(picture):
-    return np.array([[mark == "#" for mark in line] for line in picture.split()])
 
 
 def simulated(bench, frames, connectivity, labeller, rng=None, gap=0.0, stall=0.0):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from recorded_frames import RECORDINGS, recorded
 from sample import sample
+from zone_oracles import every_frame
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
@@ -47,12 +48,6 @@ def benches() -> Iterator[dict]:
     yield bench
     for one in built.values():
         one.close()
-
-
-def every_frame(rows: int, columns: int, first: int = 0, count: int | None = None) -> np.ndarray:
-    cells = rows * columns
-    numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
-    return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
 
 
 def random_frames(rows: int, columns: int, count: int, seed: int) -> np.ndarray:

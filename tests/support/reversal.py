@@ -4,7 +4,6 @@ import dataclasses
 import itertools
 
 import numpy as np
-from scipy import ndimage
 
 from contactfpga import examples
 from contactfpga.skin import Skin
@@ -180,13 +179,3 @@ def held(skin: Skin, timeline: Timeline, begin: int, end: int) -> np.ndarray:
     for place in skin.mask:
         closed[place] = False
     return closed
-
-
-def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
-    """Sorted (area, sum of x, sum of y), by scipy."""
-    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
-    found = []
-    for number in range(1, count + 1):
-        ys, xs = np.nonzero(labels == number)
-        found.append((len(ys), int(xs.sum()), int(ys.sum())))
-    return sorted(found)
