@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import zone_oracles
+from bench import split
 from recorded_frames import recorded
 from zone_oracles import RING, RULES, WOUND, cells_of, every_frame, skin_of
 
@@ -56,14 +57,6 @@ def simulated(bench, frames, connectivity, labeller, rng=None, gap=0.0, stall=0.
         80 * len(words) * (columns + 2), until=lambda: sum(word >> end for _, word in sink.transfers) == len(frames)
     )
     return source.transfers, [(cycle, None if word >> end else split(word, widths)) for cycle, word in sink.transfers]
-
-
-def split(word, widths):
-    fields = []
-    for width in widths:
-        fields.append(word & (1 << width) - 1)
-        word >>= width
-    return tuple(fields)
 
 
 def check_simulated(bench, frames, connectivity, labeller):

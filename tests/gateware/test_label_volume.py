@@ -1,7 +1,6 @@
 """The compiled labeller on very many frames: every record with its exact cycle, against the golden model."""
 
 import itertools
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -33,21 +32,6 @@ RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a te
 }
 QUICK_RANDOM = [((8, 8), 8, "run")]
 SLOW_RANDOM = [((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES if "run" in rule)]
-
-
-@pytest.fixture(scope="module")
-def benches() -> Iterator[dict]:
-    built: dict[Skin, LabelBench] = {}
-
-    def bench(rows: int, columns: int, connectivity: int, labeller: str) -> LabelBench:
-        skin = Skin(rows=rows, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=20.0)
-        if skin not in built:
-            built[skin] = LabelBench(skin)
-        return built[skin]
-
-    yield bench
-    for one in built.values():
-        one.close()
 
 
 def random_frames(rows: int, columns: int, count: int, seed: int) -> np.ndarray:

@@ -31,13 +31,13 @@ def small(**fields) -> Skin:
     return Skin(**{"scan": "reversal", "rows": 3, "columns": 4, **times, **rates, **fields})
 
 
-def checked_soon(monkeypatch) -> None:
-    """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
-    monkeypatch.setattr(reversal, "RETRY_BIT", 8)
-    monkeypatch.setattr(guard, "RETRY_US", 2**8)
+def checked_soon(monkeypatch, check_bit: int = 5, retry_bit: int = 8) -> None:
+    """A sheet at rest is checked every 2^check_bit us, and what is told is renewed every 2^retry_bit us."""
+    monkeypatch.setattr(reversal, "RETRY_BIT", retry_bit)
+    monkeypatch.setattr(guard, "RETRY_US", 2**retry_bit)
     for module in (reversal, reversal_guard):
-        monkeypatch.setattr(module, "CHECK_BIT", 5)
-    monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)
+        monkeypatch.setattr(module, "CHECK_BIT", check_bit)
+    monkeypatch.setattr(golden_guard, "CHECK_US", 2**check_bit)
 
 
 def never_let_go(monkeypatch) -> None:
