@@ -65,7 +65,7 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section("tables:front_table", kept=r"\*\*|reversal"),
+            "front": Section("tables:front_table", kept=r"\*\*"),
             "families": Section(
                 "tables:families_table",
                 kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, (caps|paper)|projection, .*tiles|\*.*) \| \d",
@@ -131,7 +131,7 @@ _ALL = (
         page="failures.md",
         minutes=10,
         sections={
-            "failures": Section("tables:table", kept=r"^\| \[(?!Switches [^]]*, by line reversal|[^]]*broken, by)"),
+            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal)"),
             "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
             "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)"),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
