@@ -14,18 +14,16 @@ _ALL = (
             "matters": Section("tables:matters_text"),
             "places": Section(
                 "tables:places_table",
-                kept=r"^\| (flush, .*|buttons|caps|tiles) \| 10 \| 1 \| 5 |^\| (flush|tiles) \| 6.4 \| 0.4 \| 5 ",
+                kept=r"^\| (flush, .*|buttons|tiles) \| 10 \| 1 \| 5 |^\| tiles \| 6.4 \| 0.4 \| 5 ",
             ),
             "effects": Section(
                 "tables:effects_table",
-                kept="(force|1) . (tiles|0.2) |latency|paper's sheet . (pitch|foam)|tiles . threshold, N . 0.4 . 0.2",
+                kept=NO_ROW,
             ),
-            "set": Section(
-                "tables:set_table", kept=r"^\| (detected|reacts|speed stays|sensor torque|contact force|peak force)"
-            ),
+            "set": Section("tables:set_table", kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)"),
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),
-            "defense": Section("tables:defense_table"),
+            "defense": Section("tables:defense_table", kept="switch"),
             "pushes": Section("tables:push_table", sample="tables:push_table"),
             "failures": Section(
                 "tables:failure_table",
@@ -68,7 +66,7 @@ _ALL = (
             "front": Section("tables:front_table", kept=r"\*\*"),
             "families": Section(
                 "tables:families_table",
-                kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, (caps|paper)|projection, .*tiles|\*.*) \| \d",
+                kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
             ),
             "methods": Section("tables:methods_table", kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|"),
             "host": Section("tables:host_table", kept=r"\| (9|10|28|29|91|92) \|"),
@@ -131,7 +129,7 @@ _ALL = (
         page="failures.md",
         minutes=10,
         sections={
-            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal)"),
+            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed"),
             "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
             "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)"),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
@@ -145,10 +143,10 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-            "fingers": Section("tables:fingers_section", kept="20x20|23x23|answer|runner"),
-            "bumper": Section("tables:bumper_section", kept="answer|runner"),
-            "hands": Section("tables:hands_section", kept="answer|runner"),
-            "sole": Section("tables:sole_section", kept="answer|runner"),
+            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner"),
+            "bumper": Section("tables:bumper_section", kept="the answer"),
+            "hands": Section("tables:hands_section", kept="the answer"),
+            "sole": Section("tables:sole_section", kept="the answer"),
         },
         extra="chart",
     ),
