@@ -70,7 +70,7 @@ _ALL = (
             ),
             "methods": Section("tables:methods_table", kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|"),
             "host": Section("tables:host_table", kept=r"\| (9|10|28|29|91|92) \|"),
-            "floor": Section("limits:floor_table", kept=r"(\| finger|bumper) \| tiles \| 6.4 mm"),
+            "floor": Section("limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm"),
             "other_ways": Section("limits:rivals_section", kept="6.4 mm"),
         },
         compute="tables:compute",
@@ -104,7 +104,7 @@ _ALL = (
         minutes=3,
         sections={
             "closes": Section("caps:felt_table", sample="caps:felt_sample"),
-            "elements": Section("caps:elements_table", page="paper.md"),
+            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
             "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
@@ -271,7 +271,7 @@ _ALL = (
         sections={
             "reference": Section("scans:reference_table", sample="scans:reference_sample"),
             "labeller": Section(
-                "labellers:labeller_table", sample="labellers:labeller_sample", kept=r"\| (16x16|64x64) \| 8 \|"
+                "labellers:labeller_table", sample="labellers:labeller_sample", kept=r"\| 16x16 \| 8 \|"
             ),
             "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
