@@ -15,12 +15,12 @@ FOLDER = "tables"
 _TABLE = re.compile(r"(?:^\|.*\|(?:\n|\Z))+", re.MULTILINE)
 _HEAD = 2
 """Lines of a table above its rows."""
-_PARTED = re.compile(rf"^(?:\|.*\n)+\nAll \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE)
+_PARTED = re.compile(rf"^(?:(?:\|.*\n)+\n)?All \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE)
 
 
 def part(text: str, kept: str, file: Path) -> str:
     """A section with only the rows of its longest table that match the regular expression ``kept``, and a link to the
-    file with all."""
+    file with all. If no row matches, only the link stays."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]
@@ -28,7 +28,7 @@ def part(text: str, kept: str, file: Path) -> str:
     file.parent.mkdir(exist_ok=True)
     write_text(file, _csv(lines))
     link = f"All [{len(rows)} rows]({FOLDER}/{file.name})."
-    return text.replace(table, "\n".join([*lines[:_HEAD], *shown, "", link]), 1)
+    return text.replace(table, "\n".join([*lines[:_HEAD], *shown, "", link] if shown else [link]), 1)
 
 
 def whole(page: Path, name: str) -> str:

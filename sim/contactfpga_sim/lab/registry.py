@@ -16,6 +16,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+NO_ROW = "^$"
+"""For :attr:`Section.kept`: the page has a link to the table instead of rows of it."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Section:

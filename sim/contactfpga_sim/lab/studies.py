@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.lab.registry import Section, Study
+from contactfpga_sim.lab.registry import NO_ROW, Section, Study
 
 _ALL = (
     Study(
@@ -12,15 +12,24 @@ _ALL = (
         minutes=12,
         sections={
             "matters": Section("tables:matters_text"),
-            "places": Section("tables:places_table"),
-            "effects": Section("tables:effects_table"),
-            "set": Section("tables:set_table"),
+            "places": Section(
+                "tables:places_table",
+                kept=r"^\| (flush, .*|buttons|tiles) \| 10 \| 1 \| 5 |^\| tiles \| 6.4 \| 0.4 \| 5 ",
+            ),
+            "effects": Section(
+                "tables:effects_table",
+                kept=NO_ROW,
+            ),
+            "set": Section("tables:set_table", kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)"),
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),
-            "defense": Section("tables:defense_table"),
+            "defense": Section("tables:defense_table", kept="switch"),
             "pushes": Section("tables:push_table", sample="tables:push_table"),
-            "failures": Section("tables:failure_table"),
-            "steps": Section("tables:step_table"),
+            "failures": Section(
+                "tables:failure_table",
+                kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
+            ),
+            "steps": Section("tables:step_table", kept=NO_ROW),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -54,12 +63,15 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section("tables:front_table"),
-            "families": Section("tables:families_table"),
-            "methods": Section("tables:methods_table", kept=r"^\| \*{0,2}\w+, 6.4 mm, \w+(, 0.2 N\*\*)? \|"),
-            "host": Section("tables:host_table"),
-            "floor": Section("limits:floor_table", kept="6.4 mm"),
-            "other_ways": Section("limits:rivals_section"),
+            "front": Section("tables:front_table", kept=r"\*\*"),
+            "families": Section(
+                "tables:families_table",
+                kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
+            ),
+            "methods": Section("tables:methods_table", kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|"),
+            "host": Section("tables:host_table", kept=r"\| (9|10|28|29|91|92) \|"),
+            "floor": Section("limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm"),
+            "other_ways": Section("limits:rivals_section", kept="6.4 mm"),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -92,11 +104,11 @@ _ALL = (
         minutes=3,
         sections={
             "closes": Section("caps:felt_table", sample="caps:felt_sample"),
-            "elements": Section("caps:elements_table", page="paper.md"),
+            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
-            "rules": Section("tables:rules_table", page="paper.md"),
-            "failing": Section("tables:failing_table", page="paper.md"),
+            "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
+            "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
             "sense": Section("tables:sense_table"),
             "thinning": Section("tables:thinning_table", sample="tables:thinning_table"),
             "foams": Section("tables:foam_table", sample="tables:foam_table"),
@@ -117,9 +129,9 @@ _ALL = (
         page="failures.md",
         minutes=10,
         sections={
-            "failures": Section("tables:table", kept=r"^\| \["),
-            "closed": Section("tables:closed"),
-            "unnoticed": Section("tables:unnoticed"),
+            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed"),
+            "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
+            "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)"),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
@@ -131,10 +143,10 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-            "fingers": Section("tables:fingers_section", kept="12x12|16x16|20x20|23x23|host|answer|runner"),
-            "bumper": Section("tables:bumper_section", kept="10x10|11x11|host|answer|runner"),
-            "hands": Section("tables:hands_section", kept="12x12|14x14|15x15|host|answer|runner"),
-            "sole": Section("tables:sole_section", kept="20x8|22x9|host|answer|runner"),
+            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner"),
+            "bumper": Section("tables:bumper_section", kept="the answer"),
+            "hands": Section("tables:hands_section", kept="the answer"),
+            "sole": Section("tables:sole_section", kept="the answer"),
         },
         extra="chart",
     ),
@@ -145,8 +157,8 @@ _ALL = (
         minutes=30,
         sections={
             "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table"),
-            "modules": Section("tables:modules_table"),
+            "flipped": Section("tables:designs_table", kept="of registers"),
+            "modules": Section("tables:modules_table", kept="(scan|label) .*`"),
             "ways": Section("tables:ways_table", kept="silently wrong"),
         },
         compute="tables:compute",
@@ -165,7 +177,7 @@ _ALL = (
             "felt": Section("tables:felt_table"),
             "pairs": Section("tables:pairs_table"),
             "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table", page="haptics_limits.md"),
+            "breaks": Section("tables:breaks_table", page="haptics_limits.md", kept=r"^\| \["),
             "breakpictures": Section(
                 "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
             ),
@@ -232,9 +244,9 @@ _ALL = (
         page="mutants.md",
         minutes=90,
         sections={
-            "mutants": Section("tables:mutants_table"),
-            "options": Section("tables:options_table"),
-            "several": Section("tables:several_table"),
+            "mutants": Section("tables:mutants_table", kept=r"^\| all"),
+            "options": Section("tables:options_table", kept=r"^\| all"),
+            "several": Section("tables:several_table", kept=r"^\| all"),
         },
         compute="tables:compute",
     ),
@@ -258,14 +270,18 @@ _ALL = (
         minutes=5,
         sections={
             "reference": Section("scans:reference_table", sample="scans:reference_sample"),
-            "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample"),
-            "report": Section("scans:report_table", sample="scans:report_sample"),
+            "labeller": Section(
+                "labellers:labeller_table", sample="labellers:labeller_sample", kept=r"\| 16x16 \| 8 \|"
+            ),
+            "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
             "bridges": Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
-            "sides": Section("scans:sides_table", sample="scans:sides_sample"),
-            "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table"),
-            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",)),
-            "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",)),
+            "sides": Section("scans:sides_table", sample="scans:sides_sample", kept=NO_ROW),
+            "gain": Section(
+                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole|nothing"
+            ),
+            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
+            "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
         },
     ),
     Study(
@@ -298,10 +314,10 @@ _ALL = (
         page="rivals.md",
         minutes=60,
         sections={
-            "rivals_made_of": Section("scripts/measure_rivals.py:provenance"),
-            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table"),
-            "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md"),
+            "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
+            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16"),
+            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16"),
+            "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md", kept="16x16"),
         },
         compute="scripts/measure_rivals.py:compute",
         extra="boards",
@@ -367,7 +383,7 @@ _ALL = (
         page="performance.md",
         minutes=60,
         sections={
-            "gateware": Section("tables:gateware_table", of_netlists=True),
+            "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole"),
             "faults": Section("tables:faults_table", of_netlists=True),
             "units_size": Section("tables:units_table", page="units.md", of_netlists=True),
             "boards": Section("tables:boards_table", page="boards.md"),
@@ -389,7 +405,7 @@ _ALL = (
         page="mutants.md",
         minutes=60,
         sections={
-            "tested": Section("scripts/tested_mutants.py:table"),
+            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| (units|all)"),
             "left": Section("scripts/tested_mutants.py:left"),
         },
         compute="scripts/tested_mutants.py:compute",

@@ -1,8 +1,15 @@
 """Arm, gear motor, foam and touched things as one system of equations, integrated with a fixed step.
 
 The state is (theta, omega, current, then position and speed of each thing that gives way): theta in rad from the first
-touch, positive into the obstacle; with a stiff gear (J + N^2 J_r) d omega/dt = N k i - sum d F. The torque sensor
-between motor and arm reads J d omega/dt + sum d F: it falls when the motor turns back, while F still rises.
+touch, positive into the obstacle.
+
+- Joint with a stiff gear: (J + N^2 J_r) d omega/dt = N k i - sum d F.
+- Motor: L di/dt = u - R i - N k omega, with the voltage u = K (i_ref - i) + R i_ref + N k omega within the supply.
+- Foam pressed in by delta: F = K_s delta^1.5 (1 + c d delta/dt), and K_b (delta - e) more once foam of thickness e is
+  pressed flat on its base.
+
+The torque sensor sits between motor and arm and reads J d omega/dt + sum d F: it falls when the motor turns back, while
+F still rises.
 """
 
 from __future__ import annotations

@@ -166,7 +166,7 @@ FAILING: dict[str, Rule] = {
     "Gauss-Legendre, 64": _raw_gauss(64),
     "16 nodes, sin², δ_c short by 1e-8": _off(1e-8, 16),
     "256 nodes, sin², δ_c short by 1e-8": _off(1e-8, 256),
-    "16 nodes, sin², that short, factored": _off_factored(1e-8),
+    "16 nodes factored, δ_c short by 1e-8": _off_factored(1e-8),
     "Euler on v = √v²(δ), 100 steps": _euler(0.01),
 }
 
