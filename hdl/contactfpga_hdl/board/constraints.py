@@ -9,15 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.boards import BOARDS
-from contactfpga.boards.spec import NAME, UNIT_PORTS, BoardSpec, column_wires, row_wires
-from contactfpga.skin import Skin
+from contactfpga.boards.spec import NAME, UNIT_PORTS, BoardSpec
 from contactfpga_hdl.board.build import plan_for
 from contactfpga_hdl.board.sites import connector_sites
 
 PAGE = Path("docs/boards.md")
 FOLDER = Path("constraints")
-CHAINS = 8
-"""The tables list the data pins of this many chains: with them one chip per chain is enough for 64 lines."""
 
 
 def constraints(board: BoardSpec) -> str:
@@ -32,25 +29,14 @@ def constraints(board: BoardSpec) -> str:
 
 
 def pin_tables(board: BoardSpec) -> str:
-    """Which wire goes where, as Markdown: one pin per line, and shift registers."""
+    """Which row and column is on which pin, as Markdown; wires to shift registers use the same pins in this order."""
     units = dict(zip(board.converter, UNIT_PORTS, strict=True))
     rows = [(f"{row} or `{units[pin]}`" if pin in units else str(row), pin) for row, pin in enumerate(board.row_side)]
     columns = [
         (f"{column} or `alive`" if pin == board.alive else str(column), pin)
         for column, pin in enumerate(board.column_side)
     ]
-    direct = _table(board, {"row": rows, "column": [*columns, ("`contact`", board.contact)]})
-    most = Skin(row_drive="74hc595", column_read="74hc165", row_chains=CHAINS, column_chains=CHAINS)
-    registers = {"74HC595": row_wires(most), "74HC165": column_wires(most)}
-    pins = board.pins(most)
-    wires = {chip: [wire for name in ports for wire in _named(name, pins[name])] for chip, ports in registers.items()}
-    return f"{direct}\n\n{_table(board, wires)}"
-
-
-def _named(port: str, pins: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Each wire of a port with its pin."""
-    names = [f"`{port}`"] if len(pins) == 1 else [f"`{port}[{bit}]`" for bit in range(len(pins))]
-    return list(zip(names, pins, strict=True))
+    return _table(board, {"row": rows, "column": [*columns, ("`contact`", board.contact)]})
 
 
 def _table(board: BoardSpec, sides: Mapping[str, list[tuple[str, str]]]) -> str:
