@@ -41,8 +41,8 @@ _ALL = (
         minutes=4,
         sections={
             "outages": Section("tables:outages_table"),
-            "registration": Section("tables:registration_table"),
-            "folds": Section("tables:folds_table", sample="tables:folds_sample"),
+            "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| [46]"),
+            "folds": Section("tables:folds_table", kept=r"^\| [25] ", sample="tables:folds_sample"),
         },
         pictures="tables:draw",
         extra="test",
@@ -103,15 +103,19 @@ _ALL = (
         page="cover.md",
         minutes=3,
         sections={
-            "closes": Section("caps:felt_table", sample="caps:felt_sample"),
+            "closes": Section("caps:felt_table", kept="6.4 mm|the paper", sample="caps:felt_sample"),
             "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
             "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
             "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
-            "sense": Section("tables:sense_table"),
-            "thinning": Section("tables:thinning_table", sample="tables:thinning_table"),
-            "foams": Section("tables:foam_table", sample="tables:foam_table"),
+            "sense": Section("tables:sense_table", kept=r"R\* = 2 mm"),
+            "thinning": Section(
+                "tables:thinning_table", kept=r"^\| (6|0.895|0.252) ms", sample="tables:thinning_table"
+            ),
+            "foams": Section(
+                "tables:foam_table", kept=r"^\| (PORON 4701-30, 320|Plastazote|Sylodyn)", sample="tables:foam_table"
+            ),
         },
         pictures="tables:draw",
         extra="test",
@@ -171,11 +175,15 @@ _ALL = (
         page="haptics.md",
         minutes=5,
         sections={
-            "layouts": Section("tables:layouts_table", sample="tables:layouts_table"),
-            "places": Section("tables:places_table"),
-            "wrong": Section("tables:wrong_table"),
-            "felt": Section("tables:felt_table"),
-            "pairs": Section("tables:pairs_table"),
+            "layouts": Section(
+                "tables:layouts_table", kept="mid-length, 60|at one end|best of all", sample="tables:layouts_table"
+            ),
+            "places": Section(
+                "tables:places_table", kept=r"^\| (barycenter \| 10|set \| 5|closings \| 5|center of pressure \| 10)"
+            ),
+            "wrong": Section("tables:wrong_table", kept="30 %|drifted"),
+            "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|"),
+            "pairs": Section("tables:pairs_table", kept="60 mm"),
             "limits": Section("tables:limits_table"),
             "breaks": Section("tables:breaks_table", page="haptics_limits.md", kept=r"^\| \["),
             "breakpictures": Section(
@@ -207,8 +215,12 @@ _ALL = (
             "times": Section("tables:times_table"),
             "built": Section("tables:built_table"),
             "pins": Section("tables:pins_table"),
-            "parts": Section("tables:parts_table", sample="tables:parts_table"),
-            "predictions": Section("tables:predictions_table", sample="tables:predictions_table"),
+            "parts": Section("tables:parts_table", kept=r"^\| fast", sample="tables:parts_table"),
+            "predictions": Section(
+                "tables:predictions_table",
+                kept=r"`(contact_worst|last_byte_median|break_worst|settle)_us|`felt_half_n|`row_ma",
+                sample="tables:predictions_table",
+            ),
         },
         compute="tables:compute",
         extra="boards",
@@ -257,8 +269,8 @@ _ALL = (
         minutes=2,
         sections={
             "batch": Section("tables:batch_table"),
-            "links": Section("tables:links_table"),
-            "thousand": Section("tables:thousand_table"),
+            "links": Section("tables:links_table", kept=r"^\| (1|16|64) "),
+            "thousand": Section("tables:thousand_table", kept="network|readers"),
         },
         pictures="tables:draw",
         extra="test",
@@ -275,13 +287,13 @@ _ALL = (
             ),
             "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
-            "bridges": Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
-            "sides": Section("scans:sides_table", sample="scans:sides_sample", kept=NO_ROW),
-            "gain": Section(
-                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole|nothing"
+            "bridges": Section(
+                "bridges:bridge_table", kept="1 ms, 0", page="boards.md", sample="bridges:bridge_sample"
             ),
-            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
-            "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
+            "sides": Section("scans:sides_table", sample="scans:sides_sample"),
+            "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table"),
+            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",)),
+            "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",)),
         },
     ),
     Study(
@@ -329,7 +341,7 @@ _ALL = (
         page="ros.md",
         minutes=10,
         sections={
-            "costs": Section("scripts/measure_ros.py:costs_table"),
+            "costs": Section("scripts/measure_ros.py:costs_table", kept="Contacts|Marker"),
             "shown": Section("scripts/measure_ros.py:shown_table"),
         },
         extra="test",
@@ -341,7 +353,10 @@ _ALL = (
         minutes=5,
         sections={
             "coverage": Section("tables:coverage_table"),
-            "faults": Section("tables:faults_table"),
+            "faults": Section(
+                "tables:faults_table",
+                kept="row is broken|stuck closed|does not close|diode is shorted|no supply|wire of",
+            ),
             "times": Section("tables:times_table", sample="tables:times_table"),
         },
     ),
@@ -358,11 +373,15 @@ _ALL = (
         page="settle.md",
         minutes=2,
         sections={
-            "needs": Section("tables:needs_table"),
-            "breaks": Section("tables:breaks_table"),
+            "needs": Section("tables:needs_table", kept="nominal|500|64x64, rows"),
+            "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]"),
             "shorted": Section("tables:shorted_table", sample="tables:shorted_table"),
-            "summary": Section("tables:summary_table", needs=("ngspice",)),
-            "agreement": Section("tables:agreement_table", kept="30, 2, 3", needs=("ngspice",)),
+            "summary": Section("tables:summary_table", kept=r"^\| all", needs=("ngspice",)),
+            "agreement": Section(
+                "tables:agreement_table",
+                kept=r"^\| (settle|project rows) \| 16x16 \| one cell \| 30, 2, 3",
+                needs=("ngspice",),
+            ),
         },
         pictures="pictures:draw",
     ),
@@ -372,7 +391,7 @@ _ALL = (
         page="several.md",
         minutes=3,
         sections={
-            "several_line": Section("tables:line_table", sample="tables:line_sample"),
+            "several_line": Section("tables:line_table", kept=r"000 \| [148] \|", sample="tables:line_sample"),
             "several_size": Section("tables:size_table", of_netlists=True),
         },
         extra="boards",
@@ -385,7 +404,7 @@ _ALL = (
         sections={
             "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole"),
             "faults": Section("tables:faults_table", of_netlists=True),
-            "units_size": Section("tables:units_table", page="units.md", of_netlists=True),
+            "units_size": Section("tables:units_table", kept=r"^\| (1|6) ", page="units.md", of_netlists=True),
             "boards": Section("tables:boards_table", page="boards.md"),
         },
         extra="boards",
@@ -419,10 +438,10 @@ _ALL = (
         sections={
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
-            "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table", kept=r"\| 100 \||mean"),
-            "ahead": Section("tables:ahead_table", kept=r"\| 100 \|"),
-            "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
+            "breaks": Section("tables:breaks_table", kept="`Tracker`"),
+            "scores": Section("tables:scores_table", kept="mean"),
+            "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
+            "recorded": Section("tables:recorded_table", kept=r"all \| `Tracker`", needs=("../shared/data",)),
         },
         pictures="tables:draw",
         extra="test",
@@ -433,7 +452,7 @@ _ALL = (
         page="units.md",
         minutes=1,
         sections={
-            "units": Section("tables:units_table", sample="tables:units_table"),
+            "units": Section("tables:units_table", kept=r"\| 6 \|", sample="tables:units_table"),
         },
     ),
     Study(
@@ -443,7 +462,7 @@ _ALL = (
         minutes=4,
         sections={
             "view_load": Section("tables:loads_table"),
-            "view_clicks": Section("tables:clicks_table"),
+            "view_clicks": Section("tables:clicks_table", kept="gateware|until it is drawn|^\\| all"),
         },
         compute="tables:compute",
         pictures="tables:draw",
