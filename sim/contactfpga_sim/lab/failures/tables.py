@@ -38,7 +38,9 @@ def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> lis
 
 def _cells(knob: Knob, sweep: Sweep) -> list[str]:
     last = len(sweep.values) - 1 if sweep.broken is None else sweep.broken - 1
-    holds = "fails at the first value" if last < 0 else knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
+    holds = "fails at the first value"
+    if last >= 0:
+        holds = knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
     if sweep.broken is None:
         return [f"{holds}, end of range", "", "no failure", ""]
     first = sweep.outcomes[sweep.broken]
