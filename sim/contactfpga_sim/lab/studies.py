@@ -24,7 +24,7 @@ _ALL = (
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),
             "defense": Section("tables:defense_table", kept="switch"),
-            "pushes": Section("tables:push_table", sample="tables:push_table"),
+            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit"),
             "failures": Section(
                 "tables:failure_table",
                 kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
