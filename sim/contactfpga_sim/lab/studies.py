@@ -270,9 +270,7 @@ _ALL = (
         minutes=5,
         sections={
             "reference": Section("scans:reference_table", sample="scans:reference_sample"),
-            "labeller": Section(
-                "labellers:labeller_table", sample="labellers:labeller_sample", kept=r"\| 16x16 \| 8 \|"
-            ),
+            "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample", kept=NO_ROW),
             "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
             "bridges": Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
