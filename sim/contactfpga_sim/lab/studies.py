@@ -24,7 +24,7 @@ _ALL = (
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),
             "defense": Section("tables:defense_table", kept="switch"),
-            "pushes": Section("tables:push_table", sample="tables:push_table"),
+            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit"),
             "failures": Section(
                 "tables:failure_table",
                 kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
@@ -282,9 +282,7 @@ _ALL = (
         minutes=5,
         sections={
             "reference": Section("scans:reference_table", sample="scans:reference_sample"),
-            "labeller": Section(
-                "labellers:labeller_table", sample="labellers:labeller_sample", kept=r"\| 16x16 \| 8 \|"
-            ),
+            "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample", kept=NO_ROW),
             "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
             "bridges": Section(
