@@ -423,7 +423,7 @@ _ALL = (
             "breaks": Section(
                 "tables:breaks_table", kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`"
             ),
-            "scores": Section("tables:scores_table", kept="mean"),
+            "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) "),
             "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
             "recorded": Section("tables:recorded_table", kept=r"all \| `Tracker`", needs=("../shared/data",)),
         },
