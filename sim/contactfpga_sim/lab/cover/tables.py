@@ -254,7 +254,7 @@ def thinning_table() -> str:
     """The first design as the reaction gets faster."""
     head = (
         "reaction time",
-        "modulus for a compression of 4/3 of it",
+        "modulus for a compression of 4/3 of this time",
         "indentation",
         "peak force",
         "the paper's foam: indentation at the reaction",
