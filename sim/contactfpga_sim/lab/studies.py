@@ -41,7 +41,7 @@ _ALL = (
         minutes=4,
         sections={
             "outages": Section("tables:outages_table"),
-            "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| [46]"),
+            "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6"),
             "folds": Section("tables:folds_table", kept=r"^\| [25] ", sample="tables:folds_sample"),
         },
         pictures="tables:draw",
@@ -103,7 +103,7 @@ _ALL = (
         page="cover.md",
         minutes=3,
         sections={
-            "closes": Section("caps:felt_table", kept="6.4 mm|the paper", sample="caps:felt_sample"),
+            "closes": Section("caps:felt_table", kept="6.4 mm|10 mm.*the paper", sample="caps:felt_sample"),
             "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
@@ -175,12 +175,8 @@ _ALL = (
         page="haptics.md",
         minutes=5,
         sections={
-            "layouts": Section(
-                "tables:layouts_table", kept="mid-length, 60|at one end|best of all", sample="tables:layouts_table"
-            ),
-            "places": Section(
-                "tables:places_table", kept=r"^\| (barycenter \| 10|set \| 5|closings \| 5|center of pressure \| 10)"
-            ),
+            "layouts": Section("tables:layouts_table", kept="at one end|best of all", sample="tables:layouts_table"),
+            "places": Section("tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)"),
             "wrong": Section("tables:wrong_table", kept="30 %|drifted"),
             "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|"),
             "pairs": Section("tables:pairs_table", kept="60 mm"),
@@ -214,11 +210,11 @@ _ALL = (
             "kits": Section("tables:headline", page="../README.md"),
             "times": Section("tables:times_table"),
             "built": Section("tables:built_table"),
-            "pins": Section("tables:pins_table"),
-            "parts": Section("tables:parts_table", kept=r"^\| fast", sample="tables:parts_table"),
+            "pins": Section("tables:pins_table", kept="the kit|22 kΩ alone|reversal"),
+            "parts": Section("tables:parts_table", kept=r"^\| fast \| beside", sample="tables:parts_table"),
             "predictions": Section(
                 "tables:predictions_table",
-                kept=r"`(contact_worst|last_byte_median|break_worst|settle)_us|`felt_half_n|`row_ma",
+                kept=r"`(contact_worst|break_worst|settle)_us|`felt_half_n",
                 sample="tables:predictions_table",
             ),
         },
@@ -436,8 +432,10 @@ _ALL = (
         sections={
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
-            "breaks": Section("tables:breaks_table", kept="`Tracker`"),
-            "scores": Section("tables:scores_table", kept="mean"),
+            "breaks": Section(
+                "tables:breaks_table", kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`"
+            ),
+            "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) "),
             "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
             "recorded": Section("tables:recorded_table", kept=r"all \| `Tracker`", needs=("../shared/data",)),
         },

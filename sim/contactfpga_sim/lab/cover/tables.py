@@ -253,12 +253,12 @@ def paper_table() -> str:
 def thinning_table() -> str:
     """The first design with ever faster reactions."""
     head = (
-        "reaction after",
-        "foam that lasts 4/3 of it",
-        "pressed in",
+        "reaction time",
+        "modulus for a compression of 4/3 of this time",
+        "indentation",
         "peak force",
-        "the paper's foam: by then",
-        "in all",
+        "the paper's foam: indentation at the reaction",
+        "in the end",
     )
     lines = []
     for one in thinning(FIRST_DESIGN, FIRST_DESIGN.foams[0]):

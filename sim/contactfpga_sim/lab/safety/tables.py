@@ -24,13 +24,13 @@ def faults_table() -> str:
     """Each fault with what reports it, how fast, and earlier errors."""
     head = [
         "fault",
-        "what it does unnoticed",
+        "effect if undetected",
         "reported by",
-        "after, at most",
-        "`contact` after",
-        "frames wrong before",
+        "worst detection time",
+        "time until `contact` rises",
+        "wrong frames before detection",
     ]
-    rows = [[*head, "without options", "what is left to do"]]
+    rows = [[*head, "without options", "what you must do"]]
     for name, fault in FAULTS.items():
         guarded, plain = _harmful("guarded", name), _harmful("plain", name)
         rows.append(
@@ -50,7 +50,7 @@ def faults_table() -> str:
 
 def coverage_table() -> str:
     """Listed faults that are reported, with and without each option."""
-    rows = [["options", "faults reported at every place", "diagnostic coverage", "places reported"]]
+    rows = [["options", "faults reported at every place", "share of faults", "places reported"]]
     for name, (skin, channels) in OPTIONS.items():
         counts = [_told(skin, fault, channels) for fault in FAULTS]
         whole = sum(told == of for told, of in counts)

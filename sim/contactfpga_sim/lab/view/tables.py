@@ -59,7 +59,7 @@ class Click:
             "browser and viser: from the mouse to the view": self.touched - self.released,
             "gateware and wire, board time": self.gateware_s,
             "driver: bytes to zones": self.driver_s,
-            "view: the rest of its moment, and of simulating it": board - self.gateware_s - self.driver_s,
+            "view: waiting for its next update, and simulating up to it": board - self.gateware_s - self.driver_s,
             "view: what to draw": self.queued - self.read,
             "viser and browser: until it is drawn": self.drawn - self.queued,
             "all": self.drawn - self.released,
