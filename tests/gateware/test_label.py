@@ -7,7 +7,7 @@ import pytest
 from bench import split
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from label_rules import RULES, pieces
+from label_rules import pieces, row_rule
 from sample import sample
 
 from contactfpga import Skin
@@ -71,10 +71,9 @@ def frame_rule(cells, columns, connectivity, labeller, start):
     for y, word in enumerate(cells):
         handed.append(cycle)
         pair = (cells[y - 1] if y else 0, word)
-        clusters = sorted(pieces(pair, connectivity), key=lambda piece: min(x for _, x in piece))
-        done, busy, end = RULES[labeller](clusters, columns, connectivity)
+        clusters, busy, end = row_rule(pair, columns, connectivity, labeller)
         last_clock = {}  # of the rightmost cluster that holds a cell of the zone
-        for cluster, clock in zip(clusters, done, strict=True):
+        for cluster, clock in clusters:
             for index, zone in enumerate(zones):
                 if any((y - 1 + below, x) in zone for below, x in cluster):
                     last_clock[index] = clock

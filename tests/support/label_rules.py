@@ -48,3 +48,17 @@ def serial_rule(clusters, columns, connectivity):
 
 
 RULES = {"run": run_rule, "serial": serial_rule}
+
+
+def row_rule(pair, columns, connectivity, labeller, closed=False):
+    """For a row and the one before it: [(cluster, the clock in which a zone leaves whose last cluster it is)] from left
+    to right, clocks for the row, and until the end mark. Where the ends meet a row that is joined over the seam takes a
+    step more, or two clocks, after its last cluster."""
+    clusters = sorted(pieces(pair, connectivity), key=lambda piece: min(x for _, x in piece))
+    done, busy, end = RULES[labeller](clusters, columns, connectivity)
+    first, last = ({y for y, row in enumerate(pair) if row >> x & 1} for x in (0, columns - 1))
+    if closed and (first and last if connectivity == 8 else first & last):
+        more = {"run": 1, "serial": 2}[labeller]
+        done[-1] += more
+        busy, end = busy + more, end + more
+    return list(zip(clusters, done, strict=True)), busy, end
