@@ -10,7 +10,6 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.model.golden import volume
 from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labelling, Strips, closed_flood, flood, moments
 
 
@@ -49,6 +48,75 @@ def exact(cells: np.ndarray, connectivity: int, strips: Strips, closed: bool = F
 def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
     labels, count = flood(cells, connectivity)
     return labels, [0] * count
+
+
+def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``LabellerRule.strips`` of ``run``, for every row of (N, R, C) bool frames."""
+    last_step, steps = _strips(frames, connectivity)
+    return last_step + 2, steps + 1, steps + 3
+
+
+def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same where the ends meet: a step more joins the last cluster with the first."""
+    last_step, steps = _strips(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    joined = ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0)
+    steps = steps + joined
+    last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
+    return last_step + 2, steps + 1, steps + 3
+
+
+def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
+    """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    taken = frames | before
+    none = np.zeros(taken.shape[:2], bool)
+    steps, begun = np.zeros(none.shape, int), np.zeros(none.shape, int)
+    above, new = begun.copy(), begun.copy()
+    reached = np.zeros(frames.shape, int)
+    joins = []
+    for column in range(frames.shape[2]):
+        a, b, here = before[..., column], frames[..., column], taken[..., column]
+        a_left, b_left, here_left = (array[..., column - 1] if column else none for array in (before, frames, taken))
+        joined = here & here_left if connectivity == 8 else (a & a_left) | (b & b_left)
+        joins.append(joined)
+        begun = np.where(joined, begun, steps)
+        above = np.where(joined, above, 0) + (a & ~a_left)
+        new = np.where(joined, new, 0) + (b & ~b_left)
+        steps = np.where(here, begun + np.maximum(above, new), steps)
+        reached[..., column] = steps
+    for column in range(frames.shape[2] - 2, -1, -1):
+        reached[..., column] = np.where(joins[column + 1], reached[..., column + 1], reached[..., column])
+    return reached, steps
+
+
+def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
+    above = np.zeros_like(frames)
+    above[:, 1:] = frames[:, :-1]
+    above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
+    more = above & ~above_left
+    if connectivity == 4:
+        more |= frames & ~left & above_left & ~above
+        joined = frames & left | above & above_left
+    else:
+        joined = (frames | above) & (left | above_left)
+    leaves = np.cumsum(1 + more, axis=2) + 1
+    busy = leaves[..., -1] + 1
+    for column in range(frames.shape[2] - 2, -1, -1):
+        leaves[..., column] = np.where(joined[..., column + 1], leaves[..., column + 1], leaves[..., column])
+    return leaves * (frames | above), busy, busy
+
+
+def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """:func:`serial_clocks` where the ends meet."""
+    leaves, busy, end = serial_clocks(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    seam = 2 * (ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
+    leaves[..., -1] += seam * (before | frames)[..., -1]
+    return leaves, busy + seam, end + seam
 
 
 def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
@@ -98,5 +166,5 @@ def _exact_rule(strips: Strips, closed: Strips) -> LabellerRule:
     return LabellerRule(functools.partial(exact, strips=strips), strips, around)
 
 
-RUN = _exact_rule(volume.run_clocks, volume.closed_run_clocks)
-SERIAL = _exact_rule(volume.serial_clocks, volume.closed_serial_clocks)
+RUN = _exact_rule(run_clocks, closed_run_clocks)
+SERIAL = _exact_rule(serial_clocks, closed_serial_clocks)
