@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from label_rules import row_rule
 from zone_oracles import cells_of, every_frame, zones_by_scipy, zones_of_frames
 
 from contactfpga.choices.labellers import LABELLERS
@@ -113,6 +114,26 @@ def test_many_frames_at_once_agree_with_flood_fill_and_the_labellers_rule(shape,
         assert end[index, -1] == one.end
         final = [zone.clock for zone in one.departures if zone.row == shape[0] - 1]
         assert clocks[index] == max(final, default=0)
+
+
+@pytest.mark.parametrize("closed", [False, True], ids=["plane", "closed"])
+@pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+@pytest.mark.parametrize("labeller", [name for name, labeller in LABELLERS.items() if labeller.exact])
+def test_clocks_of_rows_are_those_of_the_rules_worked_cell_by_cell(labeller, connectivity, closed):
+    compared = 0
+    for rows, columns, count in ((4, 4, 1500), (3, 3, 1000), (5, 7, 500), (3, 16, 150), (2, 64, 25)):
+        frames = random_frames(np.random.default_rng([rows, columns, connectivity]), (rows, columns), count)
+        rule = LABELLERS[labeller].load_golden()
+        leaves, busy, end = (rule.closed if closed else rule).strips(frames, connectivity)
+        words = (frames.astype(object) << np.arange(columns)).sum(axis=2)
+        for frame, y in np.ndindex(words.shape):
+            pair = (words[frame, y - 1] if y else 0, words[frame, y])
+            clusters, *clocks = row_rule(pair, columns, connectivity, labeller, closed)
+            assert [busy[frame, y], end[frame, y]] == clocks
+            for cluster, clock in clusters:
+                assert max(leaves[frame, y, x] for _, x in cluster) == clock
+                compared += 1
+    assert compared > 10_000
 
 
 @pytest.mark.slow
