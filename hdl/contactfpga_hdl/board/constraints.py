@@ -1,4 +1,4 @@
-"""Writes what follows from the boards' pin tables: constraints/ and the tables in docs/boards.md.
+"""Writes constraints/ and the tables in docs/boards.md from the boards' pin tables.
 
 ``python -m contactfpga_hdl.board.constraints`` in the project's folder, or ``make constraints``.
 """
@@ -17,11 +17,11 @@ from contactfpga_hdl.board.sites import connector_sites
 PAGE = Path("docs/boards.md")
 FOLDER = Path("constraints")
 CHAINS = 8
-"""The tables list the data pins of this many chains: with them one chip per chain is enough for 64 lines."""
+"""Number of chains whose data pins the tables list: with one chip per chain they serve 64 lines."""
 
 
 def constraints(board: BoardSpec) -> str:
-    """The constraints of the board's default sheet, as place and route gets them."""
+    """The constraints of the board's default sheet, as for place and route."""
     skin = board.skin
     suffix = board.constraints.partition(".")[2]
     made = plan_for(board, skin).files[f"{NAME}.{suffix}"]
@@ -32,7 +32,7 @@ def constraints(board: BoardSpec) -> str:
 
 
 def pin_tables(board: BoardSpec) -> str:
-    """Which wire goes where, as Markdown: one pin per line, and shift registers."""
+    """The pin of each wire, as Markdown: one pin per line, and shift registers."""
     units = dict(zip(board.converter, UNIT_PORTS, strict=True))
     rows = [(f"{row} or `{units[pin]}`" if pin in units else str(row), pin) for row, pin in enumerate(board.row_side)]
     columns = [
@@ -64,7 +64,7 @@ def _table(board: BoardSpec, sides: Mapping[str, list[tuple[str, str]]]) -> str:
 
 
 def page_with_tables(page: str) -> str:
-    """The page with the tables between ``<!-- pins: BOARD -->`` and ``<!-- end -->`` made again."""
+    """The page with updated tables between ``<!-- pins: BOARD -->`` and ``<!-- end -->``."""
 
     def table(found: re.Match) -> str:
         return f"{found[1]}\n{pin_tables(BOARDS[found[2]])}\n<!-- end -->"
