@@ -174,7 +174,7 @@ class Skin:
 
     def replace(self, **changes: Any) -> Skin:
         """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
-        one that begins or ends to divide."""
+        one whose division is switched on or off."""
         divides = self.report == "barycenter"
         if {"rows", "columns", "connectivity", "closed"} & set(changes) or divides != (
             changes.get("report", self.report) == "barycenter"
@@ -194,16 +194,16 @@ class Skin:
 
     @property
     def fingerprint(self) -> bytes:
-        """Eight bytes that differ between any two Skins that differ in more than their names.
+        """Eight bytes that differ between Skins that differ in more than their names.
 
-        They are made of the fields that differ from their defaults, so that a new field with a default changes no
-        fingerprint (docs/protocol.md).
+        They cover the fields that differ from their defaults, so that a new field with a default changes no fingerprint
+        (docs/protocol.md).
         """
         return hashlib.sha256(json.dumps(self.changed, sort_keys=True).encode()).digest()[:8]
 
     @property
     def changed(self) -> dict[str, Any]:
-        """The fields that differ from their defaults, but for the name."""
+        """The fields that differ from their defaults, except the name."""
         defaults = {field.name: field.default for field in dataclasses.fields(self)}
         defaults["zone_capacity"] = self._default_capacity()
         fields = dataclasses.asdict(self)
@@ -212,42 +212,42 @@ class Skin:
 
     @property
     def selects_low(self) -> bool:
-        """A selected row is low, as is a column that reads pressed; else both are high."""
+        """Whether a selected row, and a pressed column, is low; else both are high."""
         return self.diodes != "row2col"
 
     @property
     def reads_rows(self) -> bool:
-        """The board lets the rows go and reads them while it drives the columns."""
+        """Whether the board releases the rows and reads them while it drives the columns."""
         return scans.find(self.scan).reads_rows
 
     @property
     def row_lines(self) -> int:
-        """Rows, and the guard row."""
+        """Rows, including the guard row."""
         return self.rows + self.guard
 
     @property
     def column_lines(self) -> int:
-        """Columns, and the guard column."""
+        """Columns, including the guard column."""
         return self.columns + self.guard
 
     @property
     def line_of_row(self) -> tuple[int, ...]:
-        """The line that each row is soldered to, and after them the guard row."""
+        """The line of each row, and finally of the guard row."""
         return (*(self.row_order or range(self.rows)), *range(self.rows, self.row_lines))
 
     @property
     def line_of_column(self) -> tuple[int, ...]:
-        """The line that each column is soldered to, and after them the guard column."""
+        """The line of each column, and finally of the guard column."""
         return (*(self.column_order or range(self.columns)), *range(self.columns, self.column_lines))
 
     @property
     def ghosts(self) -> bool:
-        """Pressed switches can make others read pressed."""
+        """Whether pressed switches can make others read pressed."""
         return self.diodes == "none"
 
     @property
     def sheet(self) -> Sheet:
-        """What frames of this Skin's board cannot be read without."""
+        """The part of the Skin that reading frames needs."""
         assert self.zone_capacity is not None
         return Sheet(
             rows=self.rows,
@@ -269,11 +269,11 @@ class Skin:
         return Derived(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone. Another process computes again what follows from them."""
+        """The fields alone, as other processes recompute derived values."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def max_zones(self) -> int:
-        """The most zones a frame of this sheet can hold; see :meth:`Sheet.max_zones`."""
+        """The most zones in a frame of this sheet; see :meth:`Sheet.max_zones`."""
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def _keep(self, **values: Any) -> None:
@@ -287,7 +287,7 @@ class Skin:
 
 
 def _suggesting(init: Callable[..., None]) -> Callable[..., None]:
-    """The same, but a field that does not exist is refused with the one that is spelled nearly so."""
+    """The initializer, which for an unknown field suggests the most similar one."""
     known = [field.name for field in dataclasses.fields(Skin)]
 
     @functools.wraps(init)
