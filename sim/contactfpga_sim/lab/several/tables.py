@@ -53,7 +53,7 @@ def _row(count: int, baud: int) -> tuple[str, ...]:
     frames = [_frames(trace, after) for trace in traces]
     per_second = np.mean([len(of_one) for of_one in frames]) / (cycles - after) * skin.clock_hz
     waits = [_longest_wait(trace, of_one) for trace, of_one in zip(traces, frames, strict=True)]
-    replaced = max(0.0, 1 - np.mean([len(of_one) for of_one in frames]) / packed)
+    replaced = max(0.0, 1 - float(np.mean([len(of_one) for of_one in frames])) / packed)
     longest = max(waits) / skin.clock_hz * 1e6
     return f"{baud:,}", str(count), f"{per_second:,.0f}", f"{100 * replaced:.0f} %", f"{longest:.0f} µs"
 
