@@ -219,6 +219,26 @@ def two_discs(gap, pitch, structure, rng):
     return ndimage.label(cells, structure)[1]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("diameter", [8, 16, 24])
+def test_no_finger_is_felt_whose_pressure_closes_no_switch_and_each_that_closes_one(turn, diameter):
+    """A tile takes at most its own share of a flat finger's area. A dome of 0.4 N differs by 10 % from the next."""
+    found = turn("light", f"flat, {diameter} mm")
+    least = 0.4 * math.pi * (diameter / 2) ** 2 / 6.4**2
+    for force, outcome in zip(found.values, found.outcomes, strict=True):
+        right, of = shown_rate(outcome.rate)
+        assert not (force < 0.6 * least and right)
+        assert not (force > 1.4 * max(least, 0.4) and diameter == 24 and right < of)  # it lies on whole tiles anywhere
+    assert found.holds_until <= 1.4 * max(least, 4 * 0.4)  # the others at least on a quarter of one
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("force", [2, 5, 10])
+def test_fingers_on_the_kit_are_told_apart_as_image_tools_count_them(turn, force):
+    for outcome in turn("closing", f"starter kit, {force} N each").outcomes:
+        assert len(outcome.zones) == ndimage.label(outcome.cells)[1]
+
+
 def shown_rate(text):
     """Right draws and all of them, from the share and the interval that are shown."""
     share = float(re.match(r"[\d.]+", text)[0])
