@@ -243,9 +243,10 @@ def shown_rate(text):
     """Right draws and all of them, from the share and the interval that are shown."""
     share = float(re.match(r"[\d.]+", text)[0])
     for of in rated.LOOKS:
-        right = round(share * of / 100)
-        if str(rated.Rate(right, of)) == text:
-            return right, of
+        near = round(share * of / 100)  # the share is rounded
+        for right in range(max(0, near - 1), min(of, near + 1) + 1):
+            if str(rated.Rate(right, of)) == text:
+                return right, of
     raise AssertionError(text)
 
 
