@@ -4,6 +4,7 @@ import functools
 import itertools
 
 import pytest
+from bench import split
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample import sample
@@ -167,13 +168,7 @@ def label(bench, frames, columns, connectivity, labeller, rng=None, gap=0.0, sta
 def fields(payload, rows, columns):
     """Area, sum x, sum y: each as wide as its largest value on this sheet (docs/protocol.md)."""
     largest = (rows * columns, rows * sum(range(columns)), columns * sum(range(rows)))
-    values = []
-    for most in largest:
-        width = max(1, most.bit_length())
-        values.append(payload & (1 << width) - 1)
-        payload >>= width
-    assert payload == 0
-    return tuple(values)
+    return split(payload, (max(1, most.bit_length()) for most in largest))
 
 
 def assert_exact(bench, frames, columns, connectivity, labeller):

@@ -94,7 +94,7 @@ def test_rules_that_fail_do():
     assert found["Gauss-Legendre, 8"][0] == pytest.approx(-0.044, abs=5e-4)
     # an error of delta_c is passed on as its root, unless its factor is taken out by hand
     assert 3e-5 < abs(found["256 nodes, sin², δ_c short by 1e-8"][0]) < 3e-4
-    assert abs(found["16 nodes, sin², that short, factored"][0]) < 1e-8
+    assert abs(found["16 nodes factored, δ_c short by 1e-8"][0]) < 1e-8
     assert math.isnan(found["Euler on v = √v²(δ), 100 steps"][2])
 
 

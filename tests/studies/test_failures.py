@@ -433,12 +433,15 @@ def outcomes(*verdicts):
 @pytest.mark.parametrize(
     ("verdicts", "expected"),
     [
-        (("right", "right"), ["1, all there are", "", "", "nothing", ""]),
-        (("silent",), ["nowhere", "**0**", "", "2 zones of 1 contact", "**not noticed**"]),
+        (("right", "right"), ["1, end of range", "", "", "no failure", ""]),
+        (("silent",), ["fails at the first value", "**0**", "", "2 zones of 1 contact", "**not noticed**"]),
         (("right", "told"), ["0", "**1**", "", "2 zones of 1 contact", "`stuck`"]),
         (("right", "warned", "right", "told"), ["2", "**3**", "", "2 zones of 1 contact", "`stuck`, from 1 on"]),
         (("right", "told", "silent"), ["0", "**1**", "", "2 zones of 1 contact", "`stuck`; **not noticed** at 2"]),
-        (("silent", "told"), ["nowhere", "**0**", "", "2 zones of 1 contact", "**not noticed**; `stuck` from 1 on"]),
+        (
+            ("silent", "told"),
+            ["fails at the first value", "**0**", "", "2 zones of 1 contact", "**not noticed**; `stuck` from 1 on"],
+        ),
     ],
 )
 def test_lines_of_the_table(verdicts, expected):

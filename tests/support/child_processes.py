@@ -4,18 +4,32 @@ import os
 from pathlib import Path
 
 
-def children(parent=None):
-    """(id, words of the command) of all children of a process that run."""
-    found = []
+def running():
+    """{id: (id of its parent, words of its command)} of all processes that run."""
+    found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             status = (folder / "stat").read_text().rpartition(")")[2].split()
             words = (folder / "cmdline").read_bytes().split(b"\0")
         except OSError:
             continue
-        if int(status[1]) == (parent or os.getpid()) and status[0] != "Z":
-            found.append((int(folder.name), [word.decode() for word in words]))
+        if status[0] != "Z":
+            found[int(folder.name)] = int(status[1]), [word.decode(errors="replace") for word in words]
     return found
+
+
+def children(parent=None):
+    """(id, words of the command) of all children of a process that run."""
+    parent = parent or os.getpid()
+    return [(number, words) for number, (above, words) in running().items() if above == parent]
+
+
+def descendants(number):
+    """Every process below this one: {id: command line}."""
+    every, below = running(), {number}
+    while new := {child for child, (above, _) in every.items() if above in below} - below:
+        below |= new
+    return {child: " ".join(every[child][1]) for child in below - {number}}
 
 
 def reader_processes(port, parent=None):

@@ -1,5 +1,5 @@
 """Packets as they travel: stuffing, check bytes, delimiter, and the last byte that says what a packet is
-(docs/protocol.md, docs/framing.md)."""
+(docs/protocol.md)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The README's picture: what covers, pitches and closing forces come to, for one family of scenes.
+"""The README's picture: covers, pitches and closing forces, for one family of scenes.
 
-The family is `fingers`: two to five fingertips anywhere on 160 mm by 160 mm, where cover and pitch make a difference.
+The family is `fingers`: two to five fingertips anywhere on 160 mm by 160 mm, where cover and pitch matter.
 Labellers, reports and rates that change neither time nor count by more than a mark's size are left to the table.
 """
 
@@ -127,7 +127,7 @@ def picture(points: Sequence[Point]) -> Figure:
 
 
 def title(best: Point) -> str:
-    """What to build, and how well it counts."""
+    """The recommended method, and how well it counts."""
     found = best.errors["total"]["miscounted"]
     share = f"{100 * found.mean:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f})"
     return f"the ringed method, {best.task.method}, miscounts {share}"

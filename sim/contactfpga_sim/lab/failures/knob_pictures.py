@@ -1,7 +1,6 @@
-"""A knob as a picture: for each method how many draws are right at each value, and the sheet before and at the first
-break.
+"""A knob as a picture: the share of right draws at each value, and the sheet before and at the first break.
 
-Written by hand rather than by a plotting library, so that the same numbers always make the same file.
+Hand-written, so that the same numbers always make the same file.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ LETTER = 7.5
 
 
 class Span(NamedTuple):
-    """What a value takes of the axis, in pixels: halfway to the values before and after it."""
+    """The pixels of a value on the axis: halfway to its neighbors."""
 
     start: float
     middle: float
@@ -34,10 +33,9 @@ class Span(NamedTuple):
 
 
 def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span], str]:
-    """The values' places, in the order in which the knob is moved, and what is to be said of the scale.
+    """The values' places in sweep order, and a note on the scale.
 
-    Values that are evenly spaced or reach below 0 lie so; others in powers of ten, where a first value of 0 stands
-    apart.
+    Evenly spaced or negative values are linear; others logarithmic, with a first 0 set apart.
     """
     steps = np.diff(values)
     if np.allclose(steps, steps[0]) or min(values[1:]) <= 0:
@@ -55,7 +53,7 @@ def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span
 
 
 def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
-    """Numbers of the values that are written below the axis: at even steps where they lie so, else all with room."""
+    """Indexes of the labeled values: at even steps if evenly spaced, else all with room."""
     wide = [span.end - span.start for span in spans]
     if np.allclose(wide, wide[0]):
         choices = [list(range(0, len(words), step)) for step in (1, 2, 4, 5, 10, 20, len(words))]
@@ -64,7 +62,7 @@ def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
 
 
 def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int]) -> list[int]:
-    """Those of the chosen that do not come too close to the one before."""
+    """The chosen indexes that are not too close to the one before."""
     found, end = [], -math.inf
     for index in chosen:
         half = LETTER * len(words[index]) / 2
@@ -76,7 +74,7 @@ def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int
 
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
 TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}
-"""Height of a bar, which says the same as its color."""
+"""Height of a bar, which repeats its color's meaning."""
 
 WORDS = {"right": "right", "warned": "right, warned", "told": "wrong, reported", "silent": "wrong, not noticed"}
 """Below the first bar of each kind."""
@@ -208,7 +206,7 @@ def _kind(outcome: Outcome) -> str:
 
 
 def _sheets(knob: Knob, methods: Mapping[str, Sweep]) -> tuple[str, list[tuple[str, Outcome]]]:
-    """The first method that gets from right to wrong, and what came out at the two values between which it does."""
+    """The first method that fails, and its outcomes at the two values around the break."""
     for method, sweep in methods.items():
         if sweep.broken is None or not sweep.broken or sweep.outcomes[sweep.broken].cells is None:
             continue

@@ -14,7 +14,7 @@ from contactfpga_sim.lab.pool import progress
 
 HEAD = (
     *("knob", "method", "holds until", "breaks at", "closed form"),
-    *("what breaks", "what the system says", "what helps"),
+    *("what breaks", "reported", "what helps"),
 )
 
 
@@ -24,7 +24,7 @@ def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
 
 
 def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> list[str]:
-    """A knob's lines; what they have in common is said in the first one. ``pictured``: the page has its picture."""
+    """A knob's lines; common cells are only in the first. ``pictured``: the page has its picture."""
     title = f"[{knob.title}](#{knob.name})" if pictured else knob.title
     lines = []
     for number, (method, sweep) in enumerate(methods.items()):
@@ -38,9 +38,11 @@ def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> lis
 
 def _cells(knob: Knob, sweep: Sweep) -> list[str]:
     last = len(sweep.values) - 1 if sweep.broken is None else sweep.broken - 1
-    holds = "nowhere" if last < 0 else knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
+    holds = (
+        "fails at the first value" if last < 0 else knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
+    )
     if sweep.broken is None:
-        return [f"{holds}, all there are", "", "nothing", ""]
+        return [f"{holds}, end of range", "", "no failure", ""]
     first = sweep.outcomes[sweep.broken]
     at = knob.format.format(sweep.breaks_at)
     return [holds, f"**{at}**{_rate(first)}", first.what, says(knob, sweep)]
@@ -51,7 +53,7 @@ def _rate(outcome: Outcome) -> str:
 
 
 def says(knob: Knob, sweep: Sweep) -> str:
-    """What tells the user at the break, before it, and whether something passes unnoticed later."""
+    """What warns the user at and before the break, and whether something passes unnoticed later."""
     assert sweep.broken is not None
     told = sweep.outcomes[sweep.broken].told
     parts = [", ".join(f"`{word}`" for word in told) if told else "**not noticed**"]
@@ -71,7 +73,7 @@ CLOSED = ("knob", "closed form", "value")
 
 
 def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row for each knob that has a closed form: in words, and as values."""
+    """A row per knob with a closed form: in words, and as values."""
     lines = []
     for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
         values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
@@ -83,7 +85,7 @@ UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
 def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row for each knob in which something wrong passes unnoticed, with the reason."""
+    """A row per knob with an unnoticed fault, and the reason."""
     lines = []
     for name, methods in sweeps.items():
         where = [method for method, found in methods.items() if found.silent_at is not None]
@@ -102,7 +104,7 @@ SAID = {
     "host": "No picture: beyond the limit, frames are lost and counted.",
     "silence": "No picture: the newest frame is as old as the silence is long.",
 }
-"""In place of a picture that would repeat another one, or a sentence."""
+"""Text in place of a picture that would repeat another."""
 
 
 def pictures() -> str:
@@ -124,7 +126,7 @@ def compute() -> dict[str, dict[str, Sweep]]:
 
 
 def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None:
-    """Turn the knobs one after another; each is in ``sweeps`` as soon as it is done."""
+    """Sweep the knobs in turn; each enters ``sweeps`` when done."""
     runs = sum(len(KNOBS[name].runs) for name in names)
     with progress() as step:
         for name in names:
@@ -141,6 +143,6 @@ def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
 
 
 def draw_for_page(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """The same in a folder of their own among the pictures of the pages, without those that :data:`SAID` replaces."""
+    """The knobs' pictures in a folder of their own, without those that :data:`SAID` replaces."""
     (folder / "failures").mkdir(exist_ok=True)
     return draw(folder / "failures", {name: methods for name, methods in sweeps.items() if name not in SAID})

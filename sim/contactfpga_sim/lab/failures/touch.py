@@ -1,8 +1,8 @@
-"""Knobs of touch: two contacts that come close, one that is light, one that moves during a scan, switches that bounce;
-an arm that winds, shadows that cross, more zones than a frame carries.
+"""Knobs of touch: close contacts, a light one, a moving one, bouncing switches, a winding arm, crossing shadows, too
+many zones.
 
-Where fingers press, the sheets are a bare one, on which a switch closes under the middle of a contact whatever its
-force, and the starter kit's with its cover.
+Fingers press a bare sheet, on which a switch closes under the middle of a contact whatever its force, and the starter
+kit's sheet with its cover.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def _pair(
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Fingers of 8 mm radius cover a switch wherever they are. The pitch is in no wire of the gateware: the same one
-    serves sheets of any pitch."""
+    """Outcomes of two fingers of 8 mm radius, which cover a switch anywhere. The gateware does not depend on the
+    pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
@@ -124,10 +124,10 @@ LIGHT = Knob(
 )
 
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
-"""Directions of motion: along the columns and along the rows, both ways."""
+"""Directions of motion: along columns and rows, both ways."""
 
 FIRST, LAST = 2.0, 13.0
-"""Where a moving finger starts and ends, in pitches."""
+"""Start and end of a moving finger, in pitches."""
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
@@ -183,7 +183,7 @@ MOVING = Knob(
 
 DEBOUNCE_SCANS = 4
 BOUNCING = Skin(rows=4, columns=4, baud=6_000_000)
-"""Its scan takes 24 us."""
+"""A Skin with a scan of 24 us."""
 
 
 def debounced(method: str) -> Skin:
@@ -194,7 +194,7 @@ def debounced(method: str) -> Skin:
 
 
 def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
-    """How often the host sees the sheet touched when a switch closes for a time, opens for a time and closes again."""
+    """Touches that the host sees when a switch closes, opens and closes again."""
     rest, touch = np.zeros((2, 1, skin.rows, skin.columns), bool)
     touch[0, 2, 1] = True
     clocks = skin.derived.clocks_per_us
@@ -209,7 +209,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """The switch closes at any time of a scan, for 30 to 300 us before it opens again."""
+    """Outcomes of a switch that closes at any time of a scan, for 30 to 300 us before it opens again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)
@@ -240,7 +240,7 @@ SKINS = {name: REFERENCE.replace(labeller=name) for name in LABELLERS}
 
 
 def arm(size: int, quarters: int) -> np.ndarray:
-    """(size, size) bool: an arm one cell wide that winds inwards, a free cell between its turns."""
+    """(size, size) bool: an arm one cell wide that winds inward, a free cell between its turns."""
     cells = np.zeros((size, size), bool)
     y, x, (dy, dx) = 0, 0, (0, 1)
     cells[y, x] = True
@@ -253,7 +253,7 @@ def arm(size: int, quarters: int) -> np.ndarray:
 
 
 def _winding(skin: Skin, quarters: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Turned and mirrored in any way."""
+    """Outcomes of the winding arm, turned and mirrored at random."""
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)
@@ -311,7 +311,7 @@ CROSSING = Knob(
 
 
 def _many(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Single cells, no two of which touch."""
+    """Outcomes of isolated single cells."""
     cells = np.zeros((draws, skin.rows // 2, skin.columns // 2), bool)
     for each in cells:
         each.flat[rng.choice(each.size, int(count), replace=False)] = True

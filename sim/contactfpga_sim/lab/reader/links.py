@@ -1,4 +1,4 @@
-"""What many links of 1 kHz take of the process that uses them, with either reader."""
+"""Load of many links of 1 kHz on the process that uses them, with either reader."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from contactfpga_sim.lab.speed.driver import SKIN
 
 PACE = Pace(1_000, 1, 3.0)
 LOOP_S = 0.01
-"""How often each link is looked at."""
+"""Interval of reading each link."""
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Share(NamedTuple):
-    """What it takes, in shares of a core."""
+    """Load, in shares of a core."""
 
     used: float
-    """By the process that uses the links."""
+    """Share used by the process with the links."""
     readers: float
-    """By the processes that read for it, together."""
+    """Share used by its reader processes together."""
     came: float
-    """The share of the frames that came in the time in which they were sent."""
+    """Share of the frames that arrived while they were sent."""
     age_ms: float
-    """Of the newest frame of a link when it was taken, median."""
+    """Median age of a link's newest frame when taken."""
 
 
 def measured(reader: str, links: int, call: str) -> Share:
@@ -64,7 +64,7 @@ def _opened(port: str, reader: str) -> contactfpga.Board:
 
 
 def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str, feeder: Feeder) -> float:
-    """Of the newest frame that a link gives."""
+    """Age of a link's newest frame."""
     if call == "latest":
         zones = board.latest(10.0)
         time_us, arrived_s = zones.time_us, zones.arrived_s
@@ -78,7 +78,7 @@ def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str,
 
 
 def _children_s() -> float:
-    """Processor time of the readers that run for this process."""
+    """CPU time of this process's readers."""
     total = 0
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):

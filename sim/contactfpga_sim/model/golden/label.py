@@ -1,6 +1,6 @@
-"""When a labeller emits its zones: where zones end is geometry, how many clocks that takes is the labeller's rule in
-docs/timing.md: clusters and steps of ``run``, columns of ``serial``. Labellers that are not exact, ``projection`` and
-``single``, have their own idea of a zone."""
+"""When a labeller emits its zones: the end of a zone is geometry; the clocks are the labeller's rule in docs/timing.md:
+clusters and steps of ``run``, columns of ``serial``. The inexact labellers ``projection`` and ``single`` define zones
+their own way."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labelle
 
 
 def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks, closed: bool = False) -> Labelling:
-    """The work of an exact labeller on an (R, C) bool frame; ``strip_clocks``: its rule for two adjacent rows."""
+    """An exact labeller's work on an (R, C) bool frame; ``strip_clocks``: its rule for two adjacent rows."""
     shape = cells.shape
     above = np.vstack([np.zeros((1, shape[1]), bool), cells])
     strips = [strip_clocks(above[y : y + 2], connectivity) for y in range(shape[0])]
@@ -58,16 +58,15 @@ def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[
 
 
 def run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
-    when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
-    """
+    """Clocks of the (2, C) cells of two adjacent rows, counted after the one in which the lower was handed over: (C,)
+    departure of a zone by its last cluster's cells, the next row, and an end mark."""
     last_step, steps = cluster_steps(strip, connectivity)
     return last_step + 2, steps + 1, steps + 3
 
 
 def closed_run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """The same where the ends meet: where cells are joined over the seam one more step joins the last cluster with the
-    first."""
+    """:func:`run_clocks` for a sheet whose ends meet: if cells are joined over the seam, one more step joins the last
+    cluster with the first."""
     last_step, steps = cluster_steps(strip, connectivity)
     first, last = strip[:, 0], strip[:, -1]
     if first.any() and last.any() if connectivity == 8 else (first & last).any():
@@ -77,7 +76,7 @@ def closed_run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray,
 
 
 def cluster_steps(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
-    """For the (2, C) cells of two adjacent rows: the last step of each cell's cluster, and all steps.
+    """The last step of each cell's cluster in the (2, C) cells of two adjacent rows, and all steps.
 
     The first is a (2, C) int array, 0 where nothing is pressed.
     """
@@ -97,8 +96,8 @@ def runs(row: np.ndarray) -> int:
 
 
 def serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
-    when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
+    """Clocks of the (2, C) cells of two adjacent rows, counted after the one in which the lower was handed over:
+    departure of a zone by its last cluster's cells, the next row, and an end mark.
 
     The first is a (2, C) int array, 0 where nothing is pressed.
     """
@@ -119,7 +118,8 @@ def serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int
 
 
 def closed_serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """The same where the ends meet: two clocks more after the last column if cells are joined over the seam."""
+    """:func:`serial_clocks` for a sheet whose ends meet: two clocks more after the last column if cells are joined over
+    the seam."""
     leaves, busy, end = serial_clocks(strip, connectivity)
     first, last = strip[:, 0], strip[:, -1]
     seam = 2 if (first.any() and last.any() if connectivity == 8 else (first & last).any()) else 0
@@ -128,8 +128,8 @@ def closed_serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarr
 
 
 def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
-    """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band.
-    ``connectivity`` makes no difference."""
+    """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band, regardless of
+    ``connectivity``."""
     rows, columns = cells.shape
     pressed = np.any(cells, axis=1)
     walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
@@ -144,7 +144,7 @@ def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
 
 
 def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
-    """All pressed cells of an (R, C) bool frame as one zone. ``connectivity`` makes no difference."""
+    """All pressed cells of an (R, C) bool frame as one zone, regardless of ``connectivity``."""
     rows, columns = cells.shape
     any_pressed = bool(cells.any())
     walks = [*np.any(cells[:-1], axis=1).tolist(), any_pressed]
@@ -153,7 +153,8 @@ def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
 
 
 def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labelling:
-    """A row that is walked takes this many clocks more; the end mark comes three clocks after the last row's walk."""
+    """A frame's work: a walked row needs this many extra clocks; the end mark is three clocks after the last row's
+    walk."""
     steps = [clocks if walk else 0 for walk in walks]
     return Labelling(tuple(step + 1 for step in steps), steps[-1] + 3, tuple(departures))
 

@@ -1,6 +1,6 @@
 """Zones and labeller timing of very many frames at once, for volume tests.
 
-The same rules as :mod:`zones` and :mod:`label`, written a second time, for arrays: (N, R, C) bool frames go in.
+The rules of :mod:`zones` and :mod:`label`, written independently for (N, R, C) bool frames.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
 
 @dataclasses.dataclass(frozen=True)
 class Departures:
-    """Zones of N frames, n in all: frame i owns the places ``offsets[i]`` to ``offsets[i + 1] - 1``."""
+    """n zones of N frames: frame i owns the places ``offsets[i]`` to ``offsets[i + 1] - 1``."""
 
     offsets: np.ndarray
     """(N + 1,) int64."""
     row: np.ndarray
-    """(n,) int64: the row that is worked while the zone leaves."""
+    """(n,) int64: the row in work when the zone leaves."""
     clock: np.ndarray
-    """(n,) int64: in which clock after the one in which that row was handed over it leaves."""
+    """(n,) int64: clock of departure after that row's handover."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave. Where the sheet's ends
-    meet (n, 4), with :func:`contactfpga_sim.model.golden.zones.turned`."""
+    """(n, 3) int64: area, sum x, sum y in cells, by departure within a frame. For a sheet whose ends meet (n, 4), with
+    :func:`contactfpga_sim.model.golden.zones.turned`."""
 
     def sorted_moments(self) -> np.ndarray:
-        """The moments, sorted by area, sum x, sum y within each frame instead."""
+        """The moments, sorted by area, sum x, sum y within each frame."""
         area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
@@ -61,15 +61,15 @@ def all_departures(
 def row_clocks(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(N, R) int64 each, for the rows of (N, R, C) bool frames: clocks from one to the next that can be handed over,
-    and to the end mark if it is the last."""
+    """(N, R) int64 each for (N, R, C) bool frames: clocks from a row to the next handover, and to the end mark if it is
+    the last."""
     return _clocks(np.asarray(frames, bool), connectivity, labeller, closed)[1:]
 
 
 def last_record_clocks(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> np.ndarray:
-    """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 if none does."""
+    """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 without any."""
     found = all_departures(frames, connectivity, labeller, closed)
     result = np.zeros(len(frames), int)
     final = found.row == frames.shape[1] - 1
@@ -80,8 +80,8 @@ def last_record_clocks(
 def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
     """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1.
 
-    The least label spreads to neighbors until nothing changes; after every round each cell also takes the
-    label of the cell its label names, which doubles the distance that labels travel.
+    The least label spreads to neighbors until nothing changes; after every round each cell takes the label of the cell
+    that its label names, which doubles the range.
     """
     count, rows, columns = frames.shape
     index = np.arange(frames.size).reshape(frames.shape)
@@ -132,13 +132,13 @@ def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | 
 
 
 def _flat(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """On a plane all lies on one turn."""
+    """Labels of a plane, where all is on one turn."""
     turns = np.zeros(frames.shape, int)
     return min_labels(frames, connectivity), turns, turns
 
 
 def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
+    """(N, R, C): last step of the cluster of each column; (N, R): all steps of a row."""
     before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
     taken = frames | before
     none = np.zeros(taken.shape[:2], bool)
@@ -168,7 +168,7 @@ def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.nd
 
 
 def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same where the ends meet: a step more joins the last cluster with the first."""
+    """:func:`run_clocks` for a sheet whose ends meet: one more step joins the last cluster with the first."""
     last_step, steps = _strips(frames, connectivity)
     before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
     ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
@@ -179,10 +179,10 @@ def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray
 
 
 def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of (N, R, C) bool frames, (N, R, C) int64 each: for a pressed cell the least index, over all frames, of its
-    zone's cells, else -1; on which turn it lies, seen from that cell; and 1 where a neighbor disagrees about that.
+    """For (N, R, C) bool frames, (N, R, C) int64 each: for a pressed cell the least index, over all frames, of its
+    zone's cells, else -1; its turn relative to that cell; and 1 where a neighbor disagrees on the turn.
 
-    The least label spreads to neighbors, and the turn with it, until nothing changes.
+    The least label spreads to neighbors with its turn until nothing changes.
     """
     nothing = frames.size
     least = np.where(frames, np.arange(nothing).reshape(frames.shape), nothing)
@@ -205,8 +205,8 @@ def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np
 
 
 def turned(zone: np.ndarray, turns: np.ndarray, disagree: np.ndarray, most: int) -> np.ndarray:
-    """(n,) int64, of all pressed cells the number of their zone, from 0 to n - 1, and what :func:`closed_labels` says
-    of them: what the records say of the turns. ``most``: the sheet's cells."""
+    """(n,) int64: turns as in the records, for all pressed cells by zone number, 0 to n - 1, turn and disagreement of
+    :func:`closed_labels`. ``most``: the sheet's cells."""
     count = int(zone.max(initial=-1)) + 1
     lowest, highest = np.full(count, len(turns)), np.full(count, -len(turns))
     np.minimum.at(lowest, zone, turns)
@@ -220,7 +220,7 @@ def turned(zone: np.ndarray, turns: np.ndarray, disagree: np.ndarray, most: int)
 
 
 def _beside(cells: np.ndarray, step: tuple[int, int], outside: int) -> np.ndarray:
-    """What lies a step further, above the first and below the last row ``outside``."""
+    """Neighbors one step away, ``outside`` above the first and below the last row."""
     dy, dx = step
     found = np.roll(cells, -dx, axis=2).astype(int)
     if dy:
@@ -230,7 +230,7 @@ def _beside(cells: np.ndarray, step: tuple[int, int], outside: int) -> np.ndarra
 
 
 def _crossed(frames: np.ndarray, step: tuple[int, int]) -> np.ndarray:
-    """(C,) int64: 1 where the step goes over the seam to the next turn, -1 where it goes to the one before."""
+    """(C,) int64: 1 if the step crosses the seam to the next turn, -1 to the one before."""
     crossed = np.zeros(frames.shape[2], int)
     if step[1]:
         crossed[-1 if step[1] > 0 else 0] = step[1]
@@ -238,7 +238,7 @@ def _crossed(frames: np.ndarray, step: tuple[int, int]) -> np.ndarray:
 
 
 def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
+    """``LabellerRule.strips`` of ``serial`` for (N, R, C) bool frames: (N, R, C), (N, R) and (N, R) int64."""
     above = np.zeros_like(frames)
     above[:, 1:] = frames[:, :-1]
     above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
@@ -256,7 +256,7 @@ def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np
 
 
 def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """:func:`serial_clocks` where the ends meet."""
+    """:func:`serial_clocks` for a sheet whose ends meet."""
     leaves, busy, end = serial_clocks(frames, connectivity)
     before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
     ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
