@@ -32,6 +32,30 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GRAY, BROWN = PALETTE = (
 DASHES: tuple[Any, ...] = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 """For lines that may lie on one another: what is under a dashed line shows in its gaps."""
 
+DARK = {
+    CARD: "#14181d",
+    INK: "#e6ebf1",
+    SOFT: "#aab6c3",
+    GRID: "#39434e",
+    SHEET: "#2a333d",
+    PRESSED: "#3b7a9e",
+    BLUE: "#5db2f2",
+    VERMILLION: "#f5793b",
+    GREEN: "#2fc08f",
+    SKY: "#2e7099",
+    BLACK: "#ffffff",
+    GRAY: "#9aa3ad",
+    BROWN: "#bf8a5c",
+    "#e8c4a8": "#8d6950",
+    "#cfe3d4": "#2d4535",
+    "#d3e6f3": "#1c3c53",
+    "#f8dfcf": "#55301c",
+    "#d0ece3": "#17463a",
+    "#fbecc8": "#4d3d14",
+    "#f4e1ec": "#4b2e42",
+}
+"""What takes the place of a color on a dark page; the last are tints. Orange and purple are seen on either."""
+
 WIDTH_PX = 720
 """Of a picture, and of the page that it is made for."""
 
@@ -93,7 +117,7 @@ def save(figure: Figure, path: Path) -> Path:
         if kind == ".svg":
             drawn = io.StringIO()
             figure.savefig(drawn, format="svg", metadata={"Date": None})
-            new.write_text(numbered(drawn.getvalue()), encoding="utf-8", newline="\n")
+            new.write_text(for_dark_pages(numbered(drawn.getvalue())), encoding="utf-8", newline="\n")
         else:
             figure.savefig(new, dpi=2 * 96, metadata={"Software": None} if kind == ".png" else None)
     return path
@@ -108,3 +132,17 @@ def numbered(svg: str) -> str:
     return re.sub(
         r'(?<=[#"])[a-z][0-9a-f]{10}(?=[")])', lambda found: names.setdefault(found[0], f"i{len(names)}"), svg
     )
+
+
+def for_dark_pages(svg: str) -> str:
+    """A picture that shows :data:`DARK` where a reader prefers dark pages: rules for the colors that it has."""
+    rules = []
+    for light, dark in DARK.items():
+        for what in ("fill", "stroke"):
+            written = {f"{what}: {light}": f'[style*="{what}: {light}"]', f'{what}="{light}"': f'[{what}="{light}"]'}
+            if found := [mark for words, mark in written.items() if words in svg]:
+                rules.append(f"{','.join(found)}{{{what}:{dark}!important}}")
+    style = "<style>@media (prefers-color-scheme: dark) {\n" + "\n".join(rules) + "\n}</style>"
+    head, end, rest = svg.partition("<svg")
+    opening, closed, rest = rest.partition(">")
+    return f"{head}{end}{opening}{closed}\n{style}{rest}" if rules else svg

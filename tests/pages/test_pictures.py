@@ -43,12 +43,47 @@ def test_no_words_lie_on_others(path):
 
 
 @every_picture
-def test_what_is_drawn_lies_on_the_card(path):
+def test_what_is_drawn_lies_on_a_card_that_is_dark_on_dark_pages(path):
     text = path.read_text(encoding="utf-8")
-    if "prefers-color-scheme: dark" in text:  # it has colors of its own for dark pages, and needs no card
+    light, dark = re.split(r"@media \(prefers-color-scheme: dark\)", text)
+    if 'class="ground"' in text:  # a drawing with classes
+        assert re.search(r"\.ground { fill: #ffffff; }", light)
+        assert re.search(r"\.ground { fill: #14181d; }", dark)
         return
-    first = re.search(r'<(?:rect|path)[^>]*?fill(?:="|: )(#\w+)', text)
-    assert first[1] == picture_style.CARD
+    assert re.search(r'<(?:rect|path)[^>]*?fill(?:="|: )(#\w+)', text)[1] == picture_style.CARD
+    rules, _, _ = dark.partition("</style>")
+    assert re.search(rf'fill(?:="|: ){picture_style.CARD}"\][^{{]*{{fill:#14181d', rules)
+
+
+def brightness(color):
+    """As the contrast of WCAG 2 has it."""
+    parts = [int(color[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [one / 12.92 if one <= 0.03928 else ((one + 0.055) / 1.055) ** 2.4 for one in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    dark, light = sorted(map(brightness, (one, other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_words_and_lines_are_seen_on_a_dark_page():
+    dark = picture_style.DARK
+    for word in (picture_style.INK, picture_style.SOFT):
+        for ground in (picture_style.CARD, picture_style.SHEET, "#d3e6f3", "#f8dfcf", "#d0ece3", "#fbecc8", "#f4e1ec"):
+            assert contrast(dark[word], dark[ground]) >= 4.5, (word, ground)
+    for line in picture_style.PALETTE:
+        assert contrast(dark.get(line, line), dark[picture_style.CARD]) >= 3, line
+
+
+def test_a_picture_is_in_other_colors_on_a_dark_page_and_the_same_on_a_light_one():
+    light = f'<svg viewBox="0 0 1 1"><rect fill="{picture_style.CARD}"/><text style="fill: {picture_style.INK}"/></svg>'
+    both = picture_style.for_dark_pages(light)
+    style = re.search(r"\n<style>.*</style>", both, re.DOTALL)[0]
+    assert both.replace(style, "") == light
+    assert style.count("!important") == 2
+    assert picture_style.DARK[picture_style.INK] in style
+    assert picture_style.for_dark_pages('<svg><rect fill="#efe9d8"/></svg>') == '<svg><rect fill="#efe9d8"/></svg>'
 
 
 def test_ids_do_not_depend_on_the_last_digit_of_a_coordinate(tmp_path):

@@ -434,10 +434,29 @@ def test_the_picture_of_the_front_rings_what_to_build():
     build = compute.to_build(points)
     figure = front_picture.picture(points)
     assert build in figure._suptitle.get_text()
-    for panel, metric in zip(figure.axes, picture.METRICS, strict=True):
-        (ring,) = (line for line in panel.lines if line.get_markersize() == 13)
+    for axes, name, factor in zip(figure.axes, ("miscounted", "barycenter_mm"), (100, 1), strict=True):
+        (ring,) = (line for line in axes.lines if line.get_markersize() == 13)
         (best,) = [one for one in points if (one.task.method, one.task.family) == (build, "fingers")]
-        assert ring.get_xydata().tolist() == [[compute.reached_us(best), picture.error(best, metric.name)]]
+        assert ring.get_xydata().tolist() == [[compute.reached_us(best), factor * picture.error(best, name)]]
+
+
+def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
+    points = numbers.read(ROOT / tables.NUMBERS)
+    axes, _ = front_picture.picture(points).axes
+    left, right = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    marks = {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xydata()) == 1}
+    shown = [method for row in front_picture.ROWS.values() for method in row.methods.values()]
+    assert len(marks) == len(shown) == len(set(shown))
+    for line in csv.DictReader((ROOT / tables.NUMBERS).read_text(encoding="utf-8").splitlines()):
+        if line["family"] == "fingers" and line["method"] in shown:
+            x, y = float(line["touch_median_us"]) + float(line["host_us"]), 100 * float(line["total_miscounted"])
+            assert any((x, y) == pytest.approx(mark) for mark in marks), line["method"]
+            assert left < x < right
+            assert bottom < y < top
+            fast = (line["method"].startswith("reversal"), 24_000_000, 12_000_000)
+            skin = METHODS[line["method"]].skin
+            assert ((skin.clock_hz, skin.baud) == fast[1:]) == fast[0]  # as the legend says
 
 
 def test_walls_and_rivals_are_drawn_as_such():
@@ -447,7 +466,8 @@ def test_walls_and_rivals_are_drawn_as_such():
     points = [dataclasses.replace(one, least_mm=floor) if one.task.method == build else one for one in points]
     found = {name: Interval(0.1, 0.05, 0.2, 400) for name in errors.METRICS}
     rival = beside.RivalMethod("analog array", "fingers", errors.Quantile(7e3, 6e3, 8e3, 200), found)
-    count, place = front_picture.picture(points, [rival]).axes
+    row = FAMILIES_DRAWN.index("fingers")
+    count, place = picture.picture(points, [rival]).axes[2 * row : 2 * row + 2]
     assert "analog array, model" in {text.get_text() for text in count.texts}
     bits = beside.bits_us([one for one in points if one.task.family == "fingers"])
     for panel in (count, place):

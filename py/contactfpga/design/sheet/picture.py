@@ -10,12 +10,12 @@ from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, Coppe
 from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
-_BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#1d232b", "#ffffff", "#6b7a8f"
+_BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#20262e", "#ffffff", "#6b7a8f"
 
 
 def svg(drawing: Drawing, title: str) -> str:
     """The text of the file; a user unit is a millimeter."""
-    return "\n".join([*_lines(drawing, title), ""])
+    return picture_style.for_dark_pages("\n".join([*_lines(drawing, title), ""]))
 
 
 def _lines(drawing: Drawing, title: str) -> Iterator[str]:
@@ -100,5 +100,5 @@ def _legend(left: float, y: float, size: float) -> Iterator[str]:
     for number, (color, said) in enumerate(words):
         x = left + number * 9 * size
         yield f'<path fill="{color}" d="{_box(x, y - 0.75 * size, size, 0.75 * size)}"/>'
-        style = f'font-family="sans-serif" font-size="{size:.2f}" fill="{_PRINT}"'
+        style = f'font-family="sans-serif" font-size="{size:.2f}" fill="{picture_style.INK}"'
         yield f'<text x="{x + 1.4 * size:.2f}" y="{y:.2f}" {style}>{said}</text>'

@@ -10,7 +10,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.chart import beside, front_picture, host, numbers, picture, speed, times_picture
+from contactfpga_sim.lab.chart import beside, front_picture, host, numbers, speed, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, covered, front, reached_us, study, to_build
 from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
@@ -36,12 +36,9 @@ def compute() -> list[Point]:
 
 
 def draw(folder: Path, points: list[Point]) -> list[Path]:
-    """The chart, its times, and the README's picture."""
-    chart, small = folder.parent / "chart", folder / "front.svg"
-    picture.save(points, chart)
-    times_picture.save(points, chart / "times.svg")
-    front_picture.save(points, small)
-    return [chart / "chart.svg", chart / "times.svg", small]
+    """The README's picture, and the times of all methods."""
+    times = times_picture.save(points, folder.parent / "chart" / "times.svg")
+    return [times, front_picture.save(points, folder / "front.svg")]
 
 
 HEAD = (

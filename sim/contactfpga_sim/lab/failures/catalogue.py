@@ -11,6 +11,7 @@ KNOBS = {
         touch.CROSSING,
         touch.MANY,
         touch.CLOSING,
+        touch.LIGHT,
         touch.MOVING,
         touch.BOUNCE,
         electric.SETTLE,

@@ -1,4 +1,4 @@
-"""A knob as a picture: results at each value, and the sheet before and at the first break.
+"""A knob as a picture: the share of right draws at each value, and the sheet before and at the first break.
 
 Hand-written, so that the same numbers always make the same file.
 """
@@ -6,15 +6,18 @@ Hand-written, so that the same numbers always make the same file.
 from __future__ import annotations
 
 import html
+import itertools
 import math
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contactfpga import picture_style as style
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
+from contactfpga_sim.lab.failures.rated import Rated
 from contactfpga_sim.lab.failures.rig import plural
 
 LETTER = 7.5
@@ -69,123 +72,133 @@ def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int
     return found
 
 
-def rounded_up(amounts: Sequence[float]) -> list[float]:
-    """Round steps from 0, at most four, to the least one above all amounts; integers for integers."""
-    most, whole = max(amounts), all(amount == int(amount) for amount in amounts)
-    if most <= 0:
-        return [0.0, 1.0]
-    power = 10.0 ** math.floor(math.log10(most / 4))
-    steps = [power * times for times in (1, 2, 2.5, 5, 10)]
-    step = next(one for one in steps if one * 4 >= most * (1 - 1e-9) and (one >= 1 or not whole))
-    return [step * number for number in range(math.ceil(most / step - 1e-9) + 1)]
-
-
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
 TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}
 """Height of a bar, which repeats its color's meaning."""
 
-LEGEND = {
-    "right": (52, "right"),
-    "warned": (118, "right, with a warning"),
-    "told": (284, "wrong, and the system says so"),
-    "silent": (502, "wrong, not noticed"),
-}
-"""Position of each word."""
+WORDS = {"right": "right", "warned": "right, warned", "told": "wrong, reported", "silent": "wrong, not noticed"}
+"""Below the first bar of each kind."""
 
-LINES = ((style.SKY, 7.0), (style.PURPLE, 5.0), (style.BLUE, 3.0), (style.BLACK, 1.2))
-"""Color and width; later methods are wider, so that coinciding lines stay visible."""
+NAME, LEFT, TOP, HIGH = 16, 190, 66, 44
+"""Where a method's name and its chart begin, and the height of the chart, in pixels."""
 
-LEFT, TOP, HIGH = 52, 62, 110
-"""Origin of the chart, and its height, in pixels."""
+BESIDE, ALONE = 274, 510
+"""Width of the charts beside two sheets, and without."""
 
-BESIDE, ALONE = 380, 640
-"""Width of the chart beside two sheets, and without."""
+STEP = 96
+"""From one method's chart to the next one's, with bars and their words."""
 
-STRIP = 36
-"""Height of a method's name and bars."""
-
-SIDE, SHEETS = 104, 470
-"""Size of a sheet, and position of the first."""
+SIDE, SHEETS = 104, (488, 604)
+"""Size of a sheet, and where each begins."""
 
 
 def svg(knob: Knob, methods: Mapping[str, Sweep]) -> str:
-    """The whole picture."""
+    """The whole picture. Methods of which the same came out at all values share a chart."""
+    charts = _alike(methods)
     method, sheets = _sheets(knob, methods)
     spans, scale = placed(knob.values, LEFT, BESIDE if sheets else ALONE)
-    bottom = TOP + HIGH + 22 + STRIP * len(methods)
-    height = max(bottom + 64, TOP + SIDE + 80)
+    bottom = TOP + STEP * len(charts)
+    height = max(bottom + 44, TOP + SIDE + 64 if sheets else 0)
+    level = _level(knob)
+    breaks = f"; a value breaks below the dashed line, {100 * level:g} %" if level and not sheets else ""
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {style.WIDTH_PX} {height}" '
         f'font-family="system-ui,sans-serif" font-size="12" fill="{style.INK}">',
         f'<rect width="{style.WIDTH_PX}" height="{height}" rx="8" fill="{style.CARD}"/>',
-        _text(16, 24, knob.title, 'font-size="14" font-weight="600"'),
-        *_chart(knob, methods, spans),
-        *_strips(methods, spans, TOP + HIGH + 18),
+        _text(NAME, 24, knob.title, 'font-size="14" font-weight="600"'),
+        _text(LEFT, TOP - 14, f"{knob.amount}{breaks}", SOFT),
+        *itertools.chain.from_iterable(
+            [*_chart(names, outcomes, spans, level, TOP + STEP * row), *_strip(outcomes, spans, TOP + STEP * row)]
+            for row, (names, outcomes) in enumerate(charts)
+        ),
         *_ticks(knob, spans, bottom + 8),
-        _text(LEFT, bottom + 26, f"{knob.axis}{scale}"),
-        *_legend(height - 14),
+        _text(LEFT, bottom + 28, f"{knob.axis}{scale}"),
     ]
-    for number, line in enumerate(textwrap.wrap(method, 34)):
-        parts.append(_text(SHEETS, TOP - 10 + 15 * number, line))
-    for number, (caption, outcome) in enumerate(sheets):
-        parts += _sheet(SHEETS + number * (SIDE + 20), TOP + 40, f"at {caption}", outcome)
-    return "\n".join([*parts, "</svg>"]) + "\n"
+    unit = knob.axis.rpartition(", ")[2] if ", " in knob.axis else ""
+    for number, line in enumerate(textwrap.wrap(_kept_together(method), 32)):
+        parts.append(_text(SHEETS[0], TOP - 14 + 15 * number, line, SOFT))
+    for left, (caption, outcome) in zip(SHEETS, sheets):
+        parts += _sheet(left, TOP + 26, f"at {caption} {unit}".rstrip(), outcome)
+    return style.for_dark_pages("\n".join([*parts, "</svg>"]) + "\n")
+
+
+SOFT = f'fill="{style.SOFT}"'
+
+
+def _level(knob: Knob) -> float | None:
+    """The share from which on a value holds, if one does for all methods."""
+    levels = {run.level for run in knob.runs.values() if isinstance(run, Rated)}
+    return levels.pop() if len(levels) == 1 else None
+
+
+def _alike(methods: Mapping[str, Sweep]) -> list[tuple[list[str], tuple[Outcome, ...]]]:
+    """Names of methods with what came out, together those of which the same share is right and is told."""
+    found: dict[Any, tuple[list[str], tuple[Outcome, ...]]] = {}
+    for name, sweep in methods.items():
+        key = tuple((outcome.amount, _kind(outcome)) for outcome in sweep.outcomes)
+        found.setdefault(key, ([], sweep.outcomes))[0].append(name)
+    return list(found.values())
 
 
 def _text(x: float, y: float, words: str, style: str = "") -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" {style}>{html.escape(words.replace("`", ""))}</text>'
 
 
-def _chart(knob: Knob, methods: Mapping[str, Sweep], spans: Sequence[Span]) -> list[str]:
-    """Draw the outcomes' amounts; 0 is the frame's bottom."""
-    ticks = rounded_up([outcome.amount for sweep in methods.values() for outcome in sweep.outcomes])
+def _chart(
+    names: Sequence[str], outcomes: Sequence[Outcome], spans: Sequence[Span], level: float | None, top: float
+) -> list[str]:
+    """The share of each value as a step, from 0 at the bottom to all at the top."""
     left, right = spans[0].start, spans[-1].end
-    parts = [_text(LEFT, TOP - 10, knob.amount)]
-    for tick in ticks:
-        y = TOP + HIGH - HIGH * tick / ticks[-1]
-        color = style.GRID if tick else style.SOFT
+    parts = []
+    for number, line in enumerate(textwrap.wrap(_kept_together("; ".join(names)), 20)):
+        parts.append(_text(NAME, top + 12 + 15 * number, line, 'font-weight="600"'))
+    for share, color in ((1, style.GRID), (0, style.SOFT)):
+        y = top + HIGH * (1 - share)
         parts.append(f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{color}"/>')
-        parts.append(_text(LEFT - 6, y + 4, f"{tick:,g}", 'text-anchor="end"'))
-    for (color, width), sweep in zip(LINES[-len(methods) :], methods.values(), strict=True):
-        joined = " ".join(
-            f"{span.middle:.1f},{TOP + HIGH - HIGH * outcome.amount / ticks[-1]:.1f}"
-            for span, outcome in zip(spans, sweep.outcomes, strict=True)
-        )
-        parts.append(
-            f'<polyline points="{joined}" fill="none" stroke="{color}" stroke-width="{width}" stroke-linejoin="round"/>'
-        )
+        parts.append(_text(LEFT - 6, y + 4, "all" if share else "none", f'text-anchor="end" {SOFT}'))
+    if level:
+        y = top + HIGH * (1 - level)
+        parts.append(f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{style.SOFT}" stroke-dasharray="3 3"/>')
+    steps = "".join(
+        f"{'M' if number == 0 else 'V'}{f'{left:.1f} ' if number == 0 else ''}{top + HIGH - HIGH * outcome.amount:.0f}"
+        f"H{span.end:.1f}"
+        for number, (span, outcome) in enumerate(zip(spans, outcomes, strict=True))
+    )
+    area = f"{steps}V{top + HIGH}H{left:.1f}z"
+    parts.append(f'<path class="shares" d="{area}" fill="{style.BLUE}" fill-opacity="0.15"/>')
+    parts.append(f'<path d="{steps}" fill="none" stroke="{style.BLUE}" stroke-width="2"/>')
     return parts
 
 
-def _strips(methods: Mapping[str, Sweep], spans: Sequence[Span], top: float) -> list[str]:
-    """A bar for each method and value."""
-    parts = []
-    for number, ((color, width), (method, sweep)) in enumerate(
-        zip(LINES[-len(methods) :], methods.items(), strict=True)
-    ):
-        y = top + number * STRIP
-        parts.append(f'<path d="M{LEFT} {y + 6:.1f}h20" stroke="{color}" stroke-width="{width}"/>')
-        parts.append(_text(LEFT + 26, y + 10, method))
-        for span, kind in zip(spans, map(_kind, sweep.outcomes), strict=True):
-            tall, wide = TALL[kind], max(1.0, span.end - span.start - 1)
-            parts.append(
-                f'<rect class="{kind}" x="{span.start:.1f}" y="{y + 30 - tall:.1f}" width="{wide:.1f}" '
-                f'height="{tall}" fill="{COLORS[kind]}"/>'
-            )
+def _kept_together(words: str) -> str:
+    """The same with a number and its unit on one line."""
+    return re.sub(r"(?<=\d) (?=\S)", "\N{NO-BREAK SPACE}", words)
+
+
+def _strip(outcomes: Sequence[Outcome], spans: Sequence[Span], top: float) -> list[str]:
+    """A bar for each value, and what it says below the first of each kind."""
+    y, parts, said, end = top + HIGH + 6, [], set(), -math.inf
+    kinds = list(map(_kind, outcomes))
+    for span, kind in zip(spans, kinds, strict=True):
+        wide = max(1.0, span.end - span.start - 1)
+        parts.append(
+            f'<rect class="{kind}" x="{span.start:.1f}" y="{y}" width="{wide:.1f}" '
+            f'height="{TALL[kind]}" fill="{COLORS[kind]}"/>'
+        )
+    for kind, run in itertools.groupby(zip(spans, kinds, strict=True), key=lambda each: each[1]):
+        parts_of_run = [span for span, _ in run]
+        start, stop = max(parts_of_run[0].start, end + LETTER), parts_of_run[-1].end
+        start = min(start, spans[-1].end - LETTER * len(WORDS[kind]) * 0.8)
+        if kind not in said and start > end and start < stop:
+            parts.append(_text(start, y + 26, WORDS[kind], f'font-size="11" {SOFT}'))
+            said.add(kind)
+            end = start + LETTER * 0.8 * len(WORDS[kind])
     return parts
 
 
 def _ticks(knob: Knob, spans: Sequence[Span], y: float) -> list[str]:
     words = [knob.format.format(value) for value in knob.values]
     return [_text(spans[index].middle, y, words[index], 'text-anchor="middle"') for index in shown(words, spans)]
-
-
-def _legend(y: float) -> list[str]:
-    parts = []
-    for kind, (x, words) in LEGEND.items():
-        parts.append(f'<rect x="{x}" y="{y - TALL[kind]}" width="12" height="{TALL[kind]}" fill="{COLORS[kind]}"/>')
-        parts.append(_text(x + 18, y, words))
-    return parts
 
 
 def _kind(outcome: Outcome) -> str:

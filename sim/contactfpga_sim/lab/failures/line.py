@@ -266,7 +266,7 @@ CLOCK_PER_CENT = 0.1
 CLOCK = Knob(
     name="clock",
     title="A board whose clock is fast",
-    axis="%",
+    axis="its error, %",
     amount=SHARE,
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
     runs={"board with `clock_hz` off": Rated(_clock, most=480)},

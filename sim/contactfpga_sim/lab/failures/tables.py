@@ -109,7 +109,12 @@ SAID = {
 
 def pictures() -> str:
     """A heading for each knob, and a picture or what is said in its place."""
-    shown = {name: f"![{knob.title}](images/failures/{name}.svg)" for name, knob in KNOBS.items()} | SAID
+    return headed(KNOBS, "failures", SAID)
+
+
+def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> str:
+    """A heading for each knob, and its picture in a folder of ``docs/images``, or what is said in its place."""
+    shown = {name: f"![{knob.title}](images/{folder}/{name}.svg)" for name, knob in knobs.items()} | dict(said)
     return "\n".join(f"### `{name}`\n\n{what}\n" for name, what in shown.items())
 
 

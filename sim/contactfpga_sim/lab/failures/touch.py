@@ -1,4 +1,9 @@
-"""Knobs of touch: close contacts, a moving one, bouncing switches, a winding arm, crossing shadows, too many zones."""
+"""Knobs of touch: close contacts, a light one, a moving one, bouncing switches, a winding arm, crossing shadows, too
+many zones.
+
+Fingers press a bare sheet, on which a switch closes under the middle of a contact whatever its force, and the starter
+kit's sheet with its cover.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,8 @@ import math
 import numpy as np
 
 from contactfpga.choices.labellers import LABELLERS
+from contactfpga.design.cover import Cover, load_cover
+from contactfpga.design.kits import kit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.knob import Knob, Outcome
@@ -29,11 +36,22 @@ from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Track
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
 
+STARTER = kit("starter")
+COVER = load_cover(STARTER.skin_path)
 
-def _pair(gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator) -> Scene:
-    """Two fingers at a random place near the middle of the sheet, at any angle."""
-    x, y = pitch_mm * rng.uniform(7, 8, 2)
-    return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180)))
+
+def _middle(pitch_mm: float, rng: np.random.Generator) -> np.ndarray:
+    """Any place of a pitch near the middle of the sheet, in mm."""
+    return pitch_mm * rng.uniform(7, 8, 2)
+
+
+def _pair(
+    gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator, force_n: float | None = None
+) -> Scene:
+    """Two fingers around :func:`_middle`, at any angle, each with this force."""
+    x, y = _middle(pitch_mm, rng)
+    forces = {} if force_n is None else {"force_n": force_n}
+    return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180), **forces))
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
@@ -41,10 +59,19 @@ def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generato
     pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
-    return [_pair_told(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
+    return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
 
 
-def _pair_told(zones: Zones, cells: np.ndarray, there: int) -> Outcome:
+def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """The same fingers on the starter kit's sheet."""
+    skin = STARTER.skin
+    scenes = (_pair(gap_mm, 8.0, skin.pitch_x_mm, rng, force_n) for _ in range(count))
+    cells = np.array([scene.pressed(0.0, skin, COVER) for scene in scenes])
+    return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
+
+
+def _counted(zones: Zones, cells: np.ndarray, there: int) -> Outcome:
+    """Right if there are as many zones as contacts."""
     what = f"{plural(len(zones), 'zone')} of {plural(there, 'contact')}"
     return Outcome(len(zones) == there, faults(zones), what, cells=cells, zones=places(zones))
 
@@ -61,8 +88,9 @@ CLOSING = Knob(
         )
         for pitch in (10, 5)
         for connectivity in (8, 4)
-    },
-    helps="a finer pitch; 4-connectivity",
+    }
+    | {f"starter kit, {force} N each": Rated(functools.partial(_closing_covered, force)) for force in (2, 5, 10)},
+    helps="a finer pitch; 4-connectivity; a light touch",
     unnoticed="the same switches are pressed as by one contact of that shape",
     closed={
         f"{connectivity}-connectivity, {pitch} mm": round(pitch * (math.sqrt(2) if connectivity == 8 else 1), 2)
@@ -73,6 +101,28 @@ CLOSING = Knob(
     "pitches on, by 4-connectivity from one on",
 )
 
+
+def _light(radius_mm: float, force_n: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    """One finger anywhere near the middle of the starter kit's sheet."""
+    skin, cells = STARTER.skin, []
+    for _ in range(count):
+        x, y = _middle(skin.pitch_x_mm, rng)
+        finger = Contact(shape=contacts.disc(radius_mm), x_mm=x, y_mm=y, force_n=force_n)
+        cells.append(Scene((finger,)).pressed(0.0, skin, COVER))
+    return [_counted(zones, each, 1) for zones, each in zip(seen(skin, np.array(cells)), cells)]
+
+
+LIGHT = Knob(
+    name="light",
+    title="A finger that presses lightly on the starter kit",
+    axis="force, N",
+    amount=SHARE,
+    values=(20, 15, 10, 8, 6, 5, 4, 3.5, 3, 2.5, 2, 1.5, 1.25, 1, 0.75, 0.5),
+    runs={f"flat, {2 * radius} mm": Rated(functools.partial(_light, float(radius))) for radius in (4, 8, 12)},
+    helps="switches of less force; `contactfpga cover felt` says from which force on a finger is felt",
+    unnoticed="a switch that is pressed too lightly to close is one that nobody touches",
+)
+
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Directions of motion: along columns and rows, both ways."""
 
@@ -80,9 +130,9 @@ FIRST, LAST = 2.0, 13.0
 """Start and end of a moving finger, in pitches."""
 
 
-def _slide(skin: Skin, speed: float, rng: np.random.Generator) -> Outcome:
-    """The worst frame of a finger that starts at any time of a scan, by the distance of its zone from the finger at the
-    frame's time; infinite without exactly one zone."""
+def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
+    """The frame whose zones are farthest from the finger of 10 N at the frame's time, which starts at any time of a
+    scan. A frame without exactly one zone is infinitely far."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -92,26 +142,27 @@ def _slide(skin: Skin, speed: float, rng: np.random.Generator) -> Outcome:
     middle = rng.uniform(7, 8) * pitch
     x, y = (moving, middle) if way[0] else (middle, moving)
     scene = Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),))
+    pressed = scene.on(skin, cover)
     with Rig(skin) as rig:
         while rig.board.cycle < end * skin.clock_hz:
-            rig.board.press(scene.pressed(rig.board.cycle / skin.clock_hz, skin))
+            rig.board.press(pressed(rig.board.cycle / skin.clock_hz))
             rig.board.run(derived.row_clocks)
         rig.board.run(2 * rig.scan)
         frames = [zones for zones in rig.frames() if start * 1e6 <= zones.time_us <= end * 1e6]
-    return max((_off(skin, scene, zones) for zones in frames), key=lambda one: one.amount)
+    return max((_off(skin, cover, scene, zones) for zones in frames), key=lambda one: one.amount)
 
 
-def _off(skin: Skin, scene: Scene, zones: Zones) -> Outcome:
+def _off(skin: Skin, cover: Cover | None, scene: Scene, zones: Zones) -> Outcome:
     seconds, far, what = zones.time_us / 1e6, math.inf, f"{plural(len(zones), 'zone')} of 1 contact"
     truth = scene.truth(seconds).contacts[0]
     if len(zones) == 1 and zones[0].x_mm is not None and zones[0].y_mm is not None:
         far = math.hypot(zones[0].x_mm - truth.x_mm, zones[0].y_mm - truth.y_mm) / skin.pitch_x_mm
         what = f"zone {far:.1f} pitches off"
-    return Outcome(far <= 1, faults(zones), what, far, scene.pressed(seconds, skin), places(zones))
+    return Outcome(far <= 1, faults(zones), what, far, scene.pressed(seconds, skin, cover), places(zones))
 
 
-def _moving(skin: Skin, speed: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    return [_slide(skin, speed, rng) for _ in range(count)]
+def _moving(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+    return [_slide(skin, cover, speed, rng) for _ in range(count)]
 
 
 MOVING = Knob(
@@ -121,8 +172,9 @@ MOVING = Knob(
     amount=SHARE,
     values=(0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={
-        "`raster`": Rated(functools.partial(_moving, REFERENCE), most=480),
-        "`adaptive`": Rated(functools.partial(_moving, adaptive_skin(16, 16)), most=480),
+        "`raster`": Rated(functools.partial(_moving, REFERENCE, None), most=480),
+        "`adaptive`": Rated(functools.partial(_moving, adaptive_skin(16, 16), None), most=480),
+        "starter kit, 10 N": Rated(functools.partial(_moving, STARTER.skin, COVER), most=120),
     },
     helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time, `adaptive`",
     unnoticed="a zone one pitch from its finger looks like one in its place; only where faster motion tears a frame is "
@@ -221,7 +273,7 @@ def _turned(cells: np.ndarray, turns: int, mirrored: int) -> np.ndarray:
 
 def _both(zones: Zones, pair: list[np.ndarray]) -> Outcome:
     right = reported(zones) == sorted(map(moments, pair))
-    return dataclasses.replace(_pair_told(zones, np.logical_or(*pair), 2), right=right)
+    return dataclasses.replace(_counted(zones, np.logical_or(*pair), 2), right=right)
 
 
 WINDING = Knob(
@@ -241,7 +293,7 @@ def _crossing(skin: Skin, distance_mm: float, rng: np.random.Generator, count: i
     scenes = [_pair(gap, FINGER_MM, pitch, rng) for _ in range(count)]
     cells = np.array([scene.pressed(0.0, skin) for scene in scenes])
     counts = [scene.truth(0.0).count for scene in scenes]
-    return [_pair_told(zones, each, there) for zones, each, there in zip(seen(skin, cells), cells, counts)]
+    return [_counted(zones, each, there) for zones, each, there in zip(seen(skin, cells), cells, counts)]
 
 
 CROSSING = Knob(

@@ -156,20 +156,22 @@ def breaks_table() -> str:
     return writer.table(tables.HEAD, lines)
 
 
+SAID = {"lifted": "The picture is that of [`clipping`](#clipping), but `lifted` reports every break."}
+"""In place of a picture that would repeat another one."""
+
+
 def breaks_pictures() -> str:
-    """A heading and a picture for each break."""
-    return "\n".join(
-        f"### `{knob.name}`\n\n![{knob.title}](images/haptics/{knob.name}.svg)\n" for knob in breaks.KNOBS.values()
-    )
+    """A heading for each, and a picture or what is said in its place."""
+    return tables.headed(breaks.KNOBS, "haptics", SAID)
 
 
 def draw_felt(folder: Path) -> list[Path]:
     """Error over time, and a picture for each break."""
     drawn = [_front(folder / "haptics-front.svg")]
     (folder / "haptics").mkdir(exist_ok=True)
-    for name, methods in swept().items():
+    for name in (one for one in breaks.KNOBS if one not in SAID):
         path = folder / "haptics" / f"{name}.svg"
-        write_text(path, knob_pictures.svg(breaks.KNOBS[name], methods))
+        write_text(path, knob_pictures.svg(breaks.KNOBS[name], swept()[name]))
         drawn.append(path)
     return drawn
 

@@ -75,7 +75,7 @@ def svg(drawn: Sequence[Panel]) -> str:
         x = MARGIN + index % ACROSS * (PANEL + MARGIN)
         y = MARGIN + HEAD + index // ACROSS * step
         lines += [f'<g transform="translate({x} {y})">', *_panel(panel), "</g>"]
-    return "\n".join([*lines, "</svg>"]) + "\n"
+    return style.for_dark_pages("\n".join([*lines, "</svg>"]) + "\n")
 
 
 def _panel(panel: Panel) -> list[str]:
