@@ -9,7 +9,6 @@ from contactfpga_sim.lab.net import load, tables
 from contactfpga_sim.lab.registry import StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
-
 ROOT = Path(__file__).resolve().parents[2]
 
 
