@@ -20,7 +20,7 @@ def draw(path: Path) -> Path:
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):
-        figure = style.new(6.5)
+        figure = style.new(7.3)
         axes = figure.subplots()
         axes.set_aspect("equal")
         axes.axis("off")
@@ -122,8 +122,9 @@ def _words(axes: Any) -> None:
     x, y = _x(SIZE), _y(SIZE)
     axes.text(x + 0.12, y + 0.45, "stays open", ha="left", va="center", color=style.VERMILLION)
     said = (
-        "Squares: pins of the FPGA board. Dashed: only where the scan reads rows (reversal). The guard lines\n"
-        "are soldered at the far ends, through a diode each and without a switch, so that a signal has passed the whole line."
+        "Squares: pins of the FPGA board. Dashed: only where the scan reads rows (reversal).\n"
+        "The guard lines are soldered at the far ends, through a diode each and without a switch,\n"
+        "so that a signal has passed the whole line."
     )
     axes.text(-1.1, y - 1.15, said, ha="left", va="top", color=style.SOFT)
 
