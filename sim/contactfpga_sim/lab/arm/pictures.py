@@ -57,8 +57,8 @@ def course(found: dict[str, RunRecord], field: str, label: str) -> Figure:
     place.set(ylabel=label, xlabel="time from the touch, ms", xlim=(1e3 * FROM_S, 1e3 * TO_S))
     keys = {"a switch closes": "o", "the controller reacts": "x"}
     marks = [Line2D([], [], color=style.SOFT, marker=mark, linestyle="", fillstyle="none") for mark in keys.values()]
-    lines = place.get_legend_handles_labels()
-    figure.legend(lines[0] + marks, [*lines[1], *keys], loc="outside lower center", ncols=5)
+    lines, names = place.get_legend_handles_labels()
+    figure.legend([*lines, *marks], [*names, *keys], loc="outside lower center", ncols=5)
     return figure
 
 
