@@ -73,7 +73,7 @@ def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeyp
     monkeypatch.setattr(pictures, "plan", lambda case: few)
     assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
     said = capsys.readouterr().out
-    ends = [f"{name}.{end}" for name in ("arm-force", "arm-speed", "arm-thickness") for end in ("png", "svg")]
+    ends = [f"{name}.{end}" for name in ("arm-force", "arm-thickness") for end in ("png", "svg")]
     assert all(str(tmp_path / name) in said.replace("\n", "") for name in [*ends, "arm-charts.csv"])
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted([*ends, "arm-charts.csv"])
 
@@ -108,10 +108,10 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
     assert slow.peak_force_n < fast.peak_force_n == pytest.approx(at.peak_force_n)
     drawn = dataclasses.replace(few, sheet={"uart": few.force[:1], "pin": few.force[:1]})
     paths = pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))
-    assert [path.name for path in paths] == ["arm-force.svg", "arm-speed.svg", "arm-thickness.svg"]
+    assert [path.name for path in paths] == ["arm-force.svg", "arm-thickness.svg"]
     texts = [path.read_text() for path in paths]
     assert all("<svg" in text for text in texts)
-    assert "paper, 12 N" in texts[0]
+    assert "paper: 12 N when it reacts, after 6 ms" in texts[0]
     assert pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))[0].read_text() == texts[0]
     text = pictures.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
     lines = list(csv.DictReader(text.splitlines()))
@@ -127,7 +127,7 @@ def test_the_page_and_its_pictures_are_what_the_study_makes(tmp_path):
         name: section("arm.md", name) for name in run.study.sections
     }
     drawn = run.call(run.study.pictures, tmp_path)
-    assert len(drawn) == 5
+    assert len(drawn) == 4
     for picture in drawn:
         assert picture.read_text() == (Path(__file__).parents[2] / "docs/images" / picture.name).read_text(), (
             picture.name

@@ -3,6 +3,7 @@
 import importlib.util
 import itertools
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from study_pages import outdated, section
 from contactfpga_sim.lab.tracking import scenes, scores, tables
 from contactfpga_sim.lab.tracking.scores import Nearest
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/tracking.md"
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs/tracking.md"
 PITCH_MM = 10.0
 PAGE_RATES = ("100", "1,000", "10,000")
 NAMES = [name for name in scores.TRACKERS if name != "Norfair" or importlib.util.find_spec("norfair")]
@@ -171,6 +173,21 @@ def test_a_row_of_the_scores_is_up_to_date():
 def test_all_scores_are_up_to_date():
     pytest.importorskip("norfair")
     assert not outdated("tracking", "scores")
+
+
+def test_the_picture_shows_the_scores_of_the_tables_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    drawn = tables.draw(tmp_path)
+    assert drawn.read_text(encoding="utf-8") == (ROOT / "docs/images/tracking.svg").read_text(encoding="utf-8")
+    seen = []
+    monkeypatch.setattr(tables.style, "save", lambda figure, path: seen.append(figure))
+    tables.draw(tmp_path)
+    crossing = next(axes for axes in seen[0].axes if axes.get_title(loc="left") == "crossing")
+    with open(ROOT / "docs/tables/tracking-scores.csv", encoding="utf-8") as file:
+        lines = [line for line in file if line.startswith("`crossing`,")]
+    norfair = [float(re.findall(r"([\d.]+) ±", line)[3]) for line in lines]
+    assert crossing.lines[3].get_ydata().tolist() == norfair
+    assert crossing.lines[3].get_xdata().tolist() == [25, 100, 1000, 10_000]
 
 
 def test_ten_thousand_frames_per_second_with_two_contacts():

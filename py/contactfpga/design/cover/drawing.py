@@ -13,9 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contactfpga import picture_style as style
-from contactfpga.design.cover import arm, elastic, impact, line, medium, point
-from contactfpga.design.cover.answer import NoSolution
-from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover import line, medium, point
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.task import FIRST_DESIGN, WORST_M, Task
@@ -25,11 +23,17 @@ COLORS = {"halfspace": style.BLUE, "bonded": style.VERMILLION, "frictionless": s
 LIMIT: dict[str, Any] = {"color": style.SOFT, "linewidth": 1.0, "linestyle": style.DASHES[2]}
 FITS = "#cfe3d4"
 
+FIRST_M, MOST_N = 5e-3, 200.0
+"""Thickness of the paper's cover, and the largest force that is drawn."""
+
+THIN_M = 1e-3
+"""Thickness and pitch from which the map of designs is computed."""
+
 
 def draw(folder: Path, suffix: str, task: Task = FIRST_DESIGN, data: tuple[Floats, Floats] | None = None) -> list[Path]:
     """Every picture into ``folder`` as ``png`` or ``svg``; Fig. 9 only with ``data``: forces (N), deformations (m)."""
     with matplotlib.rc_context(style.SETTINGS):
-        figures = {"cover-force": force(task.switch), "cover-impact": course(task), "cover-map": design_map(task)}
+        figures = {"cover-force": force(task.switch), "cover-map": design_map(task)}
         if data:
             figures["cover-line"] = deformation(*data)
         return [save(figure, folder / f"{name}.{suffix}") for name, figure in figures.items()]
@@ -42,42 +46,21 @@ def force(switch: Switch) -> Figure:
     offsets, depths = np.linspace(0, 10e-3, 201), np.linspace(2e-3, 20e-3, 181)
     for name, dashes in zip(medium.MEDIA, style.DASHES):
         look: dict[str, Any] = {"color": COLORS[name], "label": name, "linestyle": dashes}
-        left.plot(1e3 * offsets, _closing(switch, offsets, np.full(201, 5e-3), name), **look)
+        left.plot(1e3 * offsets, _closing(switch, offsets, np.full(201, FIRST_M), name), **look)
         right.plot(1e3 * depths, _closing(switch, np.full(181, WORST_M), depths, name), **look)
     left.axvline(1e3 * WORST_M, **LIMIT)
-    left.set(ylabel="force that closes the switch, N", ylim=(0, 200), xlim=(0, 10))
+    right.axvline(1e3 * FIRST_M, **LIMIT)
+    left.set(ylabel="force that closes the switch, N", ylim=(0, MOST_N), xlim=(0, 10))
     left.set_xlabel("distance from the switch, mm")
     right.set(xlabel="thickness of the cover, mm", xlim=(0, 20))
-    left.set_title("cover 5 mm thick", loc="left")
+    left.set_title(f"cover {1e3 * FIRST_M:g} mm thick", loc="left")
     right.set_title(f"{1e3 * WORST_M:.2f} mm from the switch", loc="left")
     least_n = point.least_force_n(switch, WORST_M)
     right.plot(1e3 * point.best_thickness_m(WORST_M), least_n, "o", ms=5, color=style.INK)
     lines = [*left.get_lines()[:3], Line2D([], [], **LIMIT), right.get_lines()[-1]]
-    names = [*medium.MEDIA, f"farthest place, {1e3 * WORST_M:.2f} mm", f"least by halfspace: {least_n:.0f} N"]
-    figure.legend(lines, names, loc="outside lower center", ncols=5)
-    return figure
-
-
-def course(task: Task) -> Figure:
-    """Indentation, speed and force over time for the task's foams."""
-    figure = style.new(3.3)
-    places = figure.subplots(1, 3)
-    for number, foam in enumerate(task.foams[:6]):
-        stiffness = elastic.stiffness(Ball(task.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, task.poisson)))
-        hit = impact.strike(task.arm, task.speed_m_s, stiffness)
-        if isinstance(hit, NoSolution):
-            continue
-        over = arm.course(task.arm, task.speed_m_s, stiffness, hit.compression_m)
-        look: dict[str, Any] = {"color": style.PALETTE[number], "linestyle": style.DASHES[number % len(style.DASHES)]}
-        for place, values in zip(places, (1e3 * over.indentation_m, over.speed_m_s, over.force_n)):
-            place.plot(1e3 * over.time_s, values, label=foam.name, **look)
-    for place, name in zip(places, ("pressed in, mm", "speed, m/s", "force, N")):
-        place.axhline(0, color=style.SOFT, linewidth=0.8)
-        place.axvline(1e3 * task.latency_s, label=f"the arm reacts, {1e3 * task.latency_s:g} ms", **LIMIT)
-        place.set_xlabel("time since the touch, ms")
-        place.set_ylabel(name)
-        place.set_xlim(left=0)
-    figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    other = f"{1e3 * WORST_M:.2f} mm, the farthest place, and {1e3 * FIRST_M:g} mm: the other panel's"
+    names = [*medium.MEDIA, other, f"least by halfspace: {least_n:.0f} N"]
+    figure.legend(lines, names, loc="outside lower center", ncols=3, title=f"Forces above {MOST_N:g} N are cut off")
     return figure
 
 
@@ -85,8 +68,8 @@ def design_map(task: Task) -> Figure:
     """The force felt everywhere over thickness and pitch, by the half-space and by the bonded layer, and the limits."""
     figure = style.new(4.2)
     places = figure.subplots(1, 2, sharey=True)
-    thickness = np.linspace(1e-3, 2 * task.thickness_m, 120)
-    pitch = np.linspace(1e-3, 2 * task.pitch_m, 120)
+    thickness = np.linspace(THIN_M, 2 * task.thickness_m, 120)
+    pitch = np.linspace(THIN_M, 2 * task.pitch_m, 120)
     levels = [5, 10, 20, 50, 100, 200, 500]
     named = []
     for place, name in zip(places, ("halfspace", "bonded")):
@@ -103,6 +86,8 @@ def design_map(task: Task) -> Figure:
         place.set_xlabel("thickness, mm")
         place.set(xlim=(0, 2e3 * task.thickness_m), ylim=(0, 2e3 * task.pitch_m))
     places[0].set_ylabel("pitch, mm")
+    title = f"Force felt everywhere, for thickness and pitch from {1e3 * THIN_M:g} mm on"
+    figure.suptitle(title, x=0.02, ha="left", fontsize=style.LARGE)
     keys = {
         f"closes everywhere at {task.force_n:g} N": Line2D([], [], color=style.INK, linewidth=2),
         f"at most {1e3 * task.thickness_m:g} mm thick, pitch {1e3 * task.pitch_m:g} mm": Line2D([], [], **LIMIT),

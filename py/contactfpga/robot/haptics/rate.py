@@ -9,7 +9,7 @@ import dataclasses
 import functools
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -255,14 +255,18 @@ def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(5.6)
-        grid = figure.add_gridspec(2, 2, width_ratios=(2, 3))
+        figure = style.new(6.6)
+        grid = figure.add_gridspec(2, 2, width_ratios=(1, 1), height_ratios=(6, 5))
         _draw_units(figure.add_subplot(grid[0, 0], projection="3d"), needs, ratings[0])
         _draw_seen(figure, figure.add_subplot(grid[0, 1]), needs, ratings[0].seen)
-        _draw_map(figure, figure.add_subplot(grid[1, 1]), needs, 1e3 * ratings[0].errors_m, "error of the place, mm")
+        _draw_map(
+            figure, figure.add_subplot(grid[1, 1]), needs, 1e3 * ratings[0].errors_m, "the best: error of the place, mm"
+        )
         others = figure.add_subplot(grid[1, 0])
         _draw_all(others, ratings)
-        figure.legend(*others.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        figure.legend(
+            *others.get_legend_handles_labels(), loc="outside lower left", ncols=4, title="All that were tried"
+        )
         return style.save(figure, path)
 
 
@@ -276,7 +280,7 @@ def _draw_units(place: Axes, needs: Requirements, rating: Rating) -> None:
         end = start + 1e3 * length * np.array(unit.axis)
         place.plot(*np.stack([start, end], axis=1), color=style.VERMILLION, linewidth=2)
         place.plot(*start[:, None], "o", ms=4, color=style.BLUE)
-    place.set_title(rating.layout.name, loc="left", fontsize=style.NORMAL)
+    place.set_title(f"the best: {rating.layout.name}", loc="left", fontsize=style.NORMAL)
     place.set_box_aspect(np.ptp(points, axis=0) + 0.3 * float(np.ptp(points, axis=0).max()))
     place.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
     place.locator_params(nbins=3)
@@ -286,27 +290,29 @@ def _draw_map(figure: Figure, place: Axes, needs: Requirements, values: Floats, 
     first, second = needs.size_m
     if isinstance(needs.surface, Cylinder):
         shown, extent = values.reshape(ALONG, AROUND), (0.0, 360.0, 1e3 * first, 1e3 * second)
-        place.set(xlabel="around the link, degrees", ylabel="along it, mm")
+        place.set(xlabel="place around the link, degrees", ylabel="place along the link, mm")
     else:
         shown, extent = values.reshape(ALONG, ALONG), (-500 * first, 500 * first, -500 * second, 500 * second)
         place.set(xlabel="x, mm", ylabel="y, mm")
     image = place.imshow(shown, origin="lower", extent=extent, aspect="auto", cmap="cividis")
     figure.colorbar(image, ax=place)
-    place.set_title(name, loc="left")
+    place.set_title(name, loc="left", fontsize=style.NORMAL)
 
 
 def _draw_seen(figure: Figure, place: Axes, needs: Requirements, seen: Floats) -> None:
     """Draw detectable forces by place; around a cylinder, where the place is irrelevant, by direction."""
     first, second = needs.size_m
     if not isinstance(needs.surface, Cylinder) or seen.shape[1] == 1:
-        _draw_map(figure, place, needs, seen.max(axis=1), "smallest force seen, N")
+        _draw_map(figure, place, needs, seen.max(axis=1), "the best: smallest force seen, N")
         return
     shown = seen.reshape(ALONG, AROUND, -1).max(axis=1)[:, 1:]
     extent = (0.0, 360.0, 1e3 * first, 1e3 * second)
     image = place.imshow(shown, origin="lower", extent=extent, aspect="auto", cmap="cividis")
     figure.colorbar(image, ax=place)
-    place.set(xlabel="drag, degrees: 0 around the link, 90 along it", ylabel="along it, mm")
-    place.set_title("smallest force seen, N", loc="left")
+    place.set(
+        xlabel="direction of the drag, degrees\n(0 is around the link, 90 along it)", ylabel="place along the link, mm"
+    )
+    place.set_title("the best: smallest force seen, N", loc="left", fontsize=style.NORMAL)
 
 
 def _draw_all(place: Axes, ratings: list[Rating]) -> None:
@@ -314,6 +320,7 @@ def _draw_all(place: Axes, ratings: list[Rating]) -> None:
     for index, kind in enumerate(kinds):
         ones = [rating for rating in ratings if rating.layout.name.startswith(kind)]
         errors, forces = [1e3 * one.place_m for one in ones], [one.seen_n for one in ones]
-        place.plot(errors, forces, "os^Dv"[index % 5], ms=4, color=style.PALETTE[index], label=kind)
+        look: dict[str, Any] = {"ms": 9 - 1.5 * index, "mfc": "none", "mew": 1.4, "color": style.PALETTE[index]}
+        place.plot(errors, forces, "os^Dv"[index % 5], label=kind, **look)
     place.set(xlabel="error of the place, mm", ylabel="smallest force seen, N", xlim=(0, None), ylim=(0, None))
-    place.set_title("all that were tried", loc="left")
+    place.grid()

@@ -18,7 +18,7 @@ from contactfpga.tools.view.replayed import BoardRecording
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 
-HEIGHT_IN = 9.2
+HEIGHT_IN = 6.8
 COLORS = "cividis"
 
 
@@ -29,12 +29,12 @@ def draw(recording: BoardRecording, path: Path) -> Path:
         figure = style.new(HEIGHT_IN)
         # A name with dollar signs is no formula.
         figure.suptitle(title(recording, touches), x=0.02, ha="left", fontsize=style.LARGE, parse_math=False)
-        grid = figure.add_gridspec(4, 1, height_ratios=[3.2, 1.2, 1.6, 1.0])
-        _map(figure, figure.add_subplot(grid[0]), touches)
-        over_time = figure.add_subplot(grid[1])
-        _zones(over_time, touches)
-        _rows(figure, figure.add_subplot(grid[2], sharex=over_time), touches)
-        _losses(figure.add_subplot(grid[3], sharex=over_time), touches, recording)
+        grid = figure.add_gridspec(3, 2, height_ratios=[1, 1, 1.1])
+        _map(figure, figure.add_subplot(grid[:2, 0]), touches)
+        over_time = figure.add_subplot(grid[2, :])
+        _rows(figure, over_time, touches)
+        _zones(figure.add_subplot(grid[0, 1], sharex=over_time), touches)
+        _losses(figure.add_subplot(grid[1, 1], sharex=over_time), touches, recording)
         return style.save(figure, path)
 
 
@@ -53,9 +53,10 @@ def _map(figure: Figure, axes: Axes, touches: Touches) -> None:
     axes.set_facecolor(style.SHEET)
     image = axes.imshow(shown, extent=extent, origin="lower", cmap=COLORS, vmin=0)
     cells = sheet.report == "cells"
-    what = "each cell was pressed, s" if cells else "a barycenter lay in each cell, s"
-    figure.colorbar(image, ax=axes, label=f"how long {what}", shrink=0.9)
-    axes.set(xlabel="x, mm", ylabel="y, mm", title="Where it was touched")
+    what = "each cell was pressed, s" if cells else "a barycenter was in each cell, s"
+    figure.colorbar(image, ax=axes, label=f"how long {what}", location="bottom", shrink=0.9)
+    axes.set(xlabel="x, mm", ylabel="y, mm")
+    axes.set_title("Where it was touched", loc="left")
 
 
 def _zones(axes: Axes, touches: Touches) -> None:
@@ -68,7 +69,8 @@ def _zones(axes: Axes, touches: Touches) -> None:
     other.set(ylabel="area, cm²", ylim=(0, max(1.0, touches.area_mm2.max() / 100) * 1.15))
     for each, color in ((axes, style.VERMILLION), (other, style.BLUE)):
         each.yaxis.label.set_color(color)
-    axes.set_title("How many zones, and their area together")
+    axes.set(xlabel="time, s")
+    axes.set_title("How many zones, and their area together", loc="left")
 
 
 def _rows(figure: Figure, axes: Axes, touches: Touches) -> None:
@@ -80,7 +82,8 @@ def _rows(figure: Figure, axes: Axes, touches: Touches) -> None:
         shown, extent=extent, origin="lower", aspect="auto", cmap=COLORS, interpolation="nearest", vmin=0
     )
     figure.colorbar(image, ax=axes, label="pressed cells" if cells else "zone's area, cm²")
-    axes.set(ylabel="row", title="Pressed cells of each row" if cells else "Rows in which barycenters lay")
+    axes.set(xlabel="time, s", ylabel="row")
+    axes.set_title("Pressed cells of each row" if cells else "Rows in which barycenters were", loc="left")
 
 
 def _losses(axes: Axes, touches: Touches, recording: BoardRecording) -> None:
@@ -90,13 +93,14 @@ def _losses(axes: Axes, touches: Touches, recording: BoardRecording) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
     axes.yaxis.label.set_color(style.VERMILLION)
     if not len(late):
-        axes.set_title("Frames lost, in all. The file has no times of arrival, so latency is not known")
+        axes.set_title("Frames lost, in all; the file has no delays", loc="left")
         return
     other = axes.twinx()
     other.spines["right"].set_visible(True)
     other.plot(late[:, 0], late[:, 1] * 1e3, ".", markersize=2, color=style.BLUE)
-    other.set_ylabel("later, ms", color=style.BLUE)
-    axes.set_title("Frames lost, in all; how much later than the earliest the others came")
+    other.set(ylim=(0, None))
+    other.set_ylabel("delay over the least, ms", color=style.BLUE)
+    axes.set_title("Frames lost, in all; delay of each frame", loc="left")
 
 
 STEPS = 600

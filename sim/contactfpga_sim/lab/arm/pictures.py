@@ -1,4 +1,4 @@
-"""Pictures of a run, after the paper's Figs. 6 and 7, and of force, speed and thickness against latency."""
+"""Pictures of a run, after the paper's Figs. 6 and 7, and what latency costs: force and thickness against it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
@@ -23,19 +22,16 @@ from contactfpga_sim.lab.arm.run import RunRecord
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 LOOKS: tuple[dict[str, Any], ...] = (
-    {"color": style.BLACK, "linestyle": style.DASHES[0], "linewidth": 1.5},
-    {"color": style.VERMILLION, "linestyle": style.DASHES[1], "linewidth": 1.5},
-    {"color": style.BLUE, "linestyle": style.DASHES[2], "linewidth": 1.5},
-    {"color": style.SKY, "linestyle": style.DASHES[0], "linewidth": 3.0},
-    {"color": style.ORANGE, "linestyle": style.DASHES[1], "linewidth": 1.5},
-    {"color": style.GREEN, "linestyle": style.DASHES[3], "linewidth": 1.5},
+    {"color": style.BLACK, "linestyle": style.DASHES[0], "linewidth": 1.8},
+    {"color": style.VERMILLION, "linestyle": style.DASHES[0], "linewidth": 1.8},
+    {"color": style.BLUE, "linestyle": style.DASHES[1], "linewidth": 1.8},
 )
-"""Line styles of the runs; coinciding runs stay visible."""
+"""Line styles of the runs drawn: after the given latency, by the UART and by the pin."""
 
 DRAWN = {"speed": ("speed_rad_s", "angular speed, rad/s"), "torque": ("sensor_nm", "torque between motor and arm, Nm")}
 NAMES = {"speed": "arm-fig6-speed", "torque": "arm-fig7-torque"}
 FROM_S, TO_S = -5e-3, 40e-3
-"""Time range of the enlarged part."""
+"""Time range of the pictures."""
 
 
 def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
@@ -49,28 +45,20 @@ def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...
 
 
 def course(found: dict[str, RunRecord], field: str, label: str) -> Figure:
-    """A quantity over time, around the contact above and whole below."""
-    figure = style.new(6.4)
-    near, whole = figure.subplots(2, 1, sharey=True)
+    """A quantity over time, around the contact."""
+    figure = style.new(3.9)
+    place = figure.subplots()
     for look, (name, result) in zip(LOOKS, found.items()):
-        time, values = 1e3 * result.course["time_s"], result.course[field]
-        for place in (near, whole):
-            place.plot(time, values, label=name, **look)
-            _mark(place, result, field, look["color"])
-    for place in (near, whole):
-        place.axhline(0, color=style.SOFT, linewidth=0.8)
-        place.grid()
-        place.set_ylabel(label)
-    near.set_xlim(1e3 * FROM_S, 1e3 * TO_S)
-    near.set_title("around the contact", loc="left")
-    whole.set_xlim(left=1e3 * FROM_S)
-    whole.set_title("the whole run", loc="left")
-    whole.set_xlabel("time from the touch, ms")
-    lines = [line for line in near.get_lines() if line.get_label() in found]
+        way = f"by the {name}" if name in ("UART", "pin") else f"after {name}"
+        place.plot(1e3 * result.course["time_s"], result.course[field], label=way, **look)
+        _mark(place, result, field, look["color"])
+    place.axhline(0, color=style.SOFT, linewidth=0.8)
+    place.grid()
+    place.set(ylabel=label, xlabel="time from the touch, ms", xlim=(1e3 * FROM_S, 1e3 * TO_S))
     keys = {"a switch closes": "o", "the controller reacts": "x"}
     marks = [Line2D([], [], color=style.SOFT, marker=mark, linestyle="", fillstyle="none") for mark in keys.values()]
-    names = [*(line.get_label() for line in lines), *keys]
-    figure.legend(lines + marks, names, loc="outside lower center", ncols=4)
+    lines, names = place.get_legend_handles_labels()
+    figure.legend([*lines, *marks], [*names, *keys], loc="outside lower center", ncols=5)
     return figure
 
 
@@ -78,17 +66,17 @@ def _mark(place: Any, result: RunRecord, field: str, color: str) -> None:
     for seconds, mark in ((result.outcome.closes_s, "o"), (result.outcome.reacts_s, "x")):
         if seconds is not None:
             at = int(result.course["time_s"].searchsorted(seconds - 1e-9))
-            place.plot(1e3 * seconds, result.course[field][at], mark, color=color, ms=6, fillstyle="none", zorder=3)
+            place.plot(1e3 * seconds, result.course[field][at], mark, color=color, ms=7, mew=1.6, fillstyle="none")
 
 
 PAPER_S = 6e-3
 LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))
 SPEEDS_M_S = tuple(0.02 * step for step in range(1, 31))
 THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
-LIMITS_N = np.linspace(4, 40, 145)
 INSTANTS = 8
 """Touch instants that the gateware's own runs use, a controller period apart."""
 COLORS = {"6 ms": style.BLACK, "UART": style.VERMILLION, "pin": style.BLUE, "last byte": style.GREEN}
+BOUND_OF = "bound, "
 BOUND: dict[str, Any] = {"linewidth": 1.2, "linestyle": style.DASHES[2]}
 TICKS_MS = (0.01, 0.1, 1, 10)
 
@@ -98,7 +86,6 @@ class Plan:
     """All tasks by their picture."""
 
     force: tuple[SweepTask, ...]
-    limited: tuple[SweepTask, ...]
     sheet: dict[str, tuple[SweepTask, ...]]
     speed: dict[str, tuple[SweepTask, ...]]
     thick: dict[float, tuple[SweepTask, ...]]
@@ -106,7 +93,7 @@ class Plan:
     @property
     def all(self) -> list[SweepTask]:
         """All tasks."""
-        groups = [self.force, self.limited, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
+        groups = [self.force, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
         return [task for group in groups for task in group]
 
 
@@ -122,7 +109,6 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
 
     return Plan(
         force=tuple(SweepTask(alone, latency_s=latency) for latency in latencies),
-        limited=tuple(SweepTask(case, latency_s=latency) for latency in latencies),
         sheet={way: tuple(SweepTask(case.but(run={"lead_s": lead}), way) for lead in leads) for way in ("uart", "pin")},
         speed={
             name: tuple(SweepTask(moving(speed), latency_s=latency) for speed in speeds)
@@ -146,11 +132,10 @@ def check(case: Case) -> None:
 def draw(
     case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path, suffixes: Sequence[str] = ("png", "svg")
 ) -> list[Path]:
-    """The three charts in each format."""
+    """Both charts in each format."""
     with matplotlib.rc_context(style.SETTINGS):
         figures = {
             "arm-force": _force(case, tasks, found),
-            "arm-speed": _speed(case, tasks, found),
             "arm-thickness": _thickness(case, tasks, found),
         }
         return [style.save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
@@ -168,7 +153,7 @@ def _axes(x: str, y: str) -> tuple[Figure, Any]:
 def _latencies(place: Any, case: Case) -> None:
     """The latency axis, with each way's bound, and zero at the bottom."""
     for name, bound in sweep.bounds_s(case, Skin()).items():
-        place.axvline(1e3 * bound, color=COLORS[name], label=f"bound, {name}", **BOUND)
+        place.axvline(1e3 * bound, color=COLORS[name], label=f"{BOUND_OF}{name}", **BOUND)
     place.set_xscale("log")
     least, most = place.get_xlim()
     ticks = [ms for ms in TICKS_MS if least <= ms <= most]
@@ -178,41 +163,30 @@ def _latencies(place: Any, case: Case) -> None:
 
 
 def _force(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
-    figure, place = _axes("from the switch to the controller, ms", "force, N")
+    figure, place = _axes("from the closed switch to the controller, ms", "force on the human arm, N")
+    place.set_title(f"The arm meets a person at {case.link.speed_m_s:g} m/s", loc="left")
     late = [1e3 * task.latency_s for task in tasks.force]
-    free: tuple[dict[str, Any], ...] = ({"color": style.SKY, "lw": 3}, {"color": style.GRAY, "lw": 3})
-    held: tuple[dict[str, Any], ...] = ({"color": style.BLACK, "ls": "--"}, {"color": style.BLACK, "ls": ":"})
-    for group, name, looks in ((tasks.force, "no torque limit", free), (tasks.limited, "3 Nm limit", held)):
-        points = [found[task] for task in group]
-        for field, what, look in zip(("peak_force_n", "force_before_n"), ("peak", "at the reaction"), looks):
-            place.plot(late, [getattr(point, field) for point in points], label=f"{what}, {name}", **look)
+    points = [found[task] for task in tasks.force]
+    peak, reacts = [point.peak_force_n for point in points], [point.force_before_n for point in points]
+    place.plot(late, peak, color=style.BLACK, lw=2, label="peak")
+    place.plot(late, reacts, color=style.GRAY, lw=2, label="when the controller reacts")
     for way, name in (("uart", "UART"), ("pin", "pin")):
-        points = [found[task] for task in tasks.sheet[way]]
-        takes, forces = [1e3 * point.takes_s for point in points], [point.peak_force_n for point in points]
-        label = f"peak, gateware by {name}, {len(points)} touches"
+        some = [found[task] for task in tasks.sheet[way]]
+        takes, forces = [1e3 * point.takes_s for point in some], [point.peak_force_n for point in some]
+        label = f"peak by the {name}, {len(some)} touches through the gateware"
         place.plot(takes, forces, "o", ms=5, color=COLORS[name], label=label, zorder=3)
-    at = found[next(task for task in tasks.force if task.latency_s == PAPER_S)]
-    place.plot(1e3 * PAPER_S, at.peak_force_n, "s", color=style.INK, ms=8, fillstyle="none", label="the set at 6 ms")
-    place.plot(1e3 * PAPER_S, 12, "*", color=style.INK, ms=10, label="paper, 12 N")
+    place.plot(1e3 * PAPER_S, 12, "*", color=style.INK, ms=10, label="paper: 12 N when it reacts, after 6 ms")
     _latencies(place, case)
-    figure.legend(loc="outside lower center", ncols=3)
-    return figure
-
-
-def _speed(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
-    figure, place = _axes("force limit, N", "speed, m/s")
-    for name, group in tasks.speed.items():
-        speeds = np.array([task.case.link.speed_m_s for task in group])
-        for field, line, what in (("peak_force_n", "-", "peak"), ("force_before_n", "--", "at the reaction")):
-            forces = np.array([getattr(found[task], field) for task in group])
-            safe = [sweep.safe_speed(speeds, forces, limit) for limit in LIMITS_N]
-            place.plot(LIMITS_N, safe, line, color=COLORS[name], label=f"{what}, {name}")
-    naive = [sweep.naive_speed(case, limit, PAPER_S) for limit in LIMITS_N]
-    place.plot(LIMITS_N, naive, ":", color=style.GREEN, lw=2, label="(δ(limit) - δ(closing)) / 6 ms")
-    place.plot(15, 0.4, "*", color=style.INK, ms=10, label="paper: 15 N, designed for 0.4 m/s")
-    place.plot(15, 0.23, "s", color=style.INK, ms=7, fillstyle="none", label="the set's speed at 15 N")
-    place.set(xlim=(0, LIMITS_N[-1]), ylim=(0, 0.6))
-    figure.legend(loc="outside lower center", ncols=3)
+    for line in place.get_lines():
+        if (name := str(line.get_label())).startswith(BOUND_OF):
+            at = line.get_xdata()[0]
+            words = f"longest: {name.removeprefix(BOUND_OF)} "
+            place.annotate(
+                words, (at, 1), (-3, 0), xycoords=place.get_xaxis_transform(), textcoords="offset points",
+                rotation=90, ha="right", va="top", fontsize=style.SMALL, color=style.SOFT,
+            )  # fmt: skip
+            line.set_label("_")
+    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 

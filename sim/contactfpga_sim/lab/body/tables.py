@@ -165,25 +165,36 @@ def draw(folder: Path) -> Path:
     assert kinematics is not None
     angles = dict.fromkeys(kinematics.joint_names, 0.0) | {"L_ELBOW_P": -0.8}
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(4.6)
+        figure = style.new(5.4)
         for axes, (across, title) in zip(
             figure.subplots(1, 2, sharey=True), ((1, "from the front"), (0, "from the right"))
         ):
             for joint in kinematics.robot.joints.values():
                 ends = [kinematics.pose(link, angles).point_m for link in (joint.parent, joint.child)]
-                axes.plot([end[across] for end in ends], [end[2] for end in ends], color=style.SOFT, lw=2)
-            for plan in body.links.values():
-                _draw_sheet(axes, plan, kinematics.pose(plan.frame, angles), across)
+                axes.plot(
+                    [end[across] for end in ends],
+                    [end[2] for end in ends],
+                    color=style.GRID,
+                    lw=5,
+                    solid_capstyle="round",
+                    label="lines from joint to joint of the robot",
+                )
+            for name, plan in body.links.items():
+                cells = _draw_sheet(axes, plan, kinematics.pose(plan.frame, angles), across)
+                if across == 1:
+                    spot = (cells[:, 1].mean(), cells[:, 2].max() + 0.01)
+                    axes.text(*spot, name.replace("_", " "), ha="center", va="bottom", fontsize=style.SMALL)
             axes.set(title=title, aspect="equal", xlabel=f"{'xy'[across]}, m", ylim=(-0.85, 0.85), xlim=(-0.6, 0.6))
             axes.grid(True)
         figure.axes[0].set_ylabel("z, m")
         handles, names = figure.axes[0].get_legend_handles_labels()
         kept = dict(zip(names, handles))
-        figure.legend(kept.values(), kept.keys(), loc="outside lower center", ncols=3)
+        figure.legend(kept.values(), kept.keys(), loc="outside lower center", ncols=4)
         return style.save(figure, folder / "body.svg")
 
 
-def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
+def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> np.ndarray:
+    """Draw a sheet; the places of its cells, (cells, 3) in m."""
     skin = plan.skin
     x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
     cells = np.array([pose.apply(np.array(plan.place(*place)[0])) for place in zip(x.ravel(), y.ravel())])
@@ -199,3 +210,4 @@ def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
         ends = ([contact.point_m[across], tip[across]], [contact.point_m[2], tip[2]])
         axes.plot(ends[0][0], ends[1][0], "o", ms=5, color=style.VERMILLION, label="contacts")
         axes.plot(*ends, color=style.VERMILLION, lw=1.5, label="their normals")
+    return cells

@@ -16,7 +16,7 @@ from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
 from contactfpga.design.cover.task import FIRST_DESIGN, FOAMS, WORST_M
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.cover import caps, formulas, pictures
+from contactfpga_sim.lab.cover import caps, formulas
 
 ARM, SWITCH = FIRST_DESIGN.arm, FIRST_DESIGN.switch
 HEAVY = Arm.link(2.0, 0.038, 0.15, 0.2)
@@ -294,6 +294,5 @@ def failing_table() -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The pictures of the command's answer and of the study."""
-    own = (caps.draw(folder / "cover-caps.svg"), pictures.study(folder / "cover-study.svg"))
-    return [*own, *drawing.draw(folder, "svg")]
+    """The pictures of the command's answer, and that of the caps."""
+    return [caps.draw(folder / "cover-caps.svg"), *drawing.draw(folder, "svg")]

@@ -150,32 +150,27 @@ def ways_table(found: FlipResults) -> str:
     return writer.table(KINDS, lines)
 
 
-GOAL = 1.0
-"""Goal in percent."""
-
-
 def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
-    """Draw the curve."""
+    """Draw a line for each design, each plain one above its version with two copies."""
     import matplotlib as mpl
 
+    plain = [design for design in designs if not design.name.endswith(", dual")]
+    twice = {design.name.removesuffix(", dual"): design for design in designs if design not in plain}
+    shown = [one for design in plain for one in (design, twice.get(design.name)) if one]
     with mpl.rc_context(style.SETTINGS):
-        figure = style.new(3.6)
+        figure = style.new(0.36 * len(shown) + 1.0)
         axes = figure.subplots()
-        kinds = [design.name.removesuffix(", dual") for design in designs]
-        for kind, color in zip(dict.fromkeys(kinds), style.PALETTE):
-            line = [design for design, one in zip(designs, kinds) if one == kind]
-            shares = [summary.share(summary.of(rows, design.name, memory=False)) for design in line]
-            middle = [100 * share.hits / share.of for share in shares]
-            below = [at - 100 * share.interval[0] for at, share in zip(middle, shares)]
-            above = [100 * share.interval[1] - at for at, share in zip(middle, shares)]
-            luts = [design.luts for design in line]
-            axes.errorbar(luts, middle, yerr=[below, above], color=color, marker="o", capsize=3, lw=1.2, label=kind)
-        axes.axhline(GOAL, color=style.INK, lw=1, ls=style.DASHES[1])
-        axes.set_xlabel("LUT4 of a UP5K, plain and with dual")
-        axes.set_ylabel("register flips silently wrong, %")
-        axes.set_xlim(left=0)
-        axes.set_ylim(bottom=0)
-        axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
-        axes.grid(visible=True)
-        axes.legend()
+        for row, design in enumerate(shown):
+            share = summary.share(summary.of(rows, design.name, memory=False))
+            low, high = (100 * end for end in share.interval)
+            color = style.BLUE if design in plain else style.VERMILLION
+            axes.plot([low, high], [row, row], color=color, lw=2)
+            axes.plot(100 * share.hits / share.of, row, "o", ms=7, color=color, clip_on=False, zorder=3)
+            axes.text(high + 0.1, row, f"{share.hits} of {share.of}", va="center", fontsize=style.SMALL)
+        names = [f"{design.name.replace(', dual', ', two copies')}: {design.luts:,} LUT4" for design in shown]
+        axes.set_yticks(range(len(shown)), names)
+        axes.set_xlabel("flips of registers that are silently wrong, %, with their 95 % interval")
+        axes.set(ylim=(len(shown) - 0.4, -0.6), xlim=(0, None))
+        axes.margins(x=0.12)
+        axes.grid(visible=True, axis="x")
         return style.save(figure, path)

@@ -20,7 +20,7 @@ def draw(path: Path) -> Path:
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):
-        figure = style.new(7.6)
+        figure = style.new(7.3)
         axes = figure.subplots()
         axes.set_aspect("equal")
         axes.axis("off")
@@ -34,7 +34,7 @@ def draw(path: Path) -> Path:
         _gaps(axes)
         _words(axes)
         axes.set_xlim(-1.2, _x(SIZE) + 1.6)
-        axes.set_ylim(_y(SIZE) - 1.7, TOP + 2.0)
+        axes.set_ylim(_y(SIZE) - 1.9, TOP + 2.0)
         return style.save(figure, path)
 
 
@@ -122,8 +122,9 @@ def _words(axes: Any) -> None:
     x, y = _x(SIZE), _y(SIZE)
     axes.text(x + 0.12, y + 0.45, "stays open", ha="left", va="center", color=style.VERMILLION)
     said = (
-        "Dashed: only where the scan reads rows (reversal). The guard lines are soldered at the far ends,\n"
-        "through a diode each and without a switch, so that a signal has passed the whole line."
+        "Squares: pins of the FPGA board. Dashed: only where the scan reads rows (reversal).\n"
+        "The guard lines are soldered at the far ends, through a diode each and without a switch,\n"
+        "so that a signal has passed the whole line."
     )
     axes.text(-1.1, y - 1.15, said, ha="left", va="top", color=style.SOFT)
 

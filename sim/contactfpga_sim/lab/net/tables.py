@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
+from typing import Any
 
 from contactfpga import picture_style as style
 from contactfpga.robot.net.message import HEAD_BYTES
@@ -91,27 +92,49 @@ def _ms(latency: tuple[float, float]) -> str:
     return " / ".join(f"{1000 * one:.1f}" for one in latency) + " ms"
 
 
+PAGE = Path("docs/net.md")
+ENDS = {"publisher": style.BLUE, "router": style.VERMILLION, "reader": style.GREEN}
+SHARES = {"half arrive (p50)": style.BLUE, "99 % arrive (p99)": style.VERMILLION}
+
+
 def draw(folder: Path) -> Path:
-    """CPU time and latency by number of links."""
+    """CPU time and latency by number of links, from the page's table of links."""
     import matplotlib
 
+    rows = [row for row in _rows(writer.sections(PAGE.read_text(encoding="utf-8"))["links"].text) if row[0].isdecimal()]
+    links = [int(row[0]) for row in rows]
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(2.6)
+        figure = style.new(3.4)
         cpu, latency = figure.subplots(1, 2)
-        found = [measured(links, GROWTH_MS, full=False) for links in LINKS]
-        names = ("publishers", "router", "readers")
-        for name, values, color in zip(names, zip(*map(_ends, found)), (style.BLUE, style.VERMILLION, style.GREEN)):
-            cpu.plot(LINKS, [100 * value for value in values], marker="o", ms=4, label=name, color=color)
-        cpu.set(xscale="log", yscale="log", ylabel="processor time, % of a core")
-        for place, (name, color) in enumerate((("p50", style.BLUE), ("p99", style.VERMILLION))):
-            latency.plot(LINKS, [1000 * one.latency[place] for one in found], marker="o", ms=4, color=color, label=name)
-            bare = [1000 * one.bare[place] for one in found]
-            latency.plot(LINKS, bare, marker="o", ms=4, ls=style.DASHES[1], color=color, label=f"{name}, bare pair")
-        latency.set(xscale="log", yscale="log", ylabel="latency, ms")
-        for axes in (cpu, latency):
-            axes.set_xticks(LINKS, [str(links) for links in LINKS])
+        for column, (name, color) in enumerate(ENDS.items(), 4):
+            values = [float(row[column].removesuffix(" %")) for row in rows]
+            _line(cpu, links, values, name, color)
+        for place, (name, color) in enumerate(SHARES.items()):
+            values = [_pair(row[7])[place] for row in rows]
+            _line(latency, links, values, name, color)
+            bare = [value / _pair(row[8])[place] for value, row in zip(values, rows, strict=True)]
+            _line(latency, links, bare, f"{name[-4:-1]} of a bare pair", color, ls=style.DASHES[1])
+        for axes, label, ticks in (
+            (cpu, "processor time of each link,\n% of a core", (0.3, 1, 3, 10, 30)),
+            (latency, "latency, ms", (0.3, 1, 3, 10, 30, 100, 300, 1000)),
+        ):
+            axes.set(xscale="log", yscale="log", xlabel="links of 1 kHz, batches of 10 ms", ylabel=label)
+            axes.set_xticks(links, map(str, links))
+            axes.set_yticks(ticks, map("{:,g}".format, ticks))
+            axes.set(xlim=(links[0] / 1.3, links[-1] * 1.3), ylim=(0.2, 1.5 * ticks[-1]))
             axes.minorticks_off()
             axes.grid(True)
-            axes.legend()
-        figure.supxlabel("links of 1 kHz", fontsize=style.NORMAL)
+            axes.legend(handlelength=3)
         return style.save(figure, folder / "net.svg")
+
+
+def _rows(table: str) -> list[list[str]]:
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines() if line[:1] == "|"]
+
+
+def _pair(cell: str) -> list[float]:
+    return [float(one) for one in cell.removesuffix(" ms").split(" / ")]
+
+
+def _line(axes: Any, links: list[int], values: list[float], name: str, color: str, **how: Any) -> None:
+    axes.plot(links, values, marker="o", ms=4, color=color, label=name, **how)

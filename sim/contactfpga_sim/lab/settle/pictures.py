@@ -14,6 +14,9 @@ from contactfpga_sim.lab.settle import breaks, tables
 from contactfpga_sim.lab.settle.breaks import HIGH_V, KNOBS, SETTLE_US, SIZE, US
 from contactfpga_sim.lab.settle.tables import NAMES, RowTime
 
+SHOWN_MA = 45
+"""Of the current into a pin; the edge at which a row is selected is cut off."""
+
 COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
 
 
@@ -64,7 +67,8 @@ def _row(path: Path) -> Path:
 
 
 def _breaks(path: Path) -> Path:
-    figure = style.new(6.2)
+    figure = style.new(6.4)
+    figure.suptitle("A cross is the first value beyond the limit", x=0.02, ha="left", fontsize=style.NORMAL)
     for axes, (name, knob) in zip(figure.subplots(2, 2).flat, KNOBS.items()):
         late = name != "coupling"
         limit = SETTLE_US if late else HIGH_V
@@ -74,7 +78,15 @@ def _breaks(path: Path) -> Path:
             axes.plot(knob.values, shown, color=color, lw=1.8, label=run)
             if sweep.broken is not None:
                 axes.plot([sweep.breaks_at], [amounts[sweep.broken]], "x", color=color, ms=7, mew=2)
-        axes.axhline(limit, color=style.INK, lw=1, ls=style.DASHES[1])
+                axes.annotate(
+                    f"{sweep.breaks_at:,g}",
+                    (sweep.breaks_at, amounts[sweep.broken]),
+                    (6, -14) if late else (5, 5),
+                    textcoords="offset points",
+                    fontsize=style.SMALL,
+                )
+        words = f"limit, settle_us = {limit:g} µs" if late else f"limit, VIH = {limit:.1f} V"
+        axes.axhline(limit, color=style.INK, lw=1, ls=style.DASHES[1], label=words)
         if name != "columns":
             axes.set_xscale("log")
             axes.set_xlim(knob.values[0] / 1.2, 1.5 * knob.values[-1])
@@ -85,7 +97,7 @@ def _breaks(path: Path) -> Path:
             axes.set_ylim(0, 3.4)
         axes.set_title(knob.title, loc="left")
         axes.set_xlabel(knob.axis)
-        axes.set_ylabel("time to settle, µs" if late else "unpressed column, V")
+        axes.set_ylabel("time to settle, µs" if late else "lowest of an unpressed column, V")
         axes.grid(visible=True)
         axes.legend(loc="upper left" if late else "lower left")
     return style.save(figure, path)
@@ -108,6 +120,8 @@ def _shorted(folder: Path) -> Path:
     upper.set_ylabel("column, V")
     upper.legend(loc="lower left", bbox_to_anchor=(0.05, 0.0))
     lower.set_ylabel("into the selected\nrow's pin, mA")
-    lower.set_ylim(-5, 45)
+    lower.set_ylim(-5, SHOWN_MA)
+    most = max(-tables.row_time(tables.sheet(3)).pin_ma(patterns.middle(SIZE)))
+    lower.text(found.starts_us[2] + 0.01, SHOWN_MA, f"to {most:.0f} mA", va="top", color=style.SOFT)
     lower.set_xlabel("time, µs")
     return style.save(figure, folder / "settle-shorted.svg")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -151,24 +152,39 @@ def reflex_table() -> str:
     return writer.table_of([reflex.HEAD, reflex.measured().cells])
 
 
+SCORES = Path("docs/tables/tracking-scores.csv")
+"""The whole table of scores."""
+
+SHOWN = tuple(family for family in scenes.FAMILIES if family != "tapping")
+"""Families with a panel: on taps all trackers are alike."""
+
+
 def draw(folder: Path) -> Path:
-    """Share of correct ids by family, rate and tracker."""
+    """Share of correct ids by family, rate and tracker, from :data:`SCORES`."""
     import matplotlib
 
+    with SCORES.open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if not row["scenes"].startswith("mean")]
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(5.2)
-        panels = figure.subplots(2, len(scenes.FAMILIES) // 2, sharex=True, sharey=True)
-        for axes, family in zip(panels.flat, scenes.FAMILIES):
+        figure = style.new(5.0)
+        panels = figure.subplots(2, -(-len(SHOWN) // 2), sharex=True, sharey=True)
+        for axes, family in zip(panels.flat, SHOWN):
+            some = [row for row in rows if row["scenes"] == f"`{family}`"]
+            rates = [float(row["frames per second"].replace(",", "")) for row in some]
             for tracker, (color, dashes) in LOOKS.items():
-                values = [100 * scores.of_family(family, rate)[tracker].idf1 for rate in scores.RATES_HZ]
+                values = [float(row[f"{tracker}: IDF1, %"].split()[0]) for row in some]
                 name = tracker.replace("`", "")
-                axes.plot(scores.RATES_HZ, values, color=color, ls=dashes, marker="o", ms=4, label=name)
-            axes.set(title=family, xscale="log", ylim=(0, 105), xticks=[100, 1000, 10_000])
-            axes.set_xticklabels(["100", "1k", "10k"])
+                axes.plot(rates, values, color=color, ls=dashes, marker="o", ms=4, label=name)
+            axes.set_title(family, loc="left")
+            axes.set(xscale="log", ylim=(0, 105))
+            axes.set_xticks(rates, [f"{rate / 1000:g}k" if rate >= 1000 else f"{rate:g}" for rate in rates])
             axes.minorticks_off()
             axes.grid(True)
+            axes.tick_params(labelbottom=True)
         for axes in panels[:, 0]:
-            axes.set_ylabel("IDF1, %")
+            axes.set_ylabel("time with one id (IDF1), %")
+        legend = panels.flat[len(SHOWN)]
+        legend.axis("off")
+        legend.legend(*panels[0, 0].get_legend_handles_labels(), loc="center left")
         figure.supxlabel("frames per second", fontsize=style.NORMAL)
-        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
         return style.save(figure, folder / "tracking.svg")

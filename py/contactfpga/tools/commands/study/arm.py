@@ -38,7 +38,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--places", type=many, metavar="N", help=places)
     parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin).")
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
-    charts = "Draw force, safe speed and thickness against latency instead."
+    charts = "Draw force and thickness against latency instead."
     parser.add_argument("--charts", action="store_true", help=charts)
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
     parser.add_argument("--regions", metavar="FILE.toml", help=regions)
