@@ -6,6 +6,7 @@ import audit
 import pytest
 from verification import Outcome
 
+from contactfpga_sim.lab import beside
 from contactfpga_sim.lab.studies import STUDIES
 from contactfpga_sim.verify.mutants.campaign import Result
 from contactfpga_sim.verify.mutants.netlist import Mutant
@@ -29,11 +30,11 @@ def test_a_claim_is_judged_by_its_tests(results, said, wrong):
 
 @pytest.fixture
 def project(tmp_path, monkeypatch):
-    """The pages, to be changed."""
+    """The pages and the files of their tables, to be changed."""
     docs = tmp_path / "docs"
-    docs.mkdir()
-    for page in (audit.ROOT / "docs").glob("*.md"):
-        (docs / page.name).write_text(page.read_text())
+    (docs / beside.FOLDER).mkdir(parents=True)
+    for file in [*(audit.ROOT / "docs").glob("*.md"), *(audit.ROOT / "docs" / beside.FOLDER).iterdir()]:
+        (docs / file.relative_to(audit.ROOT / "docs")).write_text(file.read_text())
     monkeypatch.setattr(audit, "ROOT", tmp_path)
     return docs
 
@@ -41,8 +42,8 @@ def project(tmp_path, monkeypatch):
 def test_a_table_that_is_not_what_it_would_be_today_is_seen(project):
     study = STUDIES["units"]
     assert not audit.table(study, "units").wrong
-    page = project / study.page_of("units")
-    page.write_text(page.read_text().replace("3.3 V | 1 MHz | 60 µs |", "3.3 V | 1 MHz | 61 µs |"))
+    file = project / beside.FOLDER / "units-units.csv"
+    file.write_text(file.read_text().replace("3.3 V,1 MHz,60 µs", "3.3 V,1 MHz,61 µs"))
     found = audit.table(study, "units")
     assert (found.said, found.wrong) == ("differs", True)
 

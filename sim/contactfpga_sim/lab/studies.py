@@ -40,7 +40,7 @@ _ALL = (
         page="body.md",
         minutes=4,
         sections={
-            "outages": Section("tables:outages_table"),
+            "outages": Section("tables:outages_table", kept="unplugged|sends nothing|another Skin"),
             "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6"),
             "folds": Section("tables:folds_table", kept=r"^\| [25] ", sample="tables:folds_sample"),
         },
@@ -109,7 +109,7 @@ _ALL = (
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
             "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
             "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
-            "sense": Section("tables:sense_table", kept=r"R\* = 2 mm"),
+            "sense": Section("tables:sense_table", kept=r"^\| (halfspace|bonded), point \| R\* = 2 mm"),
             "thinning": Section(
                 "tables:thinning_table", kept=r"^\| (6|0.895|0.252) ms", sample="tables:thinning_table"
             ),
@@ -228,8 +228,8 @@ _ALL = (
         minutes=1,
         sections={
             "diodes": Section("tables:diodes_table", sample="tables:diodes_table"),
-            "pulls": Section("tables:pulls_table", sample="tables:pulls_table"),
-            "series": Section("tables:series_table", sample="tables:series_table"),
+            "pulls": Section("tables:pulls_table", kept=r"^\| (4.7|10|22|47) k", sample="tables:pulls_table"),
+            "series": Section("tables:series_table", kept=r"^\| (none|33|100)", sample="tables:series_table"),
         },
         pictures="tables:draw",
     ),
@@ -346,7 +346,7 @@ _ALL = (
         page="safety.md",
         minutes=5,
         sections={
-            "coverage": Section("tables:coverage_table"),
+            "coverage": Section("tables:coverage_table", kept=r"^\| (none|`guard`, |these)"),
             "faults": Section(
                 "tables:faults_table",
                 kept="row is broken|stuck closed|does not close|diode is shorted|no supply|wire of",
@@ -369,7 +369,7 @@ _ALL = (
         sections={
             "needs": Section("tables:needs_table", kept="nominal|500|64x64, rows"),
             "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]"),
-            "shorted": Section("tables:shorted_table", sample="tables:shorted_table"),
+            "shorted": Section("tables:shorted_table", kept=r"^\| [012] ", sample="tables:shorted_table"),
             "summary": Section("tables:summary_table", kept=r"^\| all", needs=("ngspice",)),
             "agreement": Section(
                 "tables:agreement_table",
