@@ -59,9 +59,7 @@ def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.nd
 def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same where the ends meet: a step more joins the last cluster with the first."""
     last_step, steps = _strips(frames, connectivity)
-    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
-    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
-    joined = ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0)
+    joined = _over_the_seam(frames, connectivity)
     steps = steps + joined
     last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
     return last_step + 2, steps + 1, steps + 3
@@ -69,7 +67,7 @@ def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray
 
 def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
     """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
-    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    before = _before(frames)
     taken = frames | before
     none = np.zeros(taken.shape[:2], bool)
     steps, begun = np.zeros(none.shape, int), np.zeros(none.shape, int)
@@ -92,9 +90,8 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
 
 
 def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
-    above = np.zeros_like(frames)
-    above[:, 1:] = frames[:, :-1]
+    """``LabellerRule.strips`` of ``serial``, for every row of (N, R, C) bool frames."""
+    above = _before(frames)
     above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
     more = above & ~above_left
     if connectivity == 4:
@@ -112,11 +109,20 @@ def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np
 def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """:func:`serial_clocks` where the ends meet."""
     leaves, busy, end = serial_clocks(frames, connectivity)
-    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
-    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
-    seam = 2 * (ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
-    leaves[..., -1] += seam * (before | frames)[..., -1]
+    seam = 2 * _over_the_seam(frames, connectivity)
+    leaves[..., -1] += seam * (_before(frames) | frames)[..., -1]
     return leaves, busy + seam, end + seam
+
+
+def _before(frames: np.ndarray) -> np.ndarray:
+    """(N, R, C) bool: the row before each; there are no cells before the first."""
+    return np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+
+
+def _over_the_seam(frames: np.ndarray, connectivity: int) -> np.ndarray:
+    """(N, R) bool: whether the ends of a row and the one before it are joined over the seam."""
+    ends = np.stack([_before(frames)[..., [0, -1]], frames[..., [0, -1]]])  # which row, N, R, first or last column
+    return np.asarray(ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
 
 
 def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:

@@ -1,6 +1,7 @@
 """Zones and labeller timing of very many frames at once, for volume tests.
 
-The same rules as :mod:`zones` and :mod:`label`, written a second time, for arrays: (N, R, C) bool frames go in.
+(N, R, C) bool frames go in. Zones are those of :mod:`zones`, found by spreading labels; clocks are the rules of
+:mod:`label`.
 """
 
 from __future__ import annotations
