@@ -27,7 +27,6 @@ BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec.
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
     flags.design(parser, "Skin to build (default: one that fits the board).")
     output = "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit)."

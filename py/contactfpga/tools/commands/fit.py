@@ -35,7 +35,6 @@ ORDER = (
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.epilog = ORDER
     what = "A .toml file of scenes, a .npz or .npy recording, or the name of a family or scene (docs/scenes.md)."
     parser.add_argument("scenes", nargs="+", metavar="SCENES", help=what)
@@ -105,7 +104,6 @@ def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.fit import show
     from contactfpga_sim.lab.fit.search import fit

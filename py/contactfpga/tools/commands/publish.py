@@ -36,7 +36,6 @@ together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("ports", nargs="*", metavar="PORT", help=PORTS)
     flags.reading(parser)
     key = "Name of a single board on the network (default: contactfpga/ and its name, or its fingerprint)."

@@ -50,7 +50,6 @@ REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     port = (
         "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
     )

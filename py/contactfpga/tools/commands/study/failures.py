@@ -18,13 +18,11 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
     flags.output(parser, "build/failures")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     from contactfpga_sim.lab.failures import tables as failures_tables
     from contactfpga_sim.lab.failures.catalogue import KNOBS
 
