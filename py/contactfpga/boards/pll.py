@@ -50,7 +50,7 @@ def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
 
 @functools.cache
 def _clocks(cell: str, crystal_hz: int) -> dict[int, Dividers]:
-    """Dividers by every clock of whole MHz, those that a Skin can request."""
+    """Dividers by clock of whole MHz, as Skins request."""
     clocks: dict[int, Dividers] = {}
     for made, found in _SETTINGS[cell](crystal_hz):
         if made % MHZ == 0:

@@ -60,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if it cannot work, or if times
-    are too short for it."""
+    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if it cannot work with its
+    times."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)

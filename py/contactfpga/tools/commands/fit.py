@@ -163,7 +163,7 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
-    """The cover of the Skin's file, the named ones, or the default ones; none for recordings alone."""
+    """The covers of the Skin's file, named ones, or defaults; none for recordings."""
     from contactfpga_sim.lab import covers
     from contactfpga_sim.lab.fit import faces
 

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _file(args: argparse.Namespace, board: BoardSpec) -> Path:
-    """The bitstream to write, which may be missing only for a kit without a released one."""
+    """The bitstream to write, which may be missing for a kit without a released one."""
     if args.kit and not args.file:
         released = kits.kit(args.kit).bitstream
         return released if released.is_file() else bitstream_path(board, default_folder(board, args.kit))

@@ -102,7 +102,7 @@ def _refuse(first: str, second: str, of: str) -> NoReturn:
 
 
 def _place(port: str) -> tuple[str, int | None]:
-    """The device behind a name and the number of the sheet; each ``sim://`` without one is a separate board."""
+    """The device behind a name and the sheet's number; each bare ``sim://`` is a board of its own."""
     sheet = SheetOf.parse(port)
     name, number = (port, None) if sheet is None else (sheet.port, sheet.number)
     virtual = name.startswith("sim:")

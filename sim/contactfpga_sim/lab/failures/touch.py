@@ -37,8 +37,7 @@ def _pair(gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Gener
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius, which cover a switch anywhere. The gateware does not depend on the
-    pitch."""
+    """Outcomes of two fingers of 8 mm radius; the gateware does not depend on the pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_pair_told(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
@@ -81,8 +80,8 @@ FIRST, LAST = 2.0, 13.0
 
 
 def _slide(skin: Skin, speed: float, rng: np.random.Generator) -> Outcome:
-    """The worst frame of a finger that starts at any time of a scan, by the distance of its zone from the finger at the
-    frame's time; infinite without exactly one zone."""
+    """The frame with the largest error of its zone at its time, for a finger that starts at any phase; infinite without
+    exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -157,7 +156,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of a switch that closes at any time of a scan, for 30 to 300 us before it opens again."""
+    """Outcomes of a switch that closes at any phase for 30 to 300 us, then opens and closes again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)

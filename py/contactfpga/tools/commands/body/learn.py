@@ -76,7 +76,7 @@ def _check(body: Body, plan: Plan, joint: str) -> None:
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
-    """Each angle with a frame scanned after it. A link without data ends it: unseen is not learned as free."""
+    """Each angle with a later frame, until a link lacks data: unseen is not learned as free."""
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue

@@ -162,7 +162,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
 
 
 def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
-    """Save the finished runs in a separate file, keeping an earlier whole table; returns its place."""
+    """Save the finished runs beside an earlier whole table; returns the place."""
     from contactfpga_sim.lab.arm import pictures
 
     again = "run the same command again to go on from there"

@@ -82,7 +82,7 @@ def _own(args: argparse.Namespace) -> dict[str, Method]:
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
-    """Save the finished points in a separate file, keeping an earlier whole chart; returns its place."""
+    """Save the finished points beside an earlier whole chart; returns the place."""
     from contactfpga_sim.lab.chart import numbers as table
 
     again = "run the same command again to go on from there"
