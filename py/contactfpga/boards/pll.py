@@ -1,7 +1,7 @@
 """PLL dividers from a board's crystal to a clock. Loads no Amaranth.
 
-iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by ``2
-** DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
+iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by
+``2**DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
 ``CLKOP_DIV`` times that.
 """
 
