@@ -156,7 +156,7 @@ class Top(wiring.Component):
         return units
 
     def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: wiring.Component | None) -> None:
-        """Connect the effects of faults on the pins, and the units."""
+        """Connect faults to the pins, and the units."""
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
@@ -274,6 +274,6 @@ def _unit_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def _packed(packer: Packer) -> Value:
-    """High in a clock in which a frame is packed, or dropped."""
+    """High when a frame is packed or dropped."""
     frames = packer.frames
     return frames.commit | frames.decide & ~frames.verdict.send

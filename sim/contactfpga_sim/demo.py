@@ -103,7 +103,7 @@ def run(name: str, engine: str, skin: Skin) -> DemoResult:
 
 
 def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]]]:
-    """Readings of a Skin's pressure units by cycle, if it has some; they feel the scene from the start."""
+    """Readings of a Skin's pressure units by cycle under the scene."""
     if not skin.units:
         return []
     read = UnitReadings(scenes.CONTACTS[name](skin), load_cells(), skin)

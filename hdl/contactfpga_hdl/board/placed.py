@@ -62,5 +62,5 @@ def read(folder: Path, log: str) -> Report:
 
 
 def _packed(log: str, kind: str) -> int:
-    """LUTs or flip-flops, from nextpnr's lines on packing into logic cells."""
+    """LUTs or flip-flops, from nextpnr's packing lines."""
     return sum(int(count) for count, kinds in re.findall(r"(\d+) LCs used as (.*)", log) if kind in kinds)

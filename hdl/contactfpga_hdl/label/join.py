@@ -190,7 +190,7 @@ class Join(wiring.Component):
         joined: data.View,
         turns: "Turns | None",
     ) -> None:
-        """Set the brackets of new-row runs now known to be of one zone."""
+        """Set the brackets of new-row runs found to be one zone."""
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
         onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
 
@@ -226,7 +226,7 @@ class Join(wiring.Component):
         return decided
 
     def _run_moments(self, m: Module, run: data.View) -> list:
-        """Moments of the new run; the column sum is a difference of triangular numbers."""
+        """Moments of the new run, whose column sum is a difference of triangular numbers."""
         start, stop = self.step.start, self.step.stop
         columns = self.derived.skin.columns
         up_to = Array(math.comb(column + 1, 2) for column in range(columns))

@@ -88,7 +88,7 @@ class ProjectionLabeller(wiring.Component):
     def _add_cells(
         self, m: Module, enable: Value, step: data.View, column: Value, y: Value
     ) -> tuple[data.View, data.View]:
-        """Each column's moments in the band, including this row's cell; one clock after the walk."""
+        """Each column's moments in the band, one clock after the walk."""
         layout = moments_layout(self.derived)
         m.submodules.sums = sums = memory.Memory(shape=layout, depth=self.derived.skin.columns, init=[])
         read, write = sums.read_port(), sums.write_port()
@@ -109,7 +109,7 @@ class ProjectionLabeller(wiring.Component):
         return added, total
 
     def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
-        """In a closing band, add up the columns of a run, one clock after their own sums."""
+        """Add up the columns of a run in a closing band, one clock after their sums."""
         kept, zone = Signal.like(total), Signal.like(total)
         closes = step.valid & step.closes
         leaves = closes & (step.cell | step.shadow) & step.stop

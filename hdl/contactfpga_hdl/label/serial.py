@@ -275,7 +275,7 @@ class SerialLabeller(wiring.Component):
         earlier: Value,
         around: SerialTurns,
     ) -> None:
-        """Update the turns of the group, its runs and its cells."""
+        """Update the turns of group, runs and cells."""
         over = acts.closes | ~walk.active
         joins, zone = acts.joins & (~earlier | group.whole), acts.joins & ~earlier
         unwrapped = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)

@@ -69,7 +69,7 @@ class Reporter(wiring.Component):
         return m
 
     def _compare(self, m: Module, at: Value, is_slot: Value) -> Value:
-        """Whether a byte of a report would differ from the stored one sent last."""
+        """Whether a byte of a report differs from the one sent last."""
         init = [*self._report, *[0] * ((1 << len(at)) - len(self._report))]
         m.submodules.sent = sent = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = sent.read_port(), sent.write_port()
@@ -80,7 +80,7 @@ class Reporter(wiring.Component):
         return watched & ~self.sends & (read.data != self.byte)
 
     def _put_slots(self, m: Module, is_slot: Value, report_due: Value, report: Value) -> Value:
-        """Send slots while no report is due; returns the byte at the place of either."""
+        """Send slots while no report is due; returns the byte of either."""
         slot = self.slots.payload
         m.d.comb += self.due.eq(report_due | self.slots.valid)
         with m.If(~report_due):
@@ -93,7 +93,7 @@ class Reporter(wiring.Component):
 
 
 def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value:
-    """The byte at a place of a packet, from ``empty`` with these digits inserted."""
+    """The byte at a place of ``empty`` with these digits inserted."""
     found = Signal(8)
     with m.Switch(place):
         for index, value in enumerate([Const(empty[0], 8), *digits, Const(empty[-1], 8)]):

@@ -195,7 +195,7 @@ class Counts(wiring.Component):
         return m
 
     def _explain(self, m: Module, tally: Tally) -> None:
-        """Add cells as they are counted, subtract zones as they pass, which pauses the counting."""
+        """Add counted cells and subtract passing zones, which pause the counting."""
         cells = Signal.like(self.cells)
         unexplained = Signal(moments_layout(self.derived))
         m.d.comb += tally.hold.eq(self.zone_valid)

@@ -154,7 +154,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += [alone.eq(seek.pattern), cells.eq(sample.pressed), self.sampled.eq(slot)]
 
     def _keep_listed(self, m: Module, seek: Seek) -> None:
-        """Keep a row on the list if it, or the state of a switch in it, was pressed after its previous sample."""
+        """Keep a row on the list if it or a switch state in it was pressed."""
         if self.skin.debounce != "none":
             m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
             return
@@ -176,7 +176,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += self.contact.eq(0)
 
     def _tag_frame(self, m: Module, seek: Seek, driver: wiring.Component) -> None:
-        """Tag a frame, which begins with its first strobe; the tag includes the number of slots up to the last."""
+        """Tag a frame from its first strobe, with the number of slots up to the last."""
         m.submodules.frame_clock = clock = FrameClock(self.skin)
         slots = Signal.like(self.tag.slots)
         m.d.comb += [

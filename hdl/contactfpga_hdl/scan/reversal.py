@@ -232,7 +232,7 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _test_lines(self, m: Module, cycle: ReversalCycle, test: SelfTest, read: Value, pressed: Value) -> None:
-        """Connect the self-test: the scan releases the sheet for each slot, and a wanted frame waits."""
+        """Connect the self-test, whose slots delay a wanted frame."""
         m.submodules.test = test
         wiring.connect(m, test.slots, wiring.flipped(self.slots))
         m.d.comb += [

@@ -160,7 +160,7 @@ class ReversalCycle(wiring.Component):
                         self._check(m, columns_from="CHARGE")
 
     def _sample_clock(self, m: Module) -> Value | int:
-        """The clock of a row in which its columns are sampled."""
+        """Sample clock of a row's columns."""
         if not moves_sample(self.derived):
             return self._settle
         return SampleAt(m, self.derived, self.moves, self.clocks, self.begins).clock
@@ -171,7 +171,7 @@ class ReversalCycle(wiring.Component):
         return max(self.derived.project_clocks, self._settle)
 
     def _check(self, m: Module, columns_from: str) -> None:
-        """Begin the next check; one of columns begins in the given state."""
+        """Begin the next check, one of columns in the given state."""
         m.d.comb += self.check_starts.eq(1)
         m.d.sync += self._selects.eq(~self.of_rows)
         with m.If(self.of_rows):

@@ -72,7 +72,7 @@ class Ads131m08(wiring.Component):
         m.d.sync += [count.eq(Mux(toggles, 0, count + 1)), self.pins.spi_pace.eq(self.pins.spi_pace ^ toggles)]
 
     def _take(self, m: Module, falls: Value, counts: Value) -> None:
-        """Read the pin: its level in the clock in which ``falls`` is high passes the synchronizer two clocks later."""
+        """Read the pin, two synchronizer clocks after ``falls``."""
         bit = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, bit)
         place = Signal(range(BITS))

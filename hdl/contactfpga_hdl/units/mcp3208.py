@@ -52,7 +52,7 @@ class Mcp3208(wiring.Component):
         return m
 
     def _take(self, m: Module, rises: Value, last_bit: Value, unit: Value, last_unit: Value) -> None:
-        """Read the pin: its level in the clock in which ``rises`` is high passes the synchronizer two clocks later."""
+        """Read the pin, two synchronizer clocks after ``rises``."""
         level = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, level)
         takes = Signal(2)

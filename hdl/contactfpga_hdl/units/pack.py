@@ -68,7 +68,7 @@ class UnitPacker(wiring.Component):
         return m
 
     def _write(self, m: Module, write: wiring.PureInterface, filling: Signal) -> Signal:
-        """Write digits; returns a signal that is high in the clock in which a sweep is complete."""
+        """Write digits; returns a signal that is high when a sweep completes."""
         m.submodules.frame_clock = clock = FrameClock(self.skin)
         begun = Signal(TIME_BITS)
         sequence = Signal(SEQUENCE_BITS)

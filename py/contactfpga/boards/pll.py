@@ -1,7 +1,7 @@
 """PLL dividers from a board's crystal to a clock. Loads no Amaranth.
 
-iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by ``2
-** DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
+iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by
+``2**DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
 ``CLKOP_DIV`` times that.
 """
 
@@ -50,7 +50,7 @@ def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
 
 @functools.cache
 def _clocks(cell: str, crystal_hz: int) -> dict[int, Dividers]:
-    """Dividers by every clock of whole MHz, those that a Skin can request."""
+    """Dividers by clock of whole MHz, as Skins request."""
     clocks: dict[int, Dividers] = {}
     for made, found in _SETTINGS[cell](crystal_hz):
         if made % MHZ == 0:

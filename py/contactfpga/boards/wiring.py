@@ -170,8 +170,7 @@ def _lines_of_sheet(several: Several, port: str, count: int) -> Sequence[Connect
 
 
 def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Sequence[Connection]) -> Iterator[Output]:
-    """Outputs of chains: chain j has lines j n to j n + n - 1, n to a chain; its first line is on the chip next to the
-    board."""
+    """Outputs of chains of n lines: chain j has lines j n to j n + n - 1, the first next to the board."""
     length = -(-len(lines) // chains)
     for index, line in enumerate(lines):
         chain, place = divmod(index, length)

@@ -71,8 +71,7 @@ def _check_reversal(skin: Any) -> None:
 
 
 def _reversal_frame_clocks(derived: Any) -> int:
-    """Clocks when all rows are touched, and each waits until the one before it is debounced, labelled and counted; then
-    guard lines are checked."""
+    """Clocks when all rows are touched and wait for debounce, labeller and count, with the guard check."""
     handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones) + 16
     checked = max(derived.project_clocks, derived.row_clocks) + 1 if derived.skin.guard else 0
     clocks: int = derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed) + checked
@@ -86,8 +85,8 @@ def _raster_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_min_row_clocks(derived: Any) -> int:
-    """Clocks to pass on all of a slot's results before the next strobe: a row that was driven alone, then all others as
-    empty, up to the end mark; and to pack a frame with any number of pressed rows before the next frame ends."""
+    """Clocks to pass on a slot's results before the next strobe, up to the end mark, and to pack a frame before the
+    next one ends."""
     rows = derived.skin.rows
     handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
     least: int = max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
@@ -95,7 +94,7 @@ def _adaptive_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_packing_clocks(derived: Any, pressed: int) -> int:
-    """Packing time while the next frame drives the same rows one by one, and all others together."""
+    """Packing time while the next frame drives the same rows again."""
     skin = derived.skin
     if not derived.report.zones:
         items = skin.rows

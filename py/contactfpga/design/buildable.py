@@ -61,14 +61,14 @@ def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str,
 
 
 def _wirings(skin: Skin) -> Iterator[dict[str, Any]]:
-    """Ways to need fewer pins; driven columns cannot be on registers."""
+    """Ways to need fewer pins; driven columns need direct ones."""
     rows: dict[str, Any] = {"row_drive": "74hc595"}
     columns: dict[str, Any] = {"column_read": "74hc165"} | ({"precharge_us": 0.0} if skin.precharge_us else {})
     yield from (rows, columns, rows | columns)
 
 
 def _times(skin: Skin, changes: dict[str, Any], circuit: Circuit | None, factor: int) -> dict[str, Any]:
-    """Times that the circuit needs beyond the Skin's, and a longer row time."""
+    """Longer times that the circuit needs, and a longer row."""
     found: dict[str, Any] = {"settle_us": skin.settle_us * factor} if factor > 1 else {}
     if circuit is not None:
         slow = skin.replace(**changes, settle_us=_SLOW_US)  # so that no row is too short to ask

@@ -75,8 +75,7 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
 
 
 def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:
-    """Check that integers have 64 bits, as in TOML, and that no table is too deep; iteratively, as recursion would
-    overflow."""
+    """Check 64-bit integers and the depth of tables, iteratively."""
     todo: list[tuple[str, Any, int]] = [(name, value, 1) for name, value in values.items()]
     while todo:
         name, value, depth = todo.pop()

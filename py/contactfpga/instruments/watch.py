@@ -168,7 +168,7 @@ class CellHistory:
                 yield self._told(group, few, since_us, others, time_us)
 
     def _alone(self, group: np.ndarray, time_us: int) -> bool:
-        """Whether nothing beside the group is, or recently was, pressed; else it may be the rest of a contact."""
+        """Whether nothing is, or was recently, pressed beside the group: else it may be the rest of a contact."""
         beside = ~away_from(places(group), 1, self._sheet) & ~group
         quiet_us = time_us - self._limits.stuck_us // QUIET
         return not (beside & (self._cells | (self._changed_us > quiet_us))).any()
@@ -269,7 +269,7 @@ class ZoneHistory:
             yield Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _may_have_joined(self, gone: Key) -> bool:
-        """Whether a zone is so near that this one may be part of it now."""
+        """Whether a zone is near enough to be merged into this one."""
         middles = self._middles(gone)
         for key in self._since_us:
             away = away_from(middles, reach_of(gone[0]) + reach_of(key[0]), self._sheet)
@@ -322,7 +322,7 @@ def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
 
 
 def _keys(zones: Zones) -> set[Key]:
-    """Keys of zones with a place: a frame flagged ``mismatch`` may have one without cells."""
+    """Keys of zones with a place, which ``mismatch`` frames may lack."""
     windings = zones.windings or [""] * len(zones)
     return {(area, x, y, winding) for (area, x, y), winding in zip(zones.records.tolist(), windings) if area}
 

@@ -84,7 +84,7 @@ class Triangles:
 
 
 def _corner_normals(mesh: Any) -> Floats:
-    """(n, 3, 3): at each corner the area-weighted mean of the triangles around it, without those beyond an edge."""
+    """(n, 3, 3): area-weighted mean normals of the triangles at each corner on its side of edges."""
     faces, normals = np.asarray(mesh.faces), np.asarray(mesh.face_normals, float)
     most = int(np.bincount(faces.ravel()).max())
     if most * len(mesh.vertices) > MAX_AROUND:

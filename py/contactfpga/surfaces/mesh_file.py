@@ -65,7 +65,7 @@ def read(path: str | Path, extra: str, suffixes: tuple[str, ...] = SUFFIXES) -> 
 
 
 def _check_collada(data: bytes, path: Path) -> None:
-    """Check for archives, which the library would accept, and for endlessly nested scenes."""
+    """Refuse archives and endlessly nested scenes."""
     if zipfile.is_zipfile(io.BytesIO(data)):
         raise SurfaceError(f"{path}: it is an archive; unpack it")
     shown: collections.Counter[str] = collections.Counter()

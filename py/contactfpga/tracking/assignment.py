@@ -25,7 +25,7 @@ def assign(costs: Costs, alone: float) -> list[int | None]:
 
 
 def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns connected by finite costs; distant contacts form many small groups."""
+    """Rows and columns connected by finite costs, for speed."""
     groups: list[tuple[list[int], set[int]]] = []
     for row, line in enumerate(costs):
         rows, columns = [row], {column for column, cost in enumerate(line) if cost < math.inf}
@@ -40,7 +40,7 @@ def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
 
 
 def _optimal(costs: Costs, alone: float) -> list[int | None]:
-    """The Hungarian method by shortest augmenting paths, with an extra column for each row, to stay alone."""
+    """The Hungarian method by shortest augmenting paths, with a lone column per row."""
     size, real = len(costs), len(costs[0])
     padded = [
         [*line, *(alone if other == row else math.inf for other in range(size))] for row, line in enumerate(costs)

@@ -344,13 +344,12 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
 
 
 def _rank(member: Member) -> tuple[float, int]:
-    """Sort key of a zone's contacts, the largest first: a finger on a stuck switch stays the finger."""
+    """Sort key of a zone's contacts, the largest first."""
     return -member.area_mm2, member.id
 
 
 def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[Way, Way]:
-    """Hypotheses of a contact's way to a zone: it kept its motion, less surely with time; or it stopped, or returned to
-    its entry."""
+    """Hypotheses of a contact's way: it kept its motion, less surely with time; or it stopped or returned."""
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy

@@ -97,8 +97,7 @@ class UnitHistory:
 
 
 def _spread(share: float, change: float, gap_us: float) -> float:
-    """Uncertainty of an interpolated reading: the change may be a step at an unknown moment between the two samples.
-    Times are truncated to whole microseconds."""
+    """Uncertainty of an interpolated reading, whose change may be a step; times are truncated to us."""
     timing = change / gap_us * _ROUNDING
     return math.sqrt(_ROUNDING**2 + share * (1 - share) * change**2 + timing**2)
 

@@ -56,7 +56,7 @@ def _hashed(text: str) -> str:
 
 @functools.cache
 def _marks(file: Path) -> tuple[str, ...]:
-    """A hash for each statement of a module, or for the whole of another file."""
+    """A hash per statement of a module, or of a whole other file."""
     data = file.read_bytes()
     if file.suffix != ".py":
         return (hashlib.sha256(data).hexdigest(),)
@@ -65,7 +65,7 @@ def _marks(file: Path) -> tuple[str, ...]:
 
 
 def _says_nothing(statement: ast.AST) -> bool:
-    """Whether a statement is an import, a docstring, or for type checkers only."""
+    """Whether a statement is an import, a docstring, or typing."""
     if isinstance(statement, ast.If):
         return isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
     if isinstance(statement, ast.Expr):

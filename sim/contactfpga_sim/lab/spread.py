@@ -82,7 +82,7 @@ class MixedTimes:
 
     @functools.cached_property
     def _shares(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points where the share's slope changes or it jumps, with the share below and up to each."""
+        """Points of slope changes and jumps, with the share below and up to each."""
         edges, places = np.unique(np.concatenate([self.low, self.high]), return_inverse=True)
         first, last = np.split(places, 2)
         single = first == last

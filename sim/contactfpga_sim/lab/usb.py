@@ -155,8 +155,7 @@ class _Phases:
         self.widths = np.tile(ends - edges, settings.period_frames)
 
     def _closings(self, values: np.ndarray) -> np.ndarray:
-        """Last byte of a packet by its first byte, unless the timer ends it; one entry more than bytes, and the number
-        of bytes if no packet is closed any more."""
+        """Last byte of a packet by its first byte, unless the timer ends it; the number of bytes if it stays open."""
         count = len(values)
         found = np.arange(count + 1) + self._settings.chip.payload_bytes - 1
         if self._settings.event is not None:
@@ -190,7 +189,7 @@ class _Phases:
     def _send(
         self, start: np.ndarray, at: np.ndarray, by_timer: np.ndarray, byte: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Bytes sent in a frame, up to the packet with the byte: the first unsent byte, and the bus time in us."""
+        """Bytes sent in a frame, up to the packet with the byte: first unsent byte, and bus time in us."""
         start, us = start.copy(), np.zeros(len(start))
         while True:
             closing = self._closing[start]

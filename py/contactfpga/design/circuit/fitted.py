@@ -140,7 +140,7 @@ def fit_circuit(
 
 
 def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
-    """Rows and columns between which all cells are known, after removing the lines with the most gaps one by one."""
+    """Rows and columns with complete cells, after removing the lines with the most gaps."""
     rows, columns = ([*range(count)] for count in known.shape)
     while rows and columns and not known[np.ix_(rows, columns)].all():
         gaps = ~known[np.ix_(rows, columns)]
@@ -160,7 +160,7 @@ def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
 def _solved(
     times: Callable[[np.ndarray], np.ndarray], start: np.ndarray, goal: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The values for which the logarithms of ``times`` equal ``goal``, and their derivatives by the goal."""
+    """The values with the logarithms of times in ``goal``, and their derivatives."""
     values = start.astype(float)
     low, high = (np.array([LIMITS[name][end] for name in names], float) for end in (0, 1))
     for number in range(ROUNDS):
@@ -187,8 +187,8 @@ def _solved(
 
 
 def _rounding_variance(clocks: np.ndarray) -> float:
-    """Variance added to the logarithm of the mean by rounding to whole clocks. If times scatter by less than a clock,
-    all are rounded alike, and the mean is off by up to half a clock, uniformly."""
+    """Variance of the logarithm of the mean by rounding to clocks; if times scatter little, up to half a clock,
+    uniformly."""
     variance = max(0.0, float(clocks.var()) - 1 / 12)
     harmonics = np.arange(1, HARMONICS + 1)
     off = float(np.sum(np.exp(-4 * np.pi**2 * harmonics**2 * variance) / (2 * np.pi**2 * harmonics**2)))
@@ -196,9 +196,8 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
-    """The variance of the mean of (rows, columns) cells, and its degrees of freedom (Satterthwaite), by a two-way
-    analysis of variance with row and column effects. Lines that scatter no more than their cells explain count as
-    equal."""
+    """The variance of the mean of (rows, columns) cells and its degrees of freedom (Satterthwaite), by two-way analysis
+    of variance; negative line variances count as 0."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean
@@ -233,7 +232,7 @@ def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _factor(covariance: np.ndarray, degrees: np.ndarray, probability: float) -> float:
-    """The number of standard deviations that none of the values exceeds with this probability."""
+    """Standard deviations that no value exceeds with this probability."""
     rng = np.random.default_rng(0)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)

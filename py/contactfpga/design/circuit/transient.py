@@ -48,8 +48,7 @@ class _Rates:
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
-    """The solution of a symmetric system in two halves: beyond some 100 lines a library may start threads, which is
-    slower."""
+    """The solution of a symmetric system in two halves, which avoids slow library threads beyond 100 lines."""
     side = matrix[:count, count:]
     both = np.linalg.solve(matrix[:count, :count], np.column_stack([side, right[:count]]))
     across, alone = both[:, :-1], both[:, -1]
@@ -76,7 +75,7 @@ class _DriveEquations:
         return _Rates(net.farads @ state.lines, cell_c, line_a, junction_a - cell_a, cell_f, cell_s)
 
     def _gathered(self, cells: np.ndarray) -> np.ndarray:
-        """Sums of the cells' currents, out of the columns and into the rows."""
+        """Cell currents summed out of columns and into rows."""
         out = np.bincount(self.network.column_of, cells, self.count)
         return np.asarray(out - np.bincount(self.network.row_of, cells, self.count))
 

@@ -250,7 +250,7 @@ Slope = Callable[[float, State], State]
 def _walk(
     slope: Slope, x: float, y: State, step: float, rtol: float, scale: State, end: float | None = None
 ) -> Iterator[tuple[float, State]]:
-    """(x, y) after each accepted step, to ``end`` or forever. The sign of ``step`` is the direction."""
+    """(x, y) after each accepted step, to ``end`` or forever; the sign of ``step`` is the direction."""
     while end is None or x != end:
         if end is not None and abs(step) >= abs(end - x):
             step = end - x

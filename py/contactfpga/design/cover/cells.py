@@ -139,7 +139,7 @@ class Cells:
         return found
 
     def _spread(self, pressure: Floats) -> Floats:
-        """The force on each part of the grid below the foam, which repeats periodically far beyond the sheet's edge."""
+        """The force on each grid part below the foam, periodic far beyond the edge."""
         if self.cover.cut:
             return pressure
         return np.fft.irfft2(np.fft.rfft2(pressure) * self._transfer, s=pressure.shape)

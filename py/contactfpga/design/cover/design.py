@@ -200,7 +200,7 @@ def _judge(task: Task, foam: Foam, hit: Impact | None) -> FoamDesign:
 
 
 def _regions(task: Task, ball: Ball, deepest_m: float) -> list[RegionLimits]:
-    """Limits of body regions, with gravity at the angle of the touch; a pull back counts only after the reaction."""
+    """Limits of body regions; a pull back counts only after the reaction."""
     brake = task.brake_nm / task.arm.lever_m
     pressing = Pressing(task.arm.mass_kg, max(0.0, task.arm.push_n(0.0)), brake, ball, deepest_m)
     return [limits_of(pressing, region, task.speed_m_s, task.latency_s) for region in task.regions]
@@ -281,8 +281,8 @@ def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
 
 
 def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
-    """End of the compression if the torque changes at ``pressed_m``: from the balance of an arm that brakes all the
-    way, with its initial energy corrected by the loss avoided before."""
+    """End of the compression if the torque changes at ``pressed_m``, by the balance of a braking arm with corrected
+    energy."""
     if pressed_m >= hit.compression_m:
         return hit.compression_m
     braking = dataclasses.replace(task.arm, torque_nm=-task.brake_nm)
@@ -291,7 +291,7 @@ def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
 
 
 def _tolerance(task: Task) -> float | None:
-    """Tolerance of the model choice; a model named by the task is used with a note of its error."""
+    """Tolerance of the model choice, None for a named model."""
     return task.tolerance if task.model is None else None
 
 

@@ -203,7 +203,7 @@ def _under(parts: Sequence[Part], x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _superposed(
     part: Part, force_n: float, thickness_m: float, within: str, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """The part's pressure as many point forces, each spread through the medium."""
+    """The part's pressure as point forces spread through the medium."""
     at_x, at_y, shares = part.pressure(thickness_m)
     places_x, places_y = x.ravel(), y.ravel()
     stress = np.empty(places_x.shape)

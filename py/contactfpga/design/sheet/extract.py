@@ -138,8 +138,8 @@ def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
 
 
 def _past_pf(skin: Skin, switch: SwitchPart, track: float | None, eps: float) -> float:
-    """Capacitance in pF over the height of a cell: of a column to a track midway between two columns, or without
-    ``track`` to the next column. Beside its switches a column is as wide as they are, between them as a track."""
+    """Capacitance in pF per cell height of a column to ``track`` midway between columns, or to the next column. Beside
+    switches a column has their width."""
     found, wide = 0.0, 2 * switch.half_width
     for width, length in ((wide, min(wide, skin.pitch_y_mm)), (TRACK_MM, max(0.0, skin.pitch_y_mm - wide))):
         gap = skin.pitch_x_mm - width if track is None else (skin.pitch_x_mm - width - track) / 2

@@ -123,7 +123,7 @@ class _Matrix:
         return f"COL{column}" if column < self.skin.columns else "COL_GUARD"
 
     def _risers(self) -> list[float]:
-        """x at which each row descends, from left to right: between columns, on a plane also left of them."""
+        """x of each descending row, from left to right: between columns, on a plane also left of them."""
         skin, gaps = self.skin, self.skin.columns - 1
         width = self.px - 2 * self.switch.half_width - VIA_MM - 2 * CLEARANCE_MM
         most = min(math.floor(self.px / PLACE_MM + 1e-9) - 1, math.floor(width / PLACE_MM + 1e-9) + 1) if gaps else 0
@@ -226,7 +226,7 @@ class _Matrix:
         self._to_row(drawing, x, y, net, self.row_net(self.skin.rows))
 
     def _guard_column(self, drawing: Drawing, base: float) -> None:
-        """Draw the guard column, with a diode to the end of each row."""
+        """Draw the guard column, with a diode to each row's end."""
         x, net = self.guard_x, self.column_net(self.skin.columns)
         drawing.run(net, "F", (x, base), *((x, self.row_y(row)) for row in range(self.skin.rows)))
         for row in range(self.skin.rows):

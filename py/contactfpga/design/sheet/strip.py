@@ -108,8 +108,7 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
 
 
 def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
-    """A pin of the channel: from the pad up, and aside onto the grid. Pads are more than a grid step apart, so no two
-    share a place."""
+    """A pin of the channel, moved onto the grid, where no two share a place."""
     step = grid.near(x, below=True)
     drawing.run(net, "B", (x, y), (x, y - 0.9), (step, y - 0.9))
     return Pin(net, step, y - 0.9)
@@ -136,8 +135,8 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
 
 
 def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    """One or more connectors for the rows, and for the columns. ``below``: there are two channels, so the parts above
-    the upper one are on the places of pins below the lower one."""
+    """One or more connectors for rows and columns. ``below``: two channels, so parts above the upper are on the lower
+    one's grid."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -172,7 +171,7 @@ CHIP_STEPS = 15
 
 
 def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
-    """The shift registers, each with its capacitor, and the resistor at their enable; none for a Skin without."""
+    """The shift registers with capacitors and enable resistor; none for a Skin without."""
     nets = list(_chip_nets(skin))
     if not nets:
         return []
@@ -217,8 +216,8 @@ def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
 def _registers(
     drawing: Drawing, chips: Sequence[_Unit], plugs: Sequence[_Unit], below: list[Pin], bottom: float
 ) -> tuple[list[Pin], float, list[float]]:
-    """Draw the channel below the chips, the chips, and the tracks that pass them. Returns the pins at the bottom of the
-    channel above, its beginning, and the ends of the drawing."""
+    """Draw the lower channel, the chips, and passing tracks. Returns the upper channel's bottom pins and beginning, and
+    the drawing's ends."""
     tried = _tried(chips)
     lower = [pin for pin in tried if pin.y > 0]
     upper = [pin for pin in tried if pin.y < 0]

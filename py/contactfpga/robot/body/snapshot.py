@@ -122,7 +122,7 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
 
 
 def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContact]:
-    """The contacts with forces, if the units' readings have arrived, and each contact has a place."""
+    """The contacts with forces, if readings and places are known."""
     forces = forces_of(plan, zones) if found else None
     if forces is None:
         return found

@@ -84,7 +84,7 @@ def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
-    """(6, n): the smallest change of the matrix that explains the rest; noise alone changes nothing."""
+    """(6, n): the smallest change of the matrix beyond noise that explains the rest."""
     sigma = np.array([unit.sigma_n / abs(unit.gain_n) for unit in cells.units])
     left, values, right = np.linalg.svd(deviations / sigma, full_matrices=False)
     moved = values > NOISE * np.sqrt(len(deviations))

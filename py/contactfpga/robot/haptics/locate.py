@@ -134,8 +134,8 @@ class Observations:
         return chance, misfit
 
     def _needed(self, cell: tuple[int, int], x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
-        """The force in N that closes the switch from each place, and its standard deviation, including its variation
-        within a grid step."""
+        """The force in N that closes the switch from each place, and its standard deviation, including that within a
+        grid step."""
         row, column = cell
         distance = np.hypot(x - column * self.pitches_m[0], y - row * self.pitches_m[1])
         needed = self.reach.closing_n(distance)
@@ -145,7 +145,7 @@ class Observations:
         return needed, np.maximum(sigma, ROUNDING * needed)
 
     def _open(self) -> list[tuple[int, int]]:
-        """Open switches that the contact might have closed: those around the pressed ones."""
+        """Unpressed switches around the pressed ones."""
         far = self.reach.reach_m(self.force_n * (1 + 3 * self.spread) + 3 * self.force_sigma_n)
         wide, high = (math.ceil(far / pitch) for pitch in self.pitches_m)
         rows, columns = zip(*self.cells)
@@ -164,8 +164,7 @@ class Observations:
 
 
 def _one_side(standing: Floats, chance: Floats, misfit: Floats) -> None:
-    """Add the evidence of a switch on the right side of its threshold if ``standing``, in standard deviations, is above
-    0."""
+    """Add the evidence of a switch ``standing`` standard deviations on the right side of its threshold."""
     # The logistic curve is the normal one to 1 %, and needs no scipy.
     chance -= np.logaddexp(0.0, -1.702 * standing)
     misfit += np.minimum(standing, 0.0) ** 2
@@ -235,8 +234,7 @@ class Locator:
         return Place(x, center.sheet_m[1] - origin_m[1], posterior.radius_95(spread), spread, "center of pressure")
 
     def _inside(self, center: Center) -> tuple[float, Floats]:
-        """Arc length on the sheet, under the foam, and the covariance there, on the turn nearest to the sheet's
-        middle."""
+        """Arc length under the foam and covariance there, on the turn nearest to the sheet."""
         assert self._sheet.radius_mm is not None
         assert center.covariance_m2 is not None
         share = 1e-3 * self._sheet.radius_mm / math.hypot(center.point_m[0], center.point_m[1])
@@ -312,8 +310,7 @@ class Locator:
         return _place(found, bool(closings), center is not None)
 
     def _box(self, cells: Sequence[tuple[int, int]], force_n: float, center: Place | None) -> Box:
-        """A box around all places that can press these cells, with margins for the spread of thresholds and the noise
-        of the force."""
+        """A box around all places that can press these cells, with margins for uncertainty."""
         far = 1.2 * self._reach.reach_m(1.5 * force_n + 5 * self._sigma) + max(self._pitch_x, self._pitch_y)
         rows, columns = zip(*cells)
         left, right = self._pitch_x * max(columns) - far, self._pitch_x * min(columns) + far

@@ -300,7 +300,7 @@ def _draw_map(figure: Figure, place: Axes, needs: Requirements, values: Floats, 
 
 
 def _draw_seen(figure: Figure, place: Axes, needs: Requirements, seen: Floats) -> None:
-    """Draw detectable forces by place; around a cylinder, where the place is irrelevant, by direction."""
+    """Draw detectable forces by place, around a cylinder by direction."""
     first, second = needs.size_m
     if not isinstance(needs.surface, Cylinder) or seen.shape[1] == 1:
         _draw_map(figure, place, needs, seen.max(axis=1), "the best: smallest force seen, N")

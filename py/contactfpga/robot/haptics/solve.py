@@ -147,10 +147,9 @@ def _one(wrench: Wrench, touch: Touch) -> Solution:
 
 
 def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
-    """The forces at two contacts: all but a squeeze along their line is determined, and friction bounds that.
+    """The forces at two contacts: determined up to a squeeze along their line, bounded by friction.
 
-    Of the allowed forces it takes those with the smallest parts along the surface, and if these do not depend on the
-    squeeze, the smallest squeeze.
+    It takes the smallest forces along the surface, else the smallest squeeze.
     """
     first, second = touches
     (ax, ay, az), (bx, by, bz) = first.point_m, second.point_m
@@ -270,7 +269,7 @@ def _solution(
     chi2: float | None,
     beyond: bool,
 ) -> Solution:
-    """A solution; ``chi2`` None, for forces that are not the best without friction, is computed from the residual."""
+    """A solution; ``chi2`` None is computed from the residual."""
     half = math.sqrt(0.5)
     null = [] if along is None else [[half * one for one in along] + [-half * one for one in along]]
     rank = 3 if along is None else 5

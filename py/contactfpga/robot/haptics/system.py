@@ -321,7 +321,7 @@ def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, b
 
 
 def _fitted(fit: confidence.Fit) -> list[Interval]:
-    """Intervals of a fit; the numpy solver slows with contacts, and is for two at most."""
+    """Intervals of a fit, by numpy for up to two contacts."""
     return fit.intervals() if fit.contacts <= 2 else fit.intervals(_ends_of_many)
 
 
@@ -344,8 +344,8 @@ def _frictions(touches: Sequence[Touch], frictionless: bool) -> list[float]:
 
 
 def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
-    """The least and largest push in N of each contact, over all forces in the cones with the wrench of ``forces``,
-    which are in them. None: unbounded."""
+    """Least and largest push in N of each contact over all forces in the cones with the wrench of ``forces``. None:
+    unbounded."""
     basis, firsts = _basis(system.touches, frictionless)
     _, values, right = np.linalg.svd(system.centered(system.matrix() @ basis))
     rank = int((values > 1e-9 * values[0]).sum())

@@ -174,7 +174,7 @@ class LoadCells:
 
     @functools.cached_property
     def _seen(self) -> tuple[Floats, int, Vector, float]:
-        """Left singular vectors about the units' barycenter with moments over their distance; rank; place; distance."""
+        """Left singular vectors about the units' barycenter, moments over their distance; rank; place; distance."""
         x, y, z = np.mean([unit.point_m for unit in self.units], axis=0).tolist()
         moved = np.array(self.matrix)
         moved[3:] -= skew((x, y, z)) @ moved[:3]

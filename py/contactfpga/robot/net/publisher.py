@@ -132,8 +132,7 @@ class BoardPublisher:
 
 
 def _check_alone(session: zenoh.Session, key: str) -> None:
-    """Raise if another publisher sends under the key. A token alone proves little: a killed publisher's lasts for a
-    while, and anyone can declare one."""
+    """Raise if another publisher sends under the key; tokens can be stale or forged."""
     if not list(session.liveliness().get(f"{key}/alive/*", timeout=LEASE_MS / 1000)):
         return
     counters, heard = NetCounters(), threading.Event()

@@ -99,7 +99,7 @@ def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.S
 
 
 def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, what: str) -> zenoh.Session:
-    """Open a session; a configuration file overrides the settings, an explicit endpoint overrides the file."""
+    """Open a session; a file overrides the settings, an explicit endpoint the file."""
     try:
         import zenoh
     except ModuleNotFoundError as error:

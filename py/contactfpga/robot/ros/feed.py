@@ -232,7 +232,7 @@ class Feed:
         self._events, self._restarted = [], False
 
     def _wanted(self, zones: Zones) -> bool:
-        """Whether to publish a frame. Frames wait while the computer is busy, or was during opening."""
+        """Whether to publish a frame, given the backlog of a busy computer."""
         now = self._board.clock()
         if zones.arrived_s is not None and now - zones.arrived_s > BEHIND_S:
             return now - self._published_s >= 1 / BEHIND_HZ
@@ -255,7 +255,7 @@ class Feed:
         self._send(topic, encode(TOPICS[topic].type, message))
 
     def _is_due(self, what: str, rate_hz: float) -> bool:
-        """Whether it is due, at this average rate, without making up for missed ones."""
+        """Whether it is due at this average rate, without catching up."""
         now, due, period_s = self._board.clock(), self._due[what], 1 / rate_hz
         if now < due - EARLY * period_s:
             return False

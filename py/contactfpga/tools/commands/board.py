@@ -13,14 +13,12 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.design(parser, "Skin of the board (default: the reference Skin).")
     parser.add_argument("--scene", metavar="NAME", help="What touches the sheet: a scene's name or a .npy file.")
     parser.add_argument("--symlink", metavar="PATH", help="Create this symbolic link to the pseudo-terminal.")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.model.board.pty_board import PtyBoard
 
     design = flags.designed(args, Skin())

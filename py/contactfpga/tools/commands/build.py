@@ -27,7 +27,6 @@ BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec.
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
     flags.design(parser, "Skin to build (default: one that fits the board).")
     output = "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit)."
@@ -61,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if it cannot work, or if times
-    are too short for it."""
+    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if it cannot work with its
+    times."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)

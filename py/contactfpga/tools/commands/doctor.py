@@ -39,7 +39,6 @@ ZONES_ONLY = (
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.connection(parser)
     long = "Seconds over which frames are counted (default: 1), or watched or tested (default: until Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)

@@ -11,13 +11,11 @@ EXTRA = "analysis"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("recording", metavar="RECORDING.mcap", help="What `contactfpga record` wrote.")
     parser.add_argument("table", metavar="OUT", help="The table: OUT.parquet, OUT.npz or OUT.csv.")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga.tools.recordings.export import export
     from contactfpga.tools.recordings.recording import Recording
 

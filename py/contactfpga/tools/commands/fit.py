@@ -35,7 +35,6 @@ ORDER = (
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.epilog = ORDER
     what = "A .toml file of scenes, a .npz or .npy recording, or the name of a family or scene (docs/scenes.md)."
     parser.add_argument("scenes", nargs="+", metavar="SCENES", help=what)
@@ -105,7 +104,6 @@ def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.fit import show
     from contactfpga_sim.lab.fit.search import fit
@@ -165,7 +163,7 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
-    """The cover of the Skin's file, the named ones, or the default ones; none for recordings alone."""
+    """The covers of the Skin's file, named ones, or defaults; none for recordings."""
     from contactfpga_sim.lab import covers
     from contactfpga_sim.lab.fit import faces
 

@@ -19,7 +19,6 @@ EXTRA = "boards"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
     usual = "Bitstream (default: the one in build/BOARD; of a kit, that of the release, or one is built)."
     parser.add_argument("file", nargs="?", metavar="FILE", help=usual)
@@ -27,7 +26,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     board = flags.named_board(args)
     file = _file(args, board)
     programmer = board.programmer
@@ -46,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _file(args: argparse.Namespace, board: BoardSpec) -> Path:
-    """The bitstream to write, which may be missing only for a kit without a released one."""
+    """The bitstream to write, which may be missing for a kit without a released one."""
     if args.kit and not args.file:
         released = kits.kit(args.kit).bitstream
         return released if released.is_file() else bitstream_path(board, default_folder(board, args.kit))

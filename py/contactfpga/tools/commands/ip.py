@@ -12,13 +12,11 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.sheet(parser, "Skin of the core (default: the reference Skin).")
     parser.add_argument("-o", "--output", metavar="DIR", default="build/ip", help="Folder (default: %(default)s).")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.verify import ip
 
     file = flags.sheet_file(args)

@@ -27,7 +27,6 @@ ENDINGS = (".svg", ".png")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.sheet(parser, "Skin to measure (default: that of --board, else the reference Skin).")
     bridge = f"Board whose USB bridge is taken: {', '.join(boards.BOARDS)}, or one of your own (default: {BOARD})."
     parser.add_argument("--board", metavar="NAME", help=bridge)
@@ -48,7 +47,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.finger import host, stages
     from contactfpga_sim.lab.usb import BridgeSettings

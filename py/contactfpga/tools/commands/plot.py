@@ -14,7 +14,6 @@ ENDINGS = (".png", ".svg")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     what = "File of `contactfpga record` or of `contactfpga zones --record`."
     parser.add_argument("recording", metavar="RECORDING", help=what)
     file = "PNG or SVG, by its ending (default: RECORDING.png, in this folder)."
@@ -24,7 +23,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga.tools.view import plot, replayed
 
     with terminal.reading(args.recording) as tell:

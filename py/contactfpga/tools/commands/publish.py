@@ -36,7 +36,6 @@ together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("ports", nargs="*", metavar="PORT", help=PORTS)
     flags.reading(parser)
     key = "Name of a single board on the network (default: contactfpga/ and its name, or its fingerprint)."
@@ -103,7 +102,7 @@ def _refuse(first: str, second: str, of: str) -> NoReturn:
 
 
 def _place(port: str) -> tuple[str, int | None]:
-    """The device behind a name and the number of the sheet; each ``sim://`` without one is a separate board."""
+    """The device behind a name and the sheet's number; each bare ``sim://`` is a board of its own."""
     sheet = SheetOf.parse(port)
     name, number = (port, None) if sheet is None else (sheet.port, sheet.number)
     virtual = name.startswith("sim:")

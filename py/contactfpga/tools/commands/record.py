@@ -28,7 +28,6 @@ SHOWN_S = 0.5
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     file = "File to write; it must not exist yet. With --recover: the file to repair; it is not changed."
     parser.add_argument("file", metavar="FILE.mcap", help=file)
     robot = "or ROBOT.toml for all boards of a robot (docs/body.md)."
@@ -47,7 +46,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     return _recover(args) if args.recover else _record(args)
 
 

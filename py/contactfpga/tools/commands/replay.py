@@ -14,7 +14,6 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     parser.add_argument("frames", metavar="FRAMES.npy", help="Array (frames, rows, columns) of bool or numbers.")
     joined = "Neighbors of a cell: 8 with corners, 4 without (default: 8)."
     parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help=joined)
@@ -31,7 +30,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.model.board import replay
 
     frames, skin = replay.load(

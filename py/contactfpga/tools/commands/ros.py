@@ -14,7 +14,6 @@ EXTRA = "ros"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.connection(parser)
     name = "Namespace of the topics (default: skin, so that zones are in /skin/zones)."
     parser.add_argument("--namespace", metavar="NAME", default="skin", help=name)
@@ -50,7 +49,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga.robot.ros.dds import Publisher
     from contactfpga.robot.ros.feed import Feed
     from contactfpga.robot.ros.settings import Settings

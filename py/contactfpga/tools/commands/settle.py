@@ -45,7 +45,6 @@ DIODE_WORDS = {
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     skin = "Skin that gives rows, columns, diodes and the table [circuit]; flags below replace values of that table."
     flags.sheet(parser, skin)
     lines = numbers.whole(1, limits.MAX_LINES, "lines")

@@ -24,7 +24,6 @@ EXTRA = None
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     lay = "Skin to lay out, with its tables [circuit] and [cover]."
     parser.add_argument("skin", metavar="SKIN.toml", nargs="?", help=lay)
     flags.kit(parser)

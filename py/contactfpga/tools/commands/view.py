@@ -19,7 +19,6 @@ WHAT = (
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     skin = "Skin of the virtual sheet; of a board: require one that was built from it, and use its baud rate."
     flags.connection(parser, WHAT, skin)
     parser.add_argument("--flat", action="store_true", help="A flat virtual sheet instead of one around a forearm.")
@@ -45,7 +44,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga.tools.view import opening
     from contactfpga.tools.view.playback import Player
 
@@ -78,5 +76,5 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _has_display() -> bool:
-    """Whether a browser would have a window, as one in the terminal cannot show this."""
+    """Whether a browser would have a window."""
     return not sys.platform.startswith("linux") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

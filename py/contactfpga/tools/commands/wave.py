@@ -13,7 +13,6 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.sheet(parser, "Skin of the board (default: the reference Skin).")
     pressed = "Press the first frame of this array of (frames, rows, columns) (default: 2x2 cells in the middle)."
     parser.add_argument("--pressed", metavar="FRAMES.npy", help=pressed)
@@ -21,7 +20,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     from contactfpga_sim.model.scenes.recordings import Recording
     from contactfpga_sim.verify import wave
 

@@ -20,7 +20,6 @@ EXTRA = None
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.connection(parser)
     flags.once(parser)
     flags.seconds(parser)
@@ -34,7 +33,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     flags.check_forces(args)
     if args.json:
         return _json(args)

@@ -150,7 +150,7 @@ def _interrupt(number: int, _: object) -> None:
 
 
 def _again(what: sys.UnraisableHookArgs) -> None:
-    """Replacement of Python's report on unraisable errors: a signal is repeated."""
+    """Repeat a signal in an unraisable error, instead of Python's report."""
     if _came is None or not issubclass(what.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(what)
         return

@@ -95,7 +95,7 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
 
 
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
-    """The scale of the drawing, and whether the table is beside it, which is preferred to a larger drawing."""
+    """The scale of the drawing, and whether the table is beside it, preferably."""
     for scale in drawn_sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
         if drawn_sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
             return scale, True

@@ -136,8 +136,7 @@ class _Copy:
 
 
 def _definitions(file: BinaryIO) -> list[_Definitions]:
-    """Definitions of each recording in the file. A closed one repeats them at its end, without which damage to their
-    first piece would lose all."""
+    """Definitions of each recording; a closed one repeats them at its end, in case their first piece is damaged."""
     from mcap.opcode import Opcode
 
     found: list[_Definitions] = []
@@ -155,7 +154,7 @@ def _definitions(file: BinaryIO) -> list[_Definitions]:
 
 
 def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, bytes]]:
-    """(number of the recording, kind, content) of records up to the end of the last recording, or of the whole part."""
+    """(number of the recording, kind, content) of all whole records."""
     from mcap.opcode import Opcode
 
     number = 0

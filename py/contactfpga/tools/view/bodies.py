@@ -132,7 +132,7 @@ class DrawnRobot:
         return contacts.rows(moment, name if label is None else label)
 
     def _measured(self, plan: Plan, newest: LinkState) -> list[LinkContact] | None:
-        """The contacts of the newest frame, or before its readings arrive, of the previous one."""
+        """The newest contacts, of the previous frame until readings arrive."""
         before, self._felt[plan.name] = self._felt.get(plan.name), newest
         if plan.units is None:
             return None

@@ -145,7 +145,7 @@ class SimulatedView(RobotView):
     # ---- the panel
 
     def _add_pushing(self) -> None:
-        """Add the mouse's force, the obstacle, the felt forces, the reflex, and a restart."""
+        """Add controls of force, obstacle, reflex and restart, and felt forces."""
         source, gui = self._source, self._server.gui
         with gui.add_folder("Robot"):
             skin = gui.add_dropdown("skin", (*SKINS, ALL), initial_value=source.skin)

@@ -91,8 +91,7 @@ class Guard:
         return f"contactfpga-view-{port}"
 
     def _is_ours(self, host: str, port: int) -> bool:
-        """Whether the browser used a host name that nobody can point elsewhere: a site whose name resolves to 127.0.0.1
-        would otherwise count as this server."""
+        """Whether the browser used a safe host name: another site's name could resolve to 127.0.0.1."""
         try:
             found = urlsplit(f"http://{host}")
             name, given = found.hostname or "", found.port or 80
@@ -106,8 +105,8 @@ class Guard:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     def _welcome(self, port: int) -> Response:
-        """Lead the browser to the page without the token in the address. The page does it by itself: after a redirect,
-        a browser from another site's link would withhold its cookie."""
+        """Lead the browser to the page without the token, by the page itself: a redirect from another site would
+        withhold the cookie."""
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         dark = "matchMedia('(prefers-color-scheme: dark)').matches"
         page = (
@@ -172,7 +171,7 @@ def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None
 
 
 def _free_port(host: str, port: int | None) -> int:
-    """A free port: viser would try 1000 others, or wait forever for a foreign host."""
+    """A free port: viser would try 1000, or wait forever for a foreign host."""
     reason = ""
     for candidate in [port] if port is not None else range(PORT, PORT + PORTS_TRIED):
         try:
@@ -190,7 +189,7 @@ def _free_port(host: str, port: int | None) -> int:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[Callable[[], bool]]:
-    """While viser starts, make its listener ask the guard first; viser has no setting for this."""
+    """While viser starts, make its listener ask the guard first."""
     import websockets.asyncio.server as listening
 
     serve = listening.serve
@@ -234,7 +233,7 @@ def _response(answer: Response) -> Any:
 
 
 def _forget_tunnel(server: viser.ViserServer) -> None:
-    """Disable viser's tunnel to a server of its authors, which a client could request."""
+    """Disable viser's tunnel, which a client could request."""
     from viser import _messages
 
     handlers = server._websock_server

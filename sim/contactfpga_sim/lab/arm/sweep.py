@@ -96,7 +96,7 @@ def _number(value: float | None) -> float:
 
 
 def _thinnest(task: SweepTask) -> SweepPoint:
-    """The smallest thickness at which the foam is not pressed flat; thicker foam also closes its switch later."""
+    """The smallest thickness at which the foam is not pressed flat."""
 
     def at(thickness_m: float) -> tuple[SweepPoint, bool]:
         point = _point(dataclasses.replace(task, case=task.case.but(foam={"thickness_m": thickness_m})))

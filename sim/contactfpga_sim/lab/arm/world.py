@@ -305,8 +305,7 @@ class World:
                 self.detected_s = at
 
     def _catch_up(self) -> None:
-        """Run the board to the plant's time, unless it is dead. It runs only on demand: at a switch change, a
-        controller sample or a host frame."""
+        """Run the board to the plant's time on demand, unless it is dead."""
         board, lead, hz = self._board, self.case.run.lead_s, self._clock_hz
         if board is None:
             return

@@ -167,7 +167,7 @@ def play(outage: Outage, folder: Path) -> OutageTimes:
 def _until(
     reader: LinkReader, socket: Socket, status: str, seen: list[str], fresh_until_s: float = float("inf")
 ) -> int:
-    """Advance until the link has this status; returns the number of looks at which it was ok for too long."""
+    """Advance until the link has this status; returns how often it was ok for too long."""
     end_s, stale = socket.now + LONGEST_S, 0
     while (found := reader.state().status) != status:
         if not seen or seen[-1] != found:

@@ -166,7 +166,7 @@ def numbered(values: np.ndarray) -> np.ndarray:
 
 
 def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, folds: int) -> Interval:
-    """Distances of scenes from the median of their number; with several folds, from medians of the other folds."""
+    """Distances of scenes from their number's median, with several folds from other folds' medians."""
     places, found = offsets * pitch_mm, np.zeros(len(offsets))
     count = int(numbers.max()) + 1
     if folds == 1:
@@ -181,7 +181,7 @@ def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, f
 
 
 def _learned(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count, 2) medians of (n, T, 2) places by (n, T) numbers, drawn to the barycenter if scenes are few."""
+    """(count, 2) medians of (n, T, 2) places by (n, T) numbers, shrunk to the barycenter."""
     scenes = np.bincount(numbers.ravel(), minlength=count) / numbers.shape[1]
     medians = geometric_medians(places.reshape(-1, 2), numbers.ravel(), count)
     return medians * (scenes / (scenes + DOUBT))[:, None]

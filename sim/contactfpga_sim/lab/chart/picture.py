@@ -177,7 +177,7 @@ def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
 
 
 def _walls(panel: Any, metric: Metric, some: Sequence[Point], method: str) -> None:
-    """Draw the time that the bits need, and the least error of any method on the best cells."""
+    """Draw the bits' time and the least error on the best cells."""
     wall: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.4, "linestyle": style.DASHES[1], "zorder": 2}
     if math.isfinite(least := bits_us(some)):
         panel.axvline(least, **wall)

@@ -63,8 +63,8 @@ class FoamOnCaps:
         return np.asarray(total, float).reshape(self.count, self.count)
 
     def _solved(self, pressure: Floats) -> Floats:
-        """The pressure below, by conjugate gradients: supported elements move together, except for the switches'
-        yield."""
+        """The pressure below, by conjugate gradients: supported elements move together, except for yielding
+        switches."""
         below = np.where(self.held, pressure.sum() / self.held.sum(), 0.0)
         rest = self._free(self._moves(pressure, below) - self._given(below))
         step, size = rest.copy(), (rest**2).sum()

@@ -84,7 +84,7 @@ def _finger(canvas: Canvas, x: float) -> None:
 
 
 def _lengths(canvas: Canvas, tops: dict[str, float], bottom: float, width: float, pitch: float, side: float) -> None:
-    """Draw pitch and cap side above the sheet, and the total height at its left."""
+    """Draw pitch and cap side above the sheet, and total height."""
     first, step, half = LEFT + 0.5 * pitch * PX_PER_MM, pitch * PX_PER_MM, side * PX_PER_MM / 2
     low = bottom + 66
     for x in (first, first + step):

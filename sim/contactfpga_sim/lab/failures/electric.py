@@ -290,7 +290,7 @@ DIODES_REVERSAL = dataclasses.replace(
 
 
 def _broken(skin: Skin, line: str, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes with broken lines, rows or columns, anywhere under a contact anywhere."""
+    """Outcomes with broken lines anywhere under a contact."""
     found = []
     for _ in range(draws):
         top, left = map(int, rng.integers(0, (skin.rows - 6, skin.columns - 6)))

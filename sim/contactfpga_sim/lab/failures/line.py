@@ -152,7 +152,7 @@ def recorded(scans: int, seed: int) -> Line:
 
 
 def _of_line(found: HostDecoding) -> Outcome:
-    """Right if every frame arrives; a frame never sent is worse than a lost one, and silent."""
+    """Right if every frame arrives; an unsent frame is worse than a lost one, and silent."""
     missing = found.sent - found.arrived
     what = f"{missing} of {found.sent} frames do not arrive"
     if found.wrong:
@@ -161,8 +161,7 @@ def _of_line(found: HostDecoding) -> Outcome:
 
 
 def _lines(bit_clocks: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of lines of a hello and some frames, each with its own contacts and phase, at a host with this bit
-    length."""
+    """Outcomes of short random lines at a host with this bit length."""
     lines = [recorded(FEW_FRAMES, int(seed)) for seed in rng.integers(0, RECORDED, count)]
     found = [(line, line.read(bit_clocks, float(phase))) for line, phase in zip(lines, rng.random(count))]
     return [_of_line(heard(line, data)) for line, data in found]
@@ -319,7 +318,7 @@ class SlowHost:
 
 
 def _slow_host(milliseconds: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """The driver reads all there is, then the host works for a while; one outcome per cycle."""
+    """Outcomes of cycles in which the driver reads all, then the host works."""
     transport = SlowHost()
     scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
     found = []
@@ -358,8 +357,7 @@ MAX_AGE_S = 0.005
 
 @functools.cache
 def _silence(max_age_s: float | None, phase: float) -> tuple[str, float]:
-    """A program reads the newest frame repeatedly, and the board stops at this phase of a scan: the error, and seconds
-    until it."""
+    """Error and delay when a board stops at this phase while a program reads its newest frame."""
     transport = DyingBoard()
     with Driver(transport) as board:
         board.greet(1.0)

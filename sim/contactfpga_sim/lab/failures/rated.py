@@ -77,8 +77,8 @@ class Rated:
 
 
 def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:
-    """One outcome of all draws. If the value holds, it reports what half of the draws report; else what the wrong draws
-    report, or nothing if fewer than ``telling`` of them report anything."""
+    """One outcome of all draws: the reports of half the draws if the value holds; else of the wrong ones, if at least
+    ``telling``."""
     wrong = [one for one in found if not one.right]
     each = [{re.sub(r"\d+", "N", word) for word in one.told} for one in (found if holds else wrong)]
     told = set().union(*each) if holds or sum(map(bool, each)) >= telling * len(each) else set()

@@ -55,15 +55,14 @@ def _pair(
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius, which cover a switch anywhere. The gateware does not depend on the
-    pitch."""
+    """Outcomes of two fingers of 8 mm radius; the gateware does not depend on the pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
 
 
 def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """The same fingers on the starter kit's sheet."""
+    """Outcomes of two fingers of 8 mm radius with this force each, on the starter kit's sheet."""
     skin = STARTER.skin
     scenes = (_pair(gap_mm, 8.0, skin.pitch_x_mm, rng, force_n) for _ in range(count))
     cells = np.array([scene.pressed(0.0, skin, COVER) for scene in scenes])
@@ -131,8 +130,8 @@ FIRST, LAST = 2.0, 13.0
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame whose zones are farthest from the finger of 10 N at the frame's time, which starts at any time of a
-    scan. A frame without exactly one zone is infinitely far."""
+    """The frame with the largest error of its zone at its time, for a finger of 10 N that starts at any phase of a scan;
+    infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -209,7 +208,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of a switch that closes at any time of a scan, for 30 to 300 us before it opens again."""
+    """Outcomes of a switch that closes at any phase for 30 to 300 us, then opens and closes again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)

@@ -102,7 +102,7 @@ def measured(
 
 
 def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
-    """Wait for the frame of a touch and take its zones, as user code does. Returns the time in us."""
+    """Wait for a touch's frame and zones, as user code does; returns us."""
     while True:
         zones = board.next(WAIT_S)
         tuple(zones)

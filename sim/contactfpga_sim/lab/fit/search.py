@@ -80,8 +80,8 @@ def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor:
 def _judged(
     task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, before: int
 ) -> list[Trial]:
-    """All candidates with the limits that they miss on the choosing scenes; times only of those with small enough
-    errors. ``before``: pieces done on earlier sheets."""
+    """All candidates with their missed limits on the choosing scenes; times only for small errors. ``before``: pieces
+    done earlier."""
     sheets: dict[Settings, dict[Settings, Candidate]] = {}
     for one in tried:
         sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one)

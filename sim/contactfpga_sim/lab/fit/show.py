@@ -59,8 +59,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """The refused trials to show, each the nearest of a number: all on the answer's sheet under its cover, one per
-    other cover there, one per sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
+    """The refused trials to show, with the number each represents: on the answer's sheet, one per other cover there,
+    one per sheet with fewer wires up to :data:`SHEETS`; without an answer one per sheet."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer

@@ -94,7 +94,7 @@ def run(
 
 
 def _first(blocks: Iterable[list[FlipOutcome] | None]) -> Iterator[FlipOutcome]:
-    """Flips of the blocks before the first missing one; which blocks exist may depend on their outcome."""
+    """Flips of the blocks before the first missing one, as a later choice would bias the result."""
     for found in itertools.takewhile(lambda block: block is not None, blocks):
         yield from found or ()
 

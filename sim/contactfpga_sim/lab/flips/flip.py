@@ -154,7 +154,7 @@ def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame],
 
 
 def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[DeliveredFrame, str]]:
-    """Frames with a wrong sheet or time, and moments at which the host holds an outdated frame."""
+    """Frames with a wrong sheet or time, and moments of outdated frames."""
     found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
     if reference.skin.send == "on_change":
         found += ((one, "stale") for one in _stale(reference, heard))
@@ -162,7 +162,7 @@ def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[Deli
 
 
 def _since_restart(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """Frames with times as if the board had not restarted: the first one after it has the usual delay."""
+    """Frames with times as if the board had not restarted."""
     begun: dict[int, float] = {0: 0.0}
     for one in heard:
         shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)

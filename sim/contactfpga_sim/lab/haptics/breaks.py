@@ -139,7 +139,7 @@ def _center(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
 
 
 def _friction(kind: str, drag: float, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of two fingers that push and drag: whether the stated interval holds the first push, or its error."""
+    """Outcomes of two dragging fingers: whether the interval holds the first push, or its error."""
     made, trials = cells(Disturbance()), []
     for _ in range(count):
         places = [SURFACE.place(rng.uniform(0, 0.09), at) for at in (-0.03, 0.03)]

@@ -113,7 +113,7 @@ def reported(skin: Skin) -> MixedTimes:
 
 
 def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[int, int]) -> MixedTimes:
-    """The times between the latest break that a check still finds and the earliest that it misses, to the clock."""
+    """Times between the latest break that a check finds and the earliest that it misses."""
 
     def told(start: int) -> int:
         board.cut({}, {})

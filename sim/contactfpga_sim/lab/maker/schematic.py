@@ -89,7 +89,7 @@ def _column(axes: Any, column: int) -> None:
 
 
 def _cell(axes: Any, row: int, column: int) -> None:
-    """Draw the path from the column through switch and diode to the row; a guard line's switch is a wire."""
+    """Draw the path from column through switch and diode to row; a guard line has a wire."""
     x, y = _x(column), _y(row)
     guard = SIZE in (row, column)
     color, place = _color(guard), x + 0.5

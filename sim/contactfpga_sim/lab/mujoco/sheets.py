@@ -220,8 +220,7 @@ def _body(model: Any, plan: Plan) -> int:
 
 
 def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
-    """By geom the number of the link whose sheet it wears, -1 for none; the last entry is for contacts without a
-    geom."""
+    """Number of the link by geom, -1 for none; the last entry is for contacts without a geom."""
     owner = np.full(model.ngeom + 1, -1)
     for number, (name, of) in enumerate(zip(body.links, bodies)):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)

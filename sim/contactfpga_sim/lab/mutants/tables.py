@@ -97,7 +97,7 @@ def run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> d
 
 @contextlib.contextmanager
 def _own_cache() -> Iterator[None]:
-    """Keep the libraries of mutants out of the user's cache, as nothing else needs them."""
+    """Keep the mutants' libraries out of the user's cache."""
     named = os.environ.get(CACHE)
     os.environ[CACHE] = named or "build/mutants"
     try:

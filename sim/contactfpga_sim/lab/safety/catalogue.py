@@ -81,7 +81,7 @@ class SheetFault:
         board.press(read[:-1, :-1])
 
     def _read(self, closed: np.ndarray) -> np.ndarray:
-        """The switches that read pressed, each in its row's time, given the closed ones of an extended sheet."""
+        """The switches that read pressed, given the closed ones of an extended sheet."""
         cells = closed.copy()
         for cell in self.closed:
             cells[cell] = True
@@ -135,7 +135,7 @@ def _cut_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _row_chips(skin: Skin) -> Mapping[str, SheetFault]:
-    """A failed connector or 74HC595: its rows alone, or also all later rows in the chain."""
+    """A failed connector or 74HC595: its rows, or all later rows too."""
     firsts = range(0, skin.rows, 8)
     alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
     return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
@@ -188,7 +188,7 @@ def _bare(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _joined_rows(skin: Skin) -> Mapping[str, SheetFault]:
-    """Two pins that drive against each other, with both resulting column levels."""
+    """Two opposing pins, with both resulting column levels."""
     return {
         f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": SheetFault(
             joined_rows=((row, row + 1),), pulls_win=released
@@ -206,7 +206,7 @@ def _joined_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _slow(skin: Skin) -> Mapping[str, SheetFault]:
-    """Lines of increasing capacitance, with weak pulls that raise them late and a resistance that lowers them late."""
+    """Lines of increasing capacitance, with slow pulls up and a resistance."""
     found = {}
     for picofarad in (464, 1000, 2154, 4642):
         for name, circuit in (

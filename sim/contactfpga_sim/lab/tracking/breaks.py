@@ -278,7 +278,7 @@ BOUNCE = Knob(
 
 
 def _stuck(count: float, rng: Random) -> Made:
-    """A finger that slides along a row with stuck switches 40 mm apart, at 300 mm/s, to 20 mm past the fourth."""
+    """A finger that slides at 300 mm/s along a row with stuck switches 40 mm apart, to 20 mm past the fourth."""
     x_mm, y_mm = _moved(rng)
     now = _times(0.69, rng, 125.0)
     cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)

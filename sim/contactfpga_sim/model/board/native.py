@@ -164,7 +164,7 @@ def _cache_key(model: Model, compiler: list[str]) -> str:
 
 @functools.cache
 def _said(compiler: tuple[str, ...]) -> str:
-    """A compiler's version output. Its file would not do: it may be a script that calls another compiler."""
+    """A compiler's version output, as its file may be a wrapper."""
     asked: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
     return subprocess.run([*compiler, "--version"], **asked).stdout
 
@@ -252,8 +252,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 @contextlib.contextmanager
 def _progress(what: str, note: str = "") -> Iterator[Callable[[str], None]]:
-    """One line on stderr: task, step, seconds; rewritten ten times a second on a terminal. The note is omitted if the
-    line would wrap, which could not be overwritten."""
+    """One line on stderr with task, step and seconds, rewritten on a terminal if it does not wrap."""
     started = time.monotonic()
     step = "start"
     done = threading.Event()

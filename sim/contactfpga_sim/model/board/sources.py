@@ -110,8 +110,7 @@ def _folders(packages: Iterable[str]) -> dict[str, Path]:
 
 
 def _beside(files: Iterable[Path]) -> dict[str, Path]:
-    """Folders of the packages that users' files can reach: their own, and neighbors without a version, which were not
-    installed."""
+    """Folders of packages that users' files reach: their own and uninstalled neighbors."""
     installed = {Path(path).resolve() for path in sysconfig.get_paths().values()}
     found = {}
     for file in files:
@@ -145,8 +144,7 @@ def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
 
 
 def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False) -> list[str]:
-    """A line per reached module and per other package; for packages of ``ours`` also per data file beside a module.
-    Users' modules may change and be reloaded."""
+    """A line per reached module and other package; for ``ours`` also per data file beside a module."""
     found = _closure(roots, folders, _noted if ours else lambda _: None)
     marks = _texts(found, folders)
     for folder in {file.parent for file in found.values() if file} if ours else ():
@@ -210,7 +208,7 @@ def _data(folder: Path) -> Iterator[Path]:
 
 
 def _imported(text: str, name: str, is_package: bool) -> set[str]:
-    """Names of modules that a module imports anywhere, or loads as a choice, and of imported attributes."""
+    """Names of modules imported anywhere or loaded as a choice, and of imported attributes."""
     found = set(_PLACE.findall(text))
     for statement in _statements(text):
         if isinstance(statement, ast.Import):
@@ -224,7 +222,7 @@ def _imported(text: str, name: str, is_package: bool) -> set[str]:
 
 
 def _statements(text: str) -> Iterator[ast.AST]:
-    """All import statements, found by text search, ten times faster than parsing; ambiguous files are parsed."""
+    """All import statements by text search, ten times faster than parsing; ambiguous files are parsed."""
     parts = _IMPORT.split(_TYPES.sub("", text))
     try:
         if any(map(_WORD.search, parts[::2])):

@@ -214,7 +214,7 @@ def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheet
 
 
 def _compared(scene: str | None, threshold: float | None) -> str | Recording | None:
-    """The scene; with a threshold the recording in its file, whose larger numbers count as pressed."""
+    """The scene; with a threshold the recording in its file."""
     if threshold is None:
         return scene
     if scene is None or not scene.endswith((".npy", ".npz")):

@@ -178,8 +178,7 @@ class AdaptiveScanModel:
         return scan, counted
 
     def _strobe(self, begin: int, rows: frozenset[int]) -> int:
-        """The cycle of the slot's sample: after its settle time; for idle rows that stay driven, when a pressed one is
-        seen."""
+        """The cycle of the slot's sample: after its settle time; for idle rows, when a touch is seen."""
         regular = begin + self._facts.settle + 1
         if not self._watched():
             return regular
@@ -220,7 +219,7 @@ class AdaptiveScanModel:
         return bool(self.slots) and self.slots[-1].released == self.slots[-1].end
 
     def _watch(self, rows: frozenset[int], strobe: int) -> None:
-        """Evaluate each cycle since the last strobe for the pin, as idle rows stayed driven."""
+        """Evaluate each cycle since the last strobe of idle rows for the pin."""
         if self._watched():
             seen = self._first_seen(self.slots[-1].strobe, strobe - 2, rows, self._clean)
             if seen is not None:

@@ -324,8 +324,8 @@ class Facts:
 
     @property
     def _most_zones(self) -> int:
-        """The most zones: with 8-connectivity one per 2x2 block, with 4 the checkerboard; around a cylinder at most
-        half the columns of a row."""
+        """The most zones: one per 2x2 block with 8-connectivity, the checkerboard with 4, at most half the columns
+        around a cylinder."""
         if self.skin.closed:
             return self.columns // 2 * (self.rows if self.skin.connectivity == 4 else math.ceil(self.rows / 2))
         if self.skin.connectivity == 4:

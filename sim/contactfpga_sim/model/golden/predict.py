@@ -244,8 +244,8 @@ class RowPipeline:
         return self._stages.labelling(np.array(rows))
 
     def _counted(self) -> int:
-        """The cycle from which a row with a pressed cell can be counted: after the previous row, which is counted a
-        group of columns per clock, in clocks without a passing zone."""
+        """The cycle from which a row with a pressed cell can be counted: after the previous row's groups of columns,
+        counted in clocks without a zone."""
         pressed = [index for index, row in enumerate(self._cells) if row.any()]
         if not pressed:
             return 0
@@ -262,8 +262,7 @@ class RowPipeline:
 
 
 def _sum_y(zone: Departure, taken: np.ndarray, places: Sequence[int]) -> int:
-    """Row sum of a zone in the ``taken`` rows at these ``places``, which the labelling numbers from 0. Its rows are
-    neighbors, unless it has all cells, as with ``single``."""
+    """Row sum of a zone in the ``taken`` rows at these ``places``, numbered from 0 by the labelling."""
     pressed = taken.sum(axis=1)
     if zone.area == pressed.sum():
         return int(pressed @ np.array(places))

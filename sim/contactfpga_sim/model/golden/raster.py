@@ -168,8 +168,7 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
 
 
 def _renews(facts: Facts, frame: int) -> bool:
-    """Whether a frame's checks end obsolete reports: the us clock passed a multiple of 2^16 in the frame before, which
-    ends with its last row's strobe."""
+    """Whether a frame's checks end obsolete reports: the us clock passed a multiple of 2^16 in the previous frame."""
     late = facts.column_shift + (facts.rows - 1) * facts.row_clocks
 
     def retries(ended: int) -> int:

@@ -169,8 +169,7 @@ def around(rows: int, columns: int) -> np.ndarray:
 
 
 def _hook(rows: int, columns: int) -> np.ndarray:
-    """An arch with a leg on either side of the seam, and inside it a zone that the last row joins with one leg: the
-    arch is on two turns when found, the zone on one."""
+    """An arch over the seam, and inside it a zone that the last row joins with one leg, on another turn."""
     cells = np.zeros((rows, columns), bool)
     cells[0, [0, 1, 2, -2, -1]] = cells[-1, :3] = True
     cells[:, [2, -2]] = True

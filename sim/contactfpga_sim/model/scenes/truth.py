@@ -194,7 +194,7 @@ def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> lis
 
 @functools.cache
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
-    """Heights from -1 to 1 and weights, substituted by a cosine, which smooths the square root at an ellipse's end."""
+    """Heights from -1 to 1 and weights, by a cosine that smooths an ellipse's ends."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     angle = math.pi / 2 * (nodes + 1)
     return -np.cos(angle), math.pi / 2 * weights * np.sin(angle)

@@ -233,8 +233,8 @@ class Matrix:
         return 0
 
     def _follow(self, selecting: LineBits, releasing: LineBits) -> tuple[int, int]:
-        """With shorts: columns that follow a line at the selecting level, and at the released level. A pin may work
-        against the supply, but not against another pin."""
+        """With shorts: columns that follow a line at the selecting, and at the released level. Pins may oppose the
+        supply, not each other."""
         assert self._shorts is not None
         feeding = LineBits(releasing.rows, releasing.columns & ~self.stuck)
         low = followers(self._shorts, self.closed, selecting, selecting=True)

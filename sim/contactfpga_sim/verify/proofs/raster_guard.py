@@ -57,8 +57,7 @@ def lines_told(proof: Proof, diodes: Diodes) -> None:
 
 
 def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Value) -> None:
-    """Claims: a line that is silent when checked is reported from the next clock until it answers in a round that
-    renews; one that never was silent is not."""
+    """Claims: a silent line is reported from the next clock until it answers in a renewing round; others are not."""
     ever = Signal(name="ever_silent")
     with proof.m.If(checked & silent):
         proof.m.d.sync += ever.eq(1)

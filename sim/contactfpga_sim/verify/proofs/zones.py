@@ -284,7 +284,7 @@ def next_row(m: Module, derived: Derived, before: OpenRow, *given) -> tuple[Open
 
 
 def _followed(m: Module, ways: list[Way], nodes: int) -> tuple[list[list], list[list]]:
-    """For each pair of nodes whether there is a path, and by how many turns the second is further on."""
+    """For each pair of nodes whether there is a path, and over how many turns."""
     reach = [[_any(way for a, b, way, _ in ways if (a, b) == (i, j)) for j in range(nodes)] for i in range(nodes)]
     turns = {(a, b): turn for a, b, _, turn in ways}
     offsets = [[turns.get((i, j), 0) for j in range(nodes)] for i in range(nodes)]

@@ -15,5 +15,4 @@ USUAL = "show", "ROBOT.toml"
 
 
 def run(topic: Callable[[], int]) -> int:
-    """Run a topic."""
     return topic()

@@ -24,7 +24,6 @@ MAX_LINE = 200
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
     parser.add_argument("link", metavar="LINK", help="Name of the link whose sheet folds.")
     parser.add_argument("joint", metavar="JOINT", help="Name of the joint that folds it.")
@@ -36,7 +35,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     body = Body.load(args.robot)
     plan = link(body, args.link)
     _check(body, plan, args.joint)
@@ -78,7 +76,7 @@ def _check(body: Body, plan: Plan, joint: str) -> None:
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
-    """Each angle with a frame scanned after it. A link without data ends it: unseen is not learned as free."""
+    """Each angle with a later frame, until a link lacks data: unseen is not learned as free."""
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue

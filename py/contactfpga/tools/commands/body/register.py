@@ -20,7 +20,6 @@ EXTRA = None
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
     parser.add_argument("link", metavar="LINK", help="Name of the link.")
     points = "Known points on the link, a [[point]] with point_m each; you press those without pressed_mm when asked."
@@ -31,7 +30,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     plan = link(Body.load(args.robot), args.link)
     presses = registration.load(args.points)
     if any(press.pressed_mm is None for press in presses):

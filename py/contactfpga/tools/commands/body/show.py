@@ -20,7 +20,6 @@ READINGS_S = 0.03
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
     frame = "Frame of the contacts: base, or link for each link's own (default: base, or link without a URDF)."
     parser.add_argument("--frame", choices=(BASE, LINK), help=frame)

@@ -18,7 +18,6 @@ _LENGTH = numbers.number(-1e5, 1e5, "mm")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("mesh", metavar="MESH", help="An .stl or .obj file (.ply and .off, too).")
     parser.add_argument("output", metavar="TABLE.npz", help="File to write; robot.toml names it as a link's surface.")
     parser.add_argument("--skin", metavar="FILE", help="The sheet (default: the reference Skin).")
@@ -36,7 +35,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     skin = Skin() if args.skin is None else Skin.load(args.skin)
     if skin.closed and args.by != "unrolling":
         raise ValueError("the ends of the Skin's sheet meet, so it goes round; use --by unrolling")

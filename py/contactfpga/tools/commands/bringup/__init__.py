@@ -50,7 +50,6 @@ REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     port = (
         "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
     )
@@ -190,7 +189,7 @@ def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
 
 
 def _opened(args: argparse.Namespace, kit: Kit, skin: Skin) -> tuple[Board, Person]:
-    """The board, built from the bring-up's Skin or else from the kit's own, and the person."""
+    """The board, of the bring-up's Skin or else the kit's, and the person."""
     person: Person = _Reader(args)
     port: str | SimulatedPort | None = args.port
     if port == REHEARSAL:

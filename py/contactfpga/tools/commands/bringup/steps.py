@@ -220,8 +220,7 @@ def bounce(bench: Bench) -> Step:
 
 
 def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: Callable[[], bool]) -> None:
-    """Yield frames for these seconds of device time, until Ctrl-C, or until everything wanted was seen and is at
-    rest."""
+    """Yield frames for these seconds of device time, until Ctrl-C, or until all was seen."""
     zones = bench.board.latest(bench.timeout)
     first_us = rest_us = zones.time_us
     with interrupt.usual_end():

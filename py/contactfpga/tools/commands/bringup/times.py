@@ -119,8 +119,8 @@ def circuit(bench: Bench) -> Step:
 
 
 def _reading(image: Settling, broken: Sequence[int], guard: bool) -> SettleReading:
-    """Rows with the most common number of pressed switches; slow or broken lines are excluded. ``guard``: each row
-    pulls a guard column too."""
+    """Rows with the most common number of pressed switches, without slow or broken lines. ``guard``: each row pulls a
+    guard column too."""
     counts = (image.clocks > 0).sum(axis=1)
     usual = int(np.bincount(counts[counts > 0]).argmax())
     clocks, slow = image.clocks.copy(), image.slow()

@@ -41,13 +41,11 @@ THIN_HEADS = (
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("file", metavar="FILE.toml", help="Arm, impact, switch and limits; see examples/.")
     cover.json_flag(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     found = design(Task.load(args.file))
     status = 0 if found.best else UNSOLVED
     if args.json:

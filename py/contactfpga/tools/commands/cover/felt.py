@@ -23,7 +23,6 @@ M = 1e-3
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("skin", metavar="SKIN", nargs="?", help="TOML file of a Skin with a table [cover].")
     flags.kit(parser)
     finger = parser.add_argument_group("finger, an ellipse whose size does not depend on its force")
@@ -46,7 +45,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     args.skin = flags.sheet_file(args)
     if args.skin is None:
         raise CoverError(f"name a Skin's file, or a kit: --kit {' or --kit '.join(kits.names())}")

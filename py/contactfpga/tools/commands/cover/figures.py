@@ -14,7 +14,6 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("--case", metavar="CASE", help="Case to draw: a .toml file (default: the paper's).")
     data = "Forces in N and deformations in m; draw their line too."
     parser.add_argument("--data", metavar="FILE.csv", help=data)
@@ -24,7 +23,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     folder = outputs.folder(args.output)
     from contactfpga.design.cover import drawing  # matplotlib, which only drawing needs
 

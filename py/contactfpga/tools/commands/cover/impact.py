@@ -17,7 +17,6 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     arm = parser.add_argument_group("arm")
     arm.add_argument("--mass", type=cover.KG, required=True, metavar="KG", help="Mass of the link.")
     arm.add_argument("--radius", type=cover.LENGTH, required=True, metavar="M", help="Radius of the link, a cylinder.")
@@ -52,7 +51,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     arm = Arm.link(
         args.mass,
         args.radius,

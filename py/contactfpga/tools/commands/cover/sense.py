@@ -18,7 +18,6 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     asked = parser.add_argument_group("what is asked")
     offset = "Distance from the contact to the switch: find the force."
     asked.add_argument("--offset", type=cover.LENGTH_FROM_0, metavar="M", help=offset)
@@ -46,7 +45,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     model = Model(args.model, args.contact or "point") if args.model else None
     if args.contact and not args.model:
         raise CoverError(

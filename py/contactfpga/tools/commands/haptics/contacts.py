@@ -14,7 +14,6 @@ EXTRA = "haptics"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument(
         "file", metavar="FILE.json", help="Wrench, contacts or surface; docs/haptics.md has the format."
     )
@@ -24,7 +23,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     wrench, touches, surface = reading.contacts(args.file)
     found = contacts(wrench, touches, surface, cones=args.cones)
     answer = _answer(found)

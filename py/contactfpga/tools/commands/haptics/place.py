@@ -20,7 +20,6 @@ SHOWN = 3
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     length = numbers.length(10.0)
     link = parser.add_argument_group("link: a cylinder about z, or a plane")
     link.add_argument("--radius", type=length, metavar="M", help="Outer radius of a cylinder, with its foam.")
@@ -53,7 +52,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     surface, size, ring = _link(args)
     picture = _picture(args.picture)
     loads = (args.force, args.friction, args.noise, args.at, args.mass, args.acceleration_sigma)

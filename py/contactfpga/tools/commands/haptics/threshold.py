@@ -16,7 +16,6 @@ EXTRA = "haptics"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     flags.connection(parser)
     unit = "Unit K raises contact from this deviation on, either way; 0: never. May be given again for other units."
     parser.add_argument("--unit", action="append", default=[], metavar="K=STEPS", help=unit)
@@ -27,7 +26,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     pairs = [("unit", *_pair("--unit", one)) for one in args.unit] + [("sum", *_pair("--sum", one)) for one in args.sum]
     if not pairs:
         raise HapticsError("no threshold is given; add --unit K=STEPS or --sum K=STEPS")

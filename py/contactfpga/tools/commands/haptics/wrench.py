@@ -12,13 +12,11 @@ EXTRA = "haptics"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("file", metavar="FILE.json", help="Units and readings; docs/haptics.md has the format.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     cells, readings = reading.units(args.file)
     wrench = cells.wrench(readings)
     values = cells.singular_values.tolist()

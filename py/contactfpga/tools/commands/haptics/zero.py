@@ -23,7 +23,6 @@ LEAST = 10
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     flags.connection(parser)
     long = "Seconds of the board's time over which readings are averaged (default: 0.1)."
     parser.add_argument("--seconds", type=numbers.SECONDS, default=0.1, metavar="S", help=long)
@@ -33,7 +32,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     if args.output is not None and args.units is None:
         raise HapticsError("--output writes units with new zeros; add --units FILE with the old ones")
     output = None if args.output is None else outputs.file(args.output, "--output")

@@ -14,5 +14,4 @@ USUAL = None
 
 
 def run(topic: Callable[[], int]) -> int:
-    """Run a topic."""
     return topic()

@@ -26,7 +26,6 @@ PLACES = 60
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     case = "Case to run: paper, paper-offset, push or a .toml file (default: paper)."
     parser.add_argument("--case", default="paper", metavar="CASE", help=case)
     late, usual = numbers.number(0, 1e7, "us"), "Latency from the switch to the controller (default: the paper's 6000)."
@@ -49,7 +48,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     from contactfpga_sim.lab.arm.case import Case
 
     case = Case.load(args.case)
@@ -164,7 +162,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
 
 
 def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
-    """Save the finished runs in a separate file, keeping an earlier whole table; returns its place."""
+    """Save the finished runs beside an earlier whole table; returns the place."""
     from contactfpga_sim.lab.arm import pictures
 
     again = "run the same command again to go on from there"

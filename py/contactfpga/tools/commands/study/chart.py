@@ -18,7 +18,6 @@ EXTRA = "chart"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("--method", action="append", metavar="NAME", help="Chart only this method; can be repeated.")
     own = "Add this labeller, module:attribute of your own, to the methods; can be repeated."
     parser.add_argument("--labeller", action="append", metavar="NAME", help=own)
@@ -34,7 +33,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.chart import beside, host, picture, times_picture
     from contactfpga_sim.lab.chart import numbers as table
@@ -84,7 +82,7 @@ def _own(args: argparse.Namespace) -> dict[str, Method]:
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
-    """Save the finished points in a separate file, keeping an earlier whole chart; returns its place."""
+    """Save the finished points beside an earlier whole chart; returns the place."""
     from contactfpga_sim.lab.chart import numbers as table
 
     again = "run the same command again to go on from there"

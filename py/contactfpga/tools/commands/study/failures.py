@@ -18,13 +18,11 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
     flags.output(parser, "build/failures")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     from contactfpga_sim.lab.failures import tables as failures_tables
     from contactfpga_sim.lab.failures.catalogue import KNOBS
 
@@ -50,7 +48,7 @@ def _write(sweeps: Mapping[str, Mapping[str, Sweep]], path: Path) -> Path:
 
 
 def _kept(sweeps: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
-    """Save the finished sweeps in a separate file, keeping an earlier whole table; returns its place."""
+    """Save the finished sweeps beside an earlier whole table; returns the place."""
     done = sum(map(len, sweeps.values()))
     if not done:
         return "interrupted before the first knob was turned"

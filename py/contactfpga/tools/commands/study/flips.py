@@ -12,7 +12,6 @@ EXTRA = "chart"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topic's flags to its parser."""
     parser.add_argument("--design", action="append", metavar="NAME", help="Flip only this design; can be repeated.")
     count = numbers.whole(1, 1_000_000)
     registers = "Flips of flip-flops per design (default: 400); always the same ones."
@@ -28,7 +27,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.flips import campaign, summary
     from contactfpga_sim.lab.flips.campaign import DESIGNS

@@ -13,7 +13,6 @@ EXTRA = None
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
     flags.connection(parser)
     flags.once(parser)
     bounces = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
@@ -26,7 +25,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
     if args.bounce and args.settle:
         raise ContactFPGAError("--bounce and --settle are two measurements; make one after the other")
     if args.bounce or args.settle:
