@@ -435,7 +435,7 @@ One clock, synchronous reset.
   `number` counts replaced frames, too, so a gap of n says that n are missing.
 
     iverilog -g2012 -o tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v && ./tb
-    verilator --binary --assert --top {NAME}_tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v
+    verilator --binary --assert -CFLAGS -std=c++20 --top {NAME}_tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v
     ./obj_dir/V{NAME}_tb
 
 `example.v` is a peripheral with the core inside, `{NAME}.sdc` has the clock. The settings, to make it again with
