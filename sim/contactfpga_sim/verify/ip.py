@@ -153,8 +153,9 @@ def _started(text: str) -> str:
     """Verilog that a simulator of four states computes from the first clock on.
 
     It computes a block once something in it changes. Yosys writes into most blocks a signal for that, which here does
-    change once, and comes into all others. What memories give begins with 0.
+    change once, and comes into all others. What memories give begins with 0. Wires of no bits, which nothing uses, go.
     """
+    text = re.sub(r"^  wire \[-1:0\] \S+ ;\n", "", text, flags=re.MULTILINE)
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
     return re.sub(r"^(  reg (?:\[\d+:0\] )?_\d+_);$", r"\1 = 0;", "".join(modules), flags=re.MULTILINE)
 
