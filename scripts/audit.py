@@ -1,21 +1,26 @@
-"""``make audit SEED=n``: draws what the pages claim by a seed of yours, and looks whether it is so.
+"""``make audit SEED=n``: draws what the pages claim by a seed of yours, and looks whether it is so, in five minutes.
 
-Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign. Ten tables of the pages
-are drawn, of those of which a part takes seconds to make, and that part is made anew and compared with the page. Ten
-mutants of the gateware of one Skin are drawn and simulated: stimuli that are compared with the golden model tell each
-of them from the gateware, or a proof says that it changes nothing. The result is a page, build/audit.md. The status is
-1 if a claim or a table does not hold, or if more mutants than :data:`ALIVE` are left.
+Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign, each claim's for half a
+minute. Ten tables of the pages are drawn, of those of which a part takes seconds to make, and that part is made anew
+and compared with the page. Ten mutants of the gateware of one Skin are drawn and simulated: stimuli that are compared
+with the golden model tell each of them from the gateware, or a proof says that it changes nothing. The result is a
+page, build/audit.md. What did not end in its time is listed as such: it neither agrees nor differs. The status is 1 if
+a claim or a table does not hold, if the gateware differs from the golden model, if a proof contradicts a simulation, or
+if more mutants than :data:`ALIVE` are left though all was tried in time.
 """
 
 import argparse
 import dataclasses
 import os
 import random
+import re
+import signal
 import subprocess
 import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import verification
@@ -23,7 +28,9 @@ import verification
 from contactfpga_sim.lab import beside, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
+from contactfpga_sim.verify.cosim.compare import Mismatch
 from contactfpga_sim.verify.mutants import campaign
+from contactfpga_sim.verify.mutants.proof import Contradiction
 from contactfpga_sim.verify.mutants.skins import SKINS
 
 ROOT = verification.ROOT
@@ -35,6 +42,8 @@ ALIVE = 4
 ten are left once in 600 audits."""
 PROOF_S = 20
 """Seconds of each proof that four were too few for, on a machine with nothing else to do."""
+CLAIM_S, MUTANTS_S = 30, 100
+"""Seconds for the tests of a claim, with one claim a core at a time, and for all that is tried of the mutants."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,21 +59,44 @@ def claims(rng: random.Random, run_before: Path | None) -> list[Finding]:
     """Claims, by their tests, or by the results of a run of all tests."""
     sections = tomllib.loads((ROOT / "tests" / "claims.toml").read_text())["section"]
     drawn = rng.sample([one for section in sections for one in section["claim"]], DRAWN)
-    tests = [test for one in drawn for test in one["tests"]]
-    results = run(tests) if run_before is None else verification.read_results(run_before)
-    return [judged(one, results) for one in drawn]
+    if run_before is not None:
+        results = verification.read_results(run_before)
+        return [judged(one, results) for one in drawn]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(tried, drawn))
 
 
-def run(tests: Sequence[str]) -> dict[str, verification.Outcome]:
-    """Outcomes of the tests with these names, ``file::name`` or ``file::*``."""
+def tried(claim: dict) -> Finding:
+    """A claim by the tests of it that end in time."""
     files = {path.stem: path for path in (ROOT / "tests").rglob("test_*.py")}
-    named = [(files[file], name) for file, name in (test.split("::") for test in tests)]
+    named = [(files[file], name) for file, name in (test.split("::") for test in claim["tests"])]
     nodes = [str(path) if name == "*" else f"{path}::{name}" for path, name in named]
     with tempfile.TemporaryDirectory() as folder:
-        results = Path(folder) / "tests.xml"
-        options = ["-q", "-n", "auto", "--dist", "loadfile", "-m", "not campaign", "--junitxml", str(results)]
-        subprocess.run([sys.executable, "-m", "pytest", *options, *nodes], cwd=ROOT, stdin=subprocess.DEVNULL)
-        return verification.read_results(results) if results.exists() else {}
+        results, said = Path(folder) / "tests.xml", Path(folder) / "said.txt"
+        options = ["-v", "-n", "0", "-p", "no:cacheprovider", "-m", "not campaign", "--junitxml", str(results)]
+        if run([sys.executable, "-u", "-m", "pytest", *options, *nodes], said):
+            return judged(claim, verification.read_results(results) if results.exists() else {})
+        ended = re.findall(r"^\S+::.* (PASSED|FAILED|ERROR)\b", said.read_text(), re.MULTILINE)
+    passed = ended.count("PASSED")
+    if failed := len(ended) - passed:
+        return Finding(claim["claim"], f"{failed} FAILED; not ended in {CLAIM_S} s", wrong=True)
+    return Finding(claim["claim"], f"not ended in {CLAIM_S} s; {passed:,} tests passed until then")
+
+
+def run(command: Sequence[str], said: Path) -> bool:
+    """Whether a command ends within :data:`CLAIM_S`; if not, it and what it started are ended. What it prints goes
+    into the file ``said``."""
+    with said.open("w") as out:
+        process = subprocess.Popen(
+            command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True
+        )
+    try:
+        process.wait(CLAIM_S)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return False
+    return True
 
 
 def judged(claim: dict, results: dict[str, verification.Outcome]) -> Finding:
@@ -99,9 +131,16 @@ def table(study: Study, name: str) -> Finding:
 def mutants(rng: random.Random) -> list[Finding]:
     """Changes of one Skin's netlist, by stimuli and proofs."""
     name = rng.choice(sorted(SKINS))
-    found = campaign.examine(name, DRAWN, rng.randrange(1 << 30), long_s=PROOF_S)
+    try:
+        found = campaign.examine(name, DRAWN, rng.randrange(1 << 30), long_s=PROOF_S, budget_s=MUTANTS_S)
+    except (Contradiction, Mismatch) as error:
+        return [Finding(f"mutants of {name}", str(error), wrong=True)]
     alive = [one for one in found if one.fate == "alive"]
-    return [Finding(f"{one.mutant} ({name})", one.fate, one in alive and len(alive) > ALIVE) for one in found]
+    said = {"open": f"alive, not proved in {MUTANTS_S} s"}
+    return [
+        Finding(f"{one.mutant} ({name})", said.get(one.fate, one.fate), one in alive and len(alive) > ALIVE)
+        for one in found
+    ]
 
 
 def page(seed: int, parts: dict[str, Sequence[Finding]]) -> str:

@@ -225,7 +225,7 @@ def simulated(
     async def bench(ctx: Any) -> None:
         for clock in range(clocks):
             levels = stimulus.pins(clock, {name: ctx.get(getattr(core, name)) for name in stimulus.reads})
-            given = dict(zip((f"{BYTES}_tready", f"{RECORDS}_tready"), takes(clock), strict=True))
+            given: dict[str, int] = dict(zip((f"{BYTES}_tready", f"{RECORDS}_tready"), takes(clock), strict=True))
             given |= {"rst": clock < RESET, **dict(zip(stimulus.drives, levels, strict=True))}
             word = sum(level << place[name] for name, level in given.items())
             ctx.set(Cat(*ins), word)
