@@ -4,6 +4,7 @@ import dataclasses
 
 import audit
 import pytest
+from child_processes import alive
 from verification import Outcome
 
 from contactfpga_sim.lab.studies import STUDIES
@@ -47,28 +48,90 @@ def test_a_table_that_is_not_what_it_would_be_today_is_seen(project):
     assert (found.said, found.wrong) == ("differs", True)
 
 
-@pytest.mark.parametrize(("alive", "wrong"), [(0, 0), (4, 0), (5, 5)])
-def test_mutants_that_are_left_are_listed_and_more_than_four_are_wrong(monkeypatch, alive, wrong):
-    def examine(name, count, seed, long_s):
-        fates = ["alive"] * alive + ["killed"] * (count - alive)
-        mutant = Mutant(**{field.name: 0 if field.type == "int" else "x" for field in dataclasses.fields(Mutant)})
-        return [Result(name, mutant, fate) for fate in fates]
+def mutant_of(fate):
+    """One with this fate."""
+    mutant = Mutant(**{field.name: 0 if field.type == "int" else "x" for field in dataclasses.fields(Mutant)})
+    return Result("8x8", mutant, fate)
+
+
+@pytest.mark.parametrize(
+    ("fate", "left", "wrong"), [("alive", 0, 0), ("alive", 4, 0), ("alive", 5, 5), ("open", 10, 0)]
+)
+def test_mutants_that_are_left_are_listed_and_more_than_four_are_wrong(monkeypatch, fate, left, wrong):
+    monkeypatch.setattr(
+        audit.campaign,
+        "examine",
+        lambda name, count, *_, **__: [mutant_of(fate)] * left + [mutant_of("killed")] * (count - left),
+    )
+    found = audit.mutants(audit.random.Random(1))
+    assert sum(one.said.startswith("alive") for one in found) == left
+    assert sum(one.wrong for one in found) == wrong
+    assert any("not proved in 100 s" in one.said for one in found) == (fate == "open")
+
+
+@pytest.mark.parametrize("error", [audit.Contradiction, AssertionError])
+def test_a_proof_or_a_board_that_contradicts_is_wrong(monkeypatch, error):
+    def examine(*_, **__):
+        raise error("it differs")
 
     monkeypatch.setattr(audit.campaign, "examine", examine)
-    found = audit.mutants(audit.random.Random(1))
-    assert [one.said for one in found].count("alive") == alive
-    assert sum(one.wrong for one in found) == wrong
+    (found,) = audit.mutants(audit.random.Random(1))
+    assert (found.said, found.wrong) == ("it differs", True)
+
+
+@pytest.fixture
+def tests(tmp_path, monkeypatch):
+    """``tests(text)``: a project whose only tests are these, each claim's for some seconds."""
+
+    def tests(text, seconds=60):
+        (tmp_path / "tests").mkdir()
+        (tmp_path / "tests" / "test_a.py").write_text(f"import time, subprocess\n\n\n{text}")
+        (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    campaign:\n")
+        monkeypatch.setattr(audit, "ROOT", tmp_path)
+        monkeypatch.setattr(audit, "CLAIM_S", seconds)
+        return audit.tried({"claim": "it holds", "tests": ["test_a::*"]})
+
+    return tests
+
+
+GOOD, BAD, LONG = "def test_good():\n    pass\n\n\n", "def test_bad():\n    assert 0\n\n\n", "def test_long():\n    "
+
+
+def test_a_claim_whose_tests_end_agrees_or_is_wrong(tests):
+    assert tests(GOOD) == audit.Finding("it holds", "agrees, 1 cases")
+
+
+def test_a_claim_whose_test_fails_is_wrong(tests):
+    assert tests(GOOD + BAD) == audit.Finding("it holds", "1 FAILED; passed", wrong=True)
+
+
+def test_a_claim_without_tests_is_wrong(tests):
+    assert tests("") == audit.Finding("it holds", "MISSING", wrong=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("before", "said", "wrong"), [(GOOD, "; 1 tests passed until then", False), (GOOD + BAD, "", True)]
+)
+def test_a_claim_that_does_not_end_in_time_neither_agrees_nor_differs(tests, tmp_path, before, said, wrong):
+    """Unless a test failed before. What it started is ended, too."""
+    started = f"subprocess.run(['sh', '-c', 'echo $$ > {tmp_path}/started; sleep 1000'])"
+    found = tests(before + LONG + started, seconds=12)
+    assert found == audit.Finding("it holds", f"{'1 FAILED; ' * wrong}not ended in 12 s{said}", wrong)
+    assert not alive(int((tmp_path / "started").read_text()))
 
 
 def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(monkeypatch, tmp_path, capsys):
     drawn = []
-    monkeypatch.setattr(audit, "run", lambda tests: drawn.append(tests) or dict.fromkeys(tests, PASSED))
-    monkeypatch.setattr(audit, "judged", lambda claim, results: audit.Finding(claim["claim"], "agrees"))
+    monkeypatch.setattr(
+        audit, "tried", lambda claim: drawn.append(claim["claim"]) or audit.Finding(claim["claim"], "agrees")
+    )
     monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
     monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
     monkeypatch.setattr(audit, "PAGE", tmp_path / "build" / "audit.md")
     assert [audit.main(["--seed", seed]) for seed in ("1", "1", "2")] == [0, 0, 0]
-    assert drawn[0] == drawn[1] != drawn[2]
+    first, again, other = (sorted(drawn[start : start + 10]) for start in (0, 10, 20))
+    assert first == again != other
     assert "Claims: 0 of 10 wrong" in (tmp_path / "build" / "audit.md").read_text()
     monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "differs", wrong=True))
     assert audit.main(["--seed", "1"]) == 1
@@ -76,7 +139,7 @@ def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(mon
 
 
 def test_results_of_a_run_of_all_tests_judge_the_claims(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(audit, "run", lambda tests: pytest.fail("the tests ran already"))
+    monkeypatch.setattr(audit, "tried", lambda claim: pytest.fail("the tests ran already"))
     monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
     monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
     monkeypatch.setattr(audit, "PAGE", tmp_path / "audit.md")
