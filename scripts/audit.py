@@ -1,7 +1,7 @@
 """``make audit SEED=n``: draws what the pages claim by a seed of yours, and looks whether it is so, in five minutes.
 
-Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign, each claim's for half a
-minute. Ten tables of the pages are drawn, of those of which a part takes seconds to make, and that part is made anew
+Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign, in two and a
+half minutes. Ten tables of the pages are drawn, of those of which a part takes seconds to make, and that part is made anew
 and compared with the page. Ten mutants of the gateware of one Skin are drawn and simulated: stimuli that are compared
 with the golden model tell each of them from the gateware, or a proof says that it changes nothing. The result is a
 page, build/audit.md. What did not end in its time is listed as such: it neither agrees nor differs. The status is 1 if
@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import tomllib
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -41,8 +42,8 @@ ALIVE = 4
 ten are left once in 600 audits."""
 PROOF_S = 20
 """Seconds of each proof that four were too few for, on a machine with nothing else to do."""
-CLAIM_S, MUTANTS_S = 30, 100
-"""Seconds for the tests of a claim, with one claim a core at a time, and for all that is tried of the mutants."""
+CLAIMS_S, MUTANTS_S = 150, 100
+"""Seconds for the tests of all claims, one claim a core at a time, and for all that is tried of the mutants."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,36 +62,42 @@ def claims(rng: random.Random, run_before: Path | None) -> list[Finding]:
     if run_before is not None:
         results = verification.read_results(run_before)
         return [judged(one, results) for one in drawn]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(tried, drawn))
+    cores, until = os.cpu_count() or 1, time.monotonic() + CLAIMS_S
+    with ThreadPoolExecutor(cores) as pool:
+        return list(pool.map(lambda place: tried(drawn[place], share(until, cores, DRAWN - place)), range(DRAWN)))
 
 
-def tried(claim: dict) -> Finding:
-    """A claim by the tests of it that end in time."""
+def share(until: float, cores: int, left: int) -> int:
+    """Seconds for the next of so many claims that are left: what others did not need is shared."""
+    return max(1, round((until - time.monotonic()) * min(1, cores / left)))
+
+
+def tried(claim: dict, limit_s: int) -> Finding:
+    """A claim by the tests of it that end in so many seconds."""
     files = {path.stem: path for path in (ROOT / "tests").rglob("test_*.py")}
     named = [(files[file], name) for file, name in (test.split("::") for test in claim["tests"])]
     nodes = [str(path) if name == "*" else f"{path}::{name}" for path, name in named]
     with tempfile.TemporaryDirectory() as folder:
         results, said = Path(folder) / "tests.xml", Path(folder) / "said.txt"
         options = ["-v", "-n", "0", "-p", "no:cacheprovider", "-m", "not campaign", "--junitxml", str(results)]
-        if run([sys.executable, "-u", "-m", "pytest", *options, *nodes], said):
+        if run([sys.executable, "-u", "-m", "pytest", *options, *nodes], said, limit_s):
             return judged(claim, verification.read_results(results) if results.exists() else {})
         ended = re.findall(r"^\S+::.* (PASSED|FAILED|ERROR)\b", said.read_text(), re.MULTILINE)
     passed = ended.count("PASSED")
     if failed := len(ended) - passed:
-        return Finding(claim["claim"], f"{failed} FAILED; not ended in {CLAIM_S} s", wrong=True)
-    return Finding(claim["claim"], f"not ended in {CLAIM_S} s; {passed:,} tests passed until then")
+        return Finding(claim["claim"], f"{failed} FAILED; not ended in {limit_s} s", wrong=True)
+    return Finding(claim["claim"], f"not ended in {limit_s} s; {passed:,} tests passed until then")
 
 
-def run(command: Sequence[str], said: Path) -> bool:
-    """Whether a command ends within :data:`CLAIM_S`; if not, it and what it started are ended. What it prints goes
-    into the file ``said``."""
+def run(command: Sequence[str], said: Path, limit_s: int) -> bool:
+    """Whether a command ends within so many seconds; if not, it and what it started are ended. What it prints goes into
+    the file ``said``."""
     with said.open("w") as out:
         process = subprocess.Popen(
             command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True
         )
     try:
-        process.wait(CLAIM_S)
+        process.wait(limit_s)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()

@@ -88,13 +88,20 @@ def tests(tmp_path, monkeypatch):
         (tmp_path / "tests" / "test_a.py").write_text(f"import time, subprocess\n\n\n{text}")
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    campaign:\n")
         monkeypatch.setattr(audit, "ROOT", tmp_path)
-        monkeypatch.setattr(audit, "CLAIM_S", seconds)
-        return audit.tried({"claim": "it holds", "tests": ["test_a::*"]})
+        return audit.tried({"claim": "it holds", "tests": ["test_a::*"]}, seconds)
 
     return tests
 
 
 GOOD, BAD, LONG = "def test_good():\n    pass\n\n\n", "def test_bad():\n    assert 0\n\n\n", "def test_long():\n    "
+
+
+def test_claims_share_the_time_that_others_did_not_need(monkeypatch):
+    monkeypatch.setattr(audit.time, "monotonic", lambda: 1000.0)
+    assert audit.share(1150.0, cores=2, left=10) == 30
+    assert audit.share(1140.0, cores=2, left=7) == 40
+    assert [audit.share(1050.0, cores=2, left=left) for left in (2, 1)] == [50, 50]
+    assert audit.share(990.0, cores=2, left=1) == 1
 
 
 def test_a_claim_whose_tests_end_agrees_or_is_wrong(tests):
@@ -124,7 +131,7 @@ def test_a_claim_that_does_not_end_in_time_neither_agrees_nor_differs(tests, tmp
 def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(monkeypatch, tmp_path, capsys):
     drawn = []
     monkeypatch.setattr(
-        audit, "tried", lambda claim: drawn.append(claim["claim"]) or audit.Finding(claim["claim"], "agrees")
+        audit, "tried", lambda claim, limit_s: drawn.append(claim["claim"]) or audit.Finding(claim["claim"], "agrees")
     )
     monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
     monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
@@ -139,7 +146,7 @@ def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(mon
 
 
 def test_results_of_a_run_of_all_tests_judge_the_claims(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(audit, "tried", lambda claim: pytest.fail("the tests ran already"))
+    monkeypatch.setattr(audit, "tried", lambda *_: pytest.fail("the tests ran already"))
     monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
     monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
     monkeypatch.setattr(audit, "PAGE", tmp_path / "audit.md")
