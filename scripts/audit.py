@@ -1,12 +1,13 @@
 """``make audit SEED=n``: draws what the pages claim by a seed of yours, and looks whether it is so, in five minutes.
 
-Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign, in two and a
-half minutes. Ten tables of the pages are drawn, of those of which a part takes seconds to make, and that part is made anew
-and compared with the page. Ten mutants of the gateware of one Skin are drawn and simulated: stimuli that are compared
-with the golden model tell each of them from the gateware, or a proof says that it changes nothing. The result is a
-page, build/audit.md. What did not end in its time is listed as such: it neither agrees nor differs. The status is 1 if
-a claim or a table does not hold, if the gateware differs from the golden model, if a proof contradicts a simulation, or
-if more mutants than :data:`ALIVE` are left though all was tried in time.
+Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign. Ten tables of the pages
+are drawn, of those of which a part takes seconds to make, and that part is made anew and compared with the page. Ten
+mutants of the gateware of one Skin are drawn and simulated: stimuli that are compared with the golden model tell each
+of them from the gateware, or a proof says that it changes nothing. The result is a page, build/audit.md.
+
+What did not end in its time is listed as such: it neither agrees nor differs. The status is 1 if a claim or a table
+does not hold, if the gateware differs from the golden model, if a proof contradicts a simulation, or if more mutants
+than :data:`ALIVE` are left though all was tried in time.
 """
 
 import argparse
