@@ -12,6 +12,7 @@ than :data:`ALIVE` are left though all was tried in time.
 
 import argparse
 import dataclasses
+import itertools
 import os
 import random
 import re
@@ -43,8 +44,9 @@ ALIVE = 4
 ten are left once in 600 audits."""
 PROOF_S = 20
 """Seconds of each proof that four were too few for, on a machine with nothing else to do."""
-CLAIMS_S, MUTANTS_S = 150, 100
-"""Seconds for the tests of all claims, one claim a core at a time, and for all that is tried of the mutants."""
+CLAIMS_S, TABLES_S, MUTANTS_S = 150, 50, 100
+"""Seconds for the tests of all claims, one claim a core at a time; after which no table and nothing of mutants
+begins."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,13 +121,16 @@ def judged(claim: dict, results: dict[str, verification.Outcome]) -> Finding:
 def tables(rng: random.Random) -> list[Finding]:
     """Compare parts of tables with what their commands give today."""
     every = [(study, name) for study in STUDIES.values() for name, section in study.sections.items() if section.sample]
-    return [table(study, name) for study, name in rng.sample(every, DRAWN)]
+    until = time.monotonic() + TABLES_S
+    return [table(study, name, until) for study, name in rng.sample(every, DRAWN)]
 
 
-def table(study: Study, name: str) -> Finding:
-    """A part of one table against its page."""
+def table(study: Study, name: str, until: float) -> Finding:
+    """A part of one table against its page, unless it is later than ``until``."""
     page = study.page_of(name)
     what = f"docs/{page}, `{name}`"
+    if time.monotonic() >= until:
+        return Finding(what, f"not looked at: {TABLES_S} s were over")
     try:
         part = StudyRun(study).call(study.sections[name].sample)
     except ImportError as error:
@@ -150,13 +155,13 @@ def mutants(rng: random.Random) -> list[Finding]:
     ]
 
 
-def page(seed: int, parts: dict[str, Sequence[Finding]]) -> str:
-    """What agreed and what not, in Markdown."""
+def page(seed: int, parts: dict[str, Sequence[Finding]], seconds: Sequence[float]) -> str:
+    """What agreed and what not, in Markdown, and how many seconds each part took."""
     text = f"# Audit by seed {seed}\n\n"
-    for title, findings in parts.items():
+    for (title, findings), took in zip(parts.items(), seconds, strict=True):
         rows = [["what was drawn", "what came out"], *([one.what, one.said] for one in findings)]
         wrong = sum(one.wrong for one in findings)
-        text += f"## {title}: {wrong} of {len(findings)} wrong\n\n{writer.table_of(rows)}\n\n"
+        text += f"## {title}: {wrong} of {len(findings)} wrong, {took:.0f} s\n\n{writer.table_of(rows)}\n\n"
     return text
 
 
@@ -166,10 +171,19 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("--results", type=Path, metavar="FILE", help="of pytest, to judge the claims by: runs no tests")
     given = parser.parse_args(arguments)
     seed, rng = given.seed, random.Random(given.seed)
-    parts = {"Claims": claims(rng, given.results), "Tables": tables(rng), "Mutants": mutants(rng)}
+    times = [time.monotonic()]
+    parts: dict[str, list[Finding]] = {}
+    for title, look in (
+        ("Claims", lambda: claims(rng, given.results)),
+        ("Tables", lambda: tables(rng)),
+        ("Mutants", lambda: mutants(rng)),
+    ):
+        parts[title] = look()
+        times.append(time.monotonic())
+    text = page(seed, parts, [late - early for early, late in itertools.pairwise(times)])
     PAGE.parent.mkdir(exist_ok=True)
-    PAGE.write_text(page(seed, parts))
-    print(page(seed, parts), end="")
+    PAGE.write_text(text)
+    print(text, end="")
     return any(one.wrong for findings in parts.values() for one in findings)
 
 

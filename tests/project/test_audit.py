@@ -1,6 +1,7 @@
 """`make audit`: what a seed draws, and that what is wrong is seen."""
 
 import dataclasses
+import math
 
 import audit
 import pytest
@@ -41,11 +42,13 @@ def project(tmp_path, monkeypatch):
 
 def test_a_table_that_is_not_what_it_would_be_today_is_seen(project):
     study = STUDIES["units"]
-    assert not audit.table(study, "units").wrong
+    assert not audit.table(study, "units", math.inf).wrong
     page = project / study.page_of("units")
     page.write_text(page.read_text().replace("3.3 V | 1 MHz | 60 µs |", "3.3 V | 1 MHz | 61 µs |"))
-    found = audit.table(study, "units")
+    found = audit.table(study, "units", math.inf)
     assert (found.said, found.wrong) == ("differs", True)
+    late = audit.table(study, "units", -math.inf)
+    assert (late.said, late.wrong) == ("not looked at: 50 s were over", False)
 
 
 def mutant_of(fate):
@@ -133,21 +136,21 @@ def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(mon
     monkeypatch.setattr(
         audit, "tried", lambda claim, limit_s: drawn.append(claim["claim"]) or audit.Finding(claim["claim"], "agrees")
     )
-    monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
+    monkeypatch.setattr(audit, "table", lambda study, name, until: audit.Finding(name, "agrees"))
     monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
     monkeypatch.setattr(audit, "PAGE", tmp_path / "build" / "audit.md")
     assert [audit.main(["--seed", seed]) for seed in ("1", "1", "2")] == [0, 0, 0]
     first, again, other = (sorted(drawn[start : start + 10]) for start in (0, 10, 20))
     assert first == again != other
     assert "Claims: 0 of 10 wrong" in (tmp_path / "build" / "audit.md").read_text()
-    monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "differs", wrong=True))
+    monkeypatch.setattr(audit, "table", lambda study, name, until: audit.Finding(name, "differs", wrong=True))
     assert audit.main(["--seed", "1"]) == 1
     assert "Tables: 10 of 10 wrong" in capsys.readouterr().out
 
 
 def test_results_of_a_run_of_all_tests_judge_the_claims(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(audit, "tried", lambda *_: pytest.fail("the tests ran already"))
-    monkeypatch.setattr(audit, "table", lambda study, name: audit.Finding(name, "agrees"))
+    monkeypatch.setattr(audit, "table", lambda study, name, until: audit.Finding(name, "agrees"))
     monkeypatch.setattr(audit, "mutants", lambda rng: [audit.Finding("mutant", "killed")])
     monkeypatch.setattr(audit, "PAGE", tmp_path / "audit.md")
     (tmp_path / "tests.xml").write_text("<testsuite></testsuite>")
