@@ -56,6 +56,8 @@ class Finding:
     what: str
     said: str
     wrong: bool = False
+    ended: bool = True
+    """False: time was too short to say."""
 
 
 def claims(rng: random.Random, run_before: Path | None) -> list[Finding]:
@@ -88,8 +90,8 @@ def tried(claim: dict, limit_s: int) -> Finding:
         ended = re.findall(r"^\S+::.* (PASSED|FAILED|ERROR)\b", said.read_text(), re.MULTILINE)
     passed = ended.count("PASSED")
     if failed := len(ended) - passed:
-        return Finding(claim["claim"], f"{failed} FAILED; not ended in {limit_s} s", wrong=True)
-    return Finding(claim["claim"], f"not ended in {limit_s} s; {passed:,} tests passed until then")
+        return Finding(claim["claim"], f"{failed} FAILED; not ended in {limit_s} s", wrong=True, ended=False)
+    return Finding(claim["claim"], f"not ended in {limit_s} s; {passed:,} tests passed until then", ended=False)
 
 
 def run(command: Sequence[str], said: Path, limit_s: int) -> bool:
@@ -130,7 +132,7 @@ def table(study: Study, name: str, until: float) -> Finding:
     page = study.page_of(name)
     what = f"docs/{page}, `{name}`"
     if time.monotonic() >= until:
-        return Finding(what, f"not looked at: {TABLES_S} s were over")
+        return Finding(what, f"not looked at: {TABLES_S} s were over", ended=False)
     try:
         part = StudyRun(study).call(study.sections[name].sample)
     except ImportError as error:
@@ -150,7 +152,12 @@ def mutants(rng: random.Random) -> list[Finding]:
     alive = [one for one in found if one.fate == "alive"]
     said = {"open": f"alive, not proved in {MUTANTS_S} s"}
     return [
-        Finding(f"{one.mutant} ({name})", said.get(one.fate, one.fate), one in alive and len(alive) > ALIVE)
+        Finding(
+            f"{one.mutant} ({name})",
+            said.get(one.fate, one.fate),
+            wrong=one in alive and len(alive) > ALIVE,
+            ended=one.fate != "open",
+        )
         for one in found
     ]
 
@@ -160,8 +167,9 @@ def page(seed: int, parts: dict[str, Sequence[Finding]], seconds: Sequence[float
     text = f"# Audit by seed {seed}\n\n"
     for (title, findings), took in zip(parts.items(), seconds, strict=True):
         rows = [["what was drawn", "what came out"], *([one.what, one.said] for one in findings)]
-        wrong = sum(one.wrong for one in findings)
-        text += f"## {title}: {wrong} of {len(findings)} wrong, {took:.0f} s\n\n{writer.table_of(rows)}\n\n"
+        wrong, left = (sum(flags) for flags in zip(*((one.wrong, not one.ended) for one in findings), strict=True))
+        text += f"## {title}: {wrong} of {len(findings)} wrong, {left} not ended, {took:.0f} s\n\n"
+        text += f"{writer.table_of(rows)}\n\n"
     return text
 
 

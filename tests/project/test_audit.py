@@ -69,6 +69,7 @@ def test_mutants_that_are_left_are_listed_and_more_than_four_are_wrong(monkeypat
     found = audit.mutants(audit.random.Random(1))
     assert sum(one.said.startswith("alive") for one in found) == left
     assert sum(one.wrong for one in found) == wrong
+    assert sum(not one.ended for one in found) == left * (fate == "open")
     assert any("not proved in 100 s" in one.said for one in found) == (fate == "open")
 
 
@@ -127,7 +128,7 @@ def test_a_claim_that_does_not_end_in_time_neither_agrees_nor_differs(tests, tmp
     """Unless a test failed before. What it started is ended, too."""
     started = f"subprocess.run(['sh', '-c', 'echo $$ > {tmp_path}/started; sleep 1000'])"
     found = tests(before + LONG + started, seconds=12)
-    assert found == audit.Finding("it holds", f"{'1 FAILED; ' * wrong}not ended in 12 s{said}", wrong)
+    assert found == audit.Finding("it holds", f"{'1 FAILED; ' * wrong}not ended in 12 s{said}", wrong, ended=False)
     assert not alive(int((tmp_path / "started").read_text()))
 
 
@@ -142,7 +143,7 @@ def test_a_seed_decides_what_is_drawn_and_one_thing_that_is_wrong_the_status(mon
     assert [audit.main(["--seed", seed]) for seed in ("1", "1", "2")] == [0, 0, 0]
     first, again, other = (sorted(drawn[start : start + 10]) for start in (0, 10, 20))
     assert first == again != other
-    assert "Claims: 0 of 10 wrong" in (tmp_path / "build" / "audit.md").read_text()
+    assert "Claims: 0 of 10 wrong, 0 not ended" in (tmp_path / "build" / "audit.md").read_text()
     monkeypatch.setattr(audit, "table", lambda study, name, until: audit.Finding(name, "differs", wrong=True))
     assert audit.main(["--seed", "1"]) == 1
     assert "Tables: 10 of 10 wrong" in capsys.readouterr().out
