@@ -106,7 +106,7 @@ mutants-tested: $(VENV)/.stamp-test | compiler ## change the gateware's source: 
 	$(PY) scripts/tested_mutants.py $(ARGS)
 
 SEED ?= 0
-audit: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## draw claims, tables and mutants by a seed of yours and check them, in some minutes: SEED=7
+audit: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## draw claims, tables and mutants by a seed of yours and check them, in five minutes: SEED=7
 	$(PY) scripts/audit.py --seed $(call quoted,SEED) $(ARGS)
 
 lint: $(VENV)/.stamp-lint ## check style, types and who imports whom

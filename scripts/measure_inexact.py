@@ -1,21 +1,16 @@
-"""Finds the faults of four public labellers again, in models of them. See docs/rivals.md.
-
-    python scripts/measure_inexact.py
-
-Needs contactfpga with its extra `sim`.
-"""
+"""Finds the faults of four public labellers again, in models of them: the study ``inexact``. See docs/rivals.md."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
-import sys
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
 from rivals import exactness
 from rivals.campaign import OURS
-from rivals.house import all_departures, guarded, table_of
+from rivals.house import all_departures, table_of
 from rivals.inexact import INEXACT, Inexact, Zone
 
 CELLS = 10
@@ -27,11 +22,10 @@ NOISE = 100
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
-    """The smallest frame that a labeller gives wrong zones for, and how it was found."""
+    """The smallest frame that a labeller gives wrong zones for."""
 
     labeller: Inexact
     cells: np.ndarray
-    searched: str
     got: list[Zone]
     right: list[Zone]
 
@@ -43,11 +37,10 @@ def compute() -> list[Fault]:
 
 def fault(labeller: Inexact) -> Fault:
     """The first frame that is wrong: by cells of the sheet, then rows, then as :func:`small` and :func:`large` go."""
-    for searched, batches in ((f"every frame of up to {CELLS} cells", small()), ("larger ones", large())):
-        for frames in batches:
-            for cells, right in zip(frames, exact(frames), strict=True):
-                if (got := sorted(labeller.model(cells))) != right:
-                    return Fault(labeller, cells, searched, got, right)
+    for frames in itertools.chain(small(), large()):
+        for cells, right in zip(frames, exact(frames), strict=True):
+            if (got := sorted(labeller.model(cells))) != right:
+                return Fault(labeller, cells, got, right)
     raise LookupError(f"{labeller.name} is right in every frame that was tried; its model lost its fault")
 
 
@@ -79,17 +72,14 @@ def exact(frames: np.ndarray) -> list[list[Zone]]:
 
 
 def inexact_table(faults: list[Fault]) -> str:
-    """The faults, and how many frames of 32x32 are wrong. Ours are given the faults as well."""
+    """How many frames of 32x32 are wrong. Ours are given the same frames."""
     frames = np.concatenate([exactness.frames_for(SIDE, NOISE), embedded(faults)])
     right = exact(frames)
     rows = [("labeller", "what ran", f"wrong of {len(frames)} frames of {SIDE}x{SIDE}", "smallest wrong frame")]
     for one in faults:
         wrong = sum(sorted(one.labeller.model(cells)) != zones for cells, zones in zip(frames, right, strict=True))
-        name, size = f"[{one.labeller.name}]({one.labeller.url})", "x".join(map(str, one.cells.shape))
-        rows.append((name, "a model of ours", f"{wrong}: {one.labeller.fault}", f"{size}, of {one.searched}"))
-    for labeller in OURS:
-        checked = exactness.check_ours(labeller, SIDE, frames)
-        rows.append((f"`{labeller}`", "its gateware", str(checked.wrong), "none of these"))
+        rows.append((one.labeller.name, "model", str(wrong), "x".join(map(str, one.cells.shape))))
+    rows += [(f"`{one}`", "gateware", str(exactness.check_ours(one, SIDE, frames).wrong), "") for one in OURS]
     return table_of(rows)
 
 
@@ -124,14 +114,3 @@ def areas(zones: list[Zone]) -> str:
 def drawn(cells: np.ndarray) -> str:
     """``#`` is pressed."""
     return "\n".join("".join(".#"[cell] for cell in row) for row in cells.astype(int).tolist())
-
-
-def main() -> int:
-    """The command; its status."""
-    faults = compute()
-    print(inexact_table(faults), pictures(faults), sep="\n\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(guarded(main))

@@ -8,16 +8,41 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.records import Records, word_bits
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.top import Top, receiver_of
 
-STREAM = {"m_axis_tdata": Out(8), "m_axis_tvalid": Out(1), "m_axis_tready": In(1), "m_axis_tlast": Out(1)}
+BYTES, RECORDS = "m_axis", "m_axis_records"
+"""Beginnings of the names of the streams' ports."""
+
+
+def _stream(name: str, bits: int) -> dict[str, wiring.Member]:
+    """Ports of an AXI4-Stream."""
+    return {f"{name}_tdata": Out(bits), f"{name}_tvalid": Out(1), f"{name}_tready": In(1), f"{name}_tlast": Out(1)}
 
 
 class StreamTop(Top):
-    """A Skin's gateware with ``bytes`` (out), a stream, instead of the transmit pin."""
+    """A Skin's gateware with ``bytes`` (out), a stream, in place of the transmit pin, and ``records`` beside it."""
 
     LINE: ClassVar = {"bytes": Out(stream.Signature(8)), "rx": In(1, init=1)}
+
+    def __init__(self, skin: Skin):
+        super().__init__(skin)
+        self.records = Records(skin)
+
+    def elaborate(self, platform):
+        m = super().elaborate(platform)
+        m.submodules.records = records = self.records
+        packer = m.submodules.packer
+        m.d.comb += [
+            records.item.eq(packer.items.payload),
+            records.taken.eq(packer.items.valid & packer.items.ready),
+            records.send.eq(packer.frames.verdict.send),
+            records.tag.eq(packer.tag),
+            records.summary.eq(packer.summary),
+            records.restart.eq(self._restarts),
+        ]
+        return m
 
     def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
         receiver = self._put(m, "receiver", receiver_of(self.derived))
@@ -28,14 +53,16 @@ class StreamTop(Top):
 
 
 class Core(wiring.Component):
-    """A Skin's gateware between the pins of the sheet and a stream of bytes, in one clock domain.
+    """A Skin's gateware between the pins of the sheet and two streams, in one clock domain.
 
     The pins of the sheet, ``rx``, ``contact`` and the pins of options are those of :class:`Top`.
 
     rx (in): requests and commands; while it stays high, the board sends what it does by itself.
     m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): the packets of docs/protocol.md as an
-        AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A newer frame replaces
-        a waiting one, so a slow reader gets the newest.
+    AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A frame that is ready
+    while another one waits takes its place, so the reader may take its time and gets the newest one.
+    m_axis_records_tdata, m_axis_records_tvalid, m_axis_records_tlast (out), m_axis_records_tready (in): the same
+    frames as an AXI4-Stream of words, see :class:`~contactfpga_hdl.link.records.Records`.
 
     A Skin with ``dual`` has none: its two copies are compared at the transmit pin.
     """
@@ -43,7 +70,7 @@ class Core(wiring.Component):
     def __init__(self, skin: Skin):
         self._top = StreamTop(skin)
         ports = {name: member for name, member in self._top.signature.members.items() if name != "bytes"}
-        super().__init__({**ports, **STREAM})
+        super().__init__({**ports, **_stream(BYTES, 8), **_stream(RECORDS, word_bits(skin.derived))})
 
     def elaborate(self, platform):
         m = Module()
@@ -52,10 +79,15 @@ class Core(wiring.Component):
             if name != "bytes":
                 inside, outside = getattr(top, name), getattr(self, name)
                 m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
+        words = top.records.words
         m.d.comb += [
             self.m_axis_tdata.eq(top.bytes.payload),
             self.m_axis_tvalid.eq(top.bytes.valid),
             self.m_axis_tlast.eq(top.bytes.payload == 0),
             top.bytes.ready.eq(self.m_axis_tready),
+            self.m_axis_records_tdata.eq(words.payload.data),
+            self.m_axis_records_tvalid.eq(words.valid),
+            self.m_axis_records_tlast.eq(words.payload.last),
+            words.ready.eq(self.m_axis_records_tready),
         ]
         return m

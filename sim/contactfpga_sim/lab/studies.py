@@ -195,6 +195,7 @@ _ALL = (
         page="rivals.md",
         minutes=2,
         sections={
+            "inexact": Section("scripts/measure_inexact.py:inexact_table"),
             "inexact_frames": Section(
                 "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
             ),

@@ -7,11 +7,12 @@ import itertools
 import random
 import re
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from amaranth.hdl import Cat, ClockDomain, Module
+from amaranth.hdl import Cat, ClockDomain, Module, Signal
 from amaranth.lib.wiring import In
 from amaranth.sim import Simulator
 
@@ -19,7 +20,9 @@ from contactfpga import __version__
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
-from contactfpga_hdl.core import Core
+from contactfpga_hdl.core import BYTES, RECORDS, Core
+from contactfpga_hdl.link.records import closing_layout, word_bits
+from contactfpga_hdl.payloads import zone_layout
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.golden.trace import Timeline
 from contactfpga_sim.verify.cosim.record import InputDriver
@@ -66,6 +69,10 @@ MEANINGS = {
     "m_axis_tvalid": "there is one",
     "m_axis_tready": "it is taken; may be low for as long as you like",
     "m_axis_tlast": "it is the last one of its packet, 0",
+    "m_axis_records_tdata": "a word of a frame: a record, or what closes the frame",
+    "m_axis_records_tvalid": "there is one",
+    "m_axis_records_tready": "it is taken; may be low for as long as you like",
+    "m_axis_records_tlast": "it closes its frame",
 }
 
 
@@ -96,6 +103,20 @@ def ports(skin: Skin, core: Core) -> list[Port]:
     return [Port(name, takes, bits, said[name]) for name, takes, bits in every]
 
 
+def record_fields(skin: Skin) -> dict[str, int]:
+    """Bits of each field of a record, lowest first."""
+    if not skin.derived.report.zones:
+        return {"cells": skin.columns}
+    if skin.derived.report.divided:
+        return dict(zip(("area", "x", "y"), skin.derived.record_bits, strict=True))
+    return {name: len(Signal(shape)) for name, shape in zone_layout(skin.derived).members.items()}
+
+
+def closing_fields(skin: Skin) -> dict[str, int]:
+    """The same of what closes a frame."""
+    return {name: len(Signal(shape)) for name, shape in closing_layout(skin.derived).members.items()}
+
+
 def write(skin: Skin, folder: Path) -> list[Path]:
     """Write all files of the core into an existing folder.
 
@@ -105,13 +126,13 @@ def write(skin: Skin, folder: Path) -> list[Path]:
         raise IpError("dual = true compares two copies at the transmit pin, which a core has not; leave it out")
     core = Core(skin)
     known = ports(skin, core)
-    vectors = simulated(skin, core, known)
+    played = vectors(skin, core, known)
     texts = {
         f"{NAME}.v": _head(skin) + verilog(skin),
         f"{NAME}_sva.sv": assertions(skin, known),
-        f"{NAME}_tb.v": testbench(known, len(vectors)),
-        "vectors.hex": "".join(f"{word:x}\n" for word in vectors),
-        "example.v": example(known),
+        f"{NAME}_tb.v": testbench(known, len(played)),
+        "vectors.hex": "".join(f"{word:x}\n" for word in played),
+        "example.v": example(skin, known),
         f"{NAME}.sdc": constraints(skin, known),
         "README.md": readme(skin, known),
     }
@@ -131,9 +152,10 @@ def verilog(skin: Skin) -> str:
 def _started(text: str) -> str:
     """Verilog that four-state simulators compute correctly from the first clock on.
 
-    They compute a block once an input changes. Yosys writes into most blocks a signal for that, which here does change
-    once, and is added to all others. Memory outputs begin with 0.
+    It computes a block once something in it changes. Yosys writes into most blocks a signal for that, which here does
+    change once, and comes into all others. What memories give begins with 0. Wires of no bits, which nothing uses, go.
     """
+    text = re.sub(r"^  wire \[-1:0\] \S+ ;\n", "", text, flags=re.MULTILINE)
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
     return re.sub(r"^(  reg (?:\[\d+:0\] )?_\d+_);$", r"\1 = 0;", "".join(modules), flags=re.MULTILINE)
 
@@ -160,36 +182,54 @@ def _head(skin: Skin) -> str:
     )
 
 
-def simulated(skin: Skin, core: Core, known: list[Port]) -> list[int]:
+def vectors(skin: Skin, core: Core, known: list[Port]) -> list[int]:
     """Inputs and outputs of each clock as a word, inputs lowest, in Amaranth's simulator.
 
-    After the hello two switches close and open, and the stream's reader stalls in a quarter of the clocks.
+    After the hello two switches close and open again. The streams' readers stall in a quarter of the clocks, that of
+    the records at all of the second scan and the third.
     """
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[0, 0] = cells[-1, -1] = True
     scan = skin.derived.frame_clocks
     hello = 2 * scan + 1000
-    clocks = min(hello + SCANS * scan, MOST_CLOCKS)
     timeline = Timeline([(hello, cells, None), (hello + 3 * scan // 2, cells & False, None)])
-    stimulus, rng = InputDriver(skin, timeline), random.Random(skin.fingerprint.hex())
+    rng = random.Random(skin.fingerprint.hex())
+
+    def takes(clock: int) -> tuple[bool, bool]:
+        return rng.random() < 0.75, rng.random() < 0.75 and not hello < clock < hello + 2 * scan
+
+    return simulated(skin, core, known, timeline, min(hello + SCANS * scan, MOST_CLOCKS), takes)
+
+
+def simulated(
+    skin: Skin,
+    core: Core,
+    known: list[Port],
+    timeline: Timeline,
+    clocks: int,
+    takes: Callable[[int], tuple[bool, bool]],
+) -> list[int]:
+    """The words of so many clocks. ``takes``: whether bytes and records are taken in a clock, if there are any."""
+    stimulus = InputDriver(skin, timeline)
     m = Module()
     m.domains.sync = clock_domain = ClockDomain()
     m.submodules.core = core
     inside = known[1:]
-    takes, gives = (
+    ins, outs = (
         [_signal(core, clock_domain, port) for port in inside if port.takes is taken] for taken in (True, False)
     )
-    places = list(itertools.accumulate((len(signal) for signal in takes), initial=0))
+    places = list(itertools.accumulate((len(signal) for signal in ins), initial=0))
     place = dict(zip((port.name for port in inside if port.takes), places, strict=False))
     words: list[int] = []
 
     async def bench(ctx: Any) -> None:
         for clock in range(clocks):
             levels = stimulus.pins(clock, {name: ctx.get(getattr(core, name)) for name in stimulus.reads})
-            word = (rng.random() < 0.75) << place["m_axis_tready"] | (clock < RESET) << place["rst"]
-            word |= sum(level << place[name] for name, level in zip(stimulus.drives, levels, strict=True))
-            ctx.set(Cat(*takes), word)
-            _, _, out = await ctx.tick().sample(Cat(*gives))
+            given: dict[str, int] = dict(zip((f"{BYTES}_tready", f"{RECORDS}_tready"), takes(clock), strict=True))
+            given |= {"rst": clock < RESET, **dict(zip(stimulus.drives, levels, strict=True))}
+            word = sum(level << place[name] for name, level in given.items())
+            ctx.set(Cat(*ins), word)
+            _, _, out = await ctx.tick().sample(Cat(*outs))
             words.append(word | out << places[-1])
 
     simulator = Simulator(m)
@@ -218,7 +258,7 @@ def assertions(skin: Skin, known: list[Port]) -> str:
 module {NAME}_sva (
 {declared}
 );
-    reg waited = 0;
+{_of_records(skin)}    reg waited = 0;
     reg [8:0] offered = 0;
     always @(posedge clk) begin
         waited <= !rst && m_axis_tvalid && !m_axis_tready;
@@ -229,6 +269,43 @@ module {NAME}_sva (
         if (m_axis_tvalid && !rst) assert (m_axis_tlast == (m_axis_tdata == 0));
     end
 {one_row}endmodule
+"""
+
+
+def _of_records(skin: Skin) -> str:
+    """What holds of the stream of records."""
+    fields = closing_fields(skin)
+    place = dict(zip(fields, itertools.accumulate(fields.values(), initial=0), strict=False))
+
+    def field(name: str) -> str:
+        low, high = place[name], place[name] + fields[name] - 1
+        return f"{RECORDS}_tdata[{low if low == high else f'{high}:{low}'}]"
+
+    most = skin.derived.max_items
+    there = f"16'd{most}"
+    if skin.derived.report.zones:
+        there = f"{field('overflow')} ? {there} : {{{16 - fields['zones']}'d0, {field('zones')}}}"
+    return f"""    reg [{word_bits(skin.derived)}:0] word = 0;
+    reg held = 0, after = 0;
+    reg [15:0] records = 0, number = 0;
+    always @(posedge clk) begin
+        held <= !rst && {RECORDS}_tvalid && !{RECORDS}_tready;
+        word <= {{{RECORDS}_tlast, {RECORDS}_tdata}};
+        if (rst) {{after, records}} <= 0;
+        else if ({RECORDS}_tvalid && {RECORDS}_tready) begin
+            records <= {RECORDS}_tlast ? 0 : records + 1;
+            if ({RECORDS}_tlast) {{after, number}} <= {{1'b1, {field("number")}}};
+        end
+        // A word that is offered stays until it is taken.
+        if (held && !rst) assert ({RECORDS}_tvalid && {{{RECORDS}_tlast, {RECORDS}_tdata}} == word);
+        // Once a frame has begun, a word is there in every clock.
+        if (records != 0 && !rst) assert ({RECORDS}_tvalid);
+        if ({RECORDS}_tvalid && {RECORDS}_tlast && !rst) begin
+            // The last word says how many records came before, and no frame comes twice.
+            assert (records == ({there}));
+            assert (!after || {field("number")} != number);
+        end
+    end
 """
 
 
@@ -273,35 +350,42 @@ endmodule
 """
 
 
-def example(known: list[Port]) -> str:
+def example(skin: Skin, known: list[Port]) -> str:
     """A peripheral of a small bus, with the core inside."""
-    sheet = [port for port in known[2:] if not port.name.startswith("m_axis") and port.name not in ("rx", "contact")]
+    told = ("rx", "contact")
+    sheet = [port for port in known[2:] if not port.name.startswith(BYTES) and port.name not in told]
     declared = "\n".join(f"    {'input' if port.takes else 'output'} wire {port.range}{port.name}," for port in sheet)
     connected = ", ".join(f".{port.name}({port.name})" for port in sheet)
-    return f"""// A peripheral with one register, for a bus with a select and a read strobe (Wishbone, AXI4-Lite or
-// a CSR bus of LiteX need a few gates more). A read gives {{empty, last, byte}} and takes the byte. The interrupt
-// is `contact`, which rises within a scan of a touch, long before the frame is there. A program collects the
-// bytes up to `last` and reads the packet as docs/protocol.md says, for example with c/contactfpga.h.
+    bits = word_bits(skin.derived)
+    last = -(-bits // 32)
+    return f"""// A peripheral for a 32-bit bus with a select and a read strobe (Wishbone, AXI4-Lite or a CSR bus
+// of LiteX need a few gates more). Register 0 gives {{closing, valid}}, and from register 1 on there are the
+// bits of the word, lowest first; a read of register {last} takes it. README.md has the fields. The interrupt is
+// high while a word waits: read words up to a closing one, then the frame is whole.
 `timescale 1ns / 1ps
 module contactfpga_peripheral (
     input wire clk,
     input wire rst,
     input wire select,
     input wire read,
-    output reg [9:0] data,
+    input wire [2:0] address,
+    output reg [31:0] data,
     output wire irq,
+    output wire contact,
 {declared}
     input wire rx  // high, or a UART's line with requests
 );
-    wire [7:0] tdata;
-    wire tvalid, tlast;
-    wire taken = select & read;
+    wire [{bits - 1}:0] tdata;
+    wire tlast;
+    wire [255:0] registers = {{{{{224 - bits}{{1'b0}}}}, tdata, 30'd0, tlast, irq}};
+    wire taken = select & read & (address == {last});
 
-    always @(posedge clk) if (taken) data <= {{!tvalid, tlast, tdata}};
+    always @(posedge clk) if (select & read) data <= registers[32 * address +: 32];
 
     {NAME} core (
-        .clk(clk), .rst(rst), .rx(rx), .contact(irq), {connected},
-        .m_axis_tdata(tdata), .m_axis_tvalid(tvalid), .m_axis_tready(taken), .m_axis_tlast(tlast)
+        .clk(clk), .rst(rst), .rx(rx), .contact(contact), {connected},
+        .{BYTES}_tdata(), .{BYTES}_tvalid(), .{BYTES}_tready(1'b0), .{BYTES}_tlast(),
+        .{RECORDS}_tdata(tdata), .{RECORDS}_tvalid(irq), .{RECORDS}_tready(taken), .{RECORDS}_tlast(tlast)
     );
 endmodule
 """
@@ -314,6 +398,15 @@ def constraints(skin: Skin, known: list[Port]) -> str:
     return f"create_clock -name clk -period {1e9 / skin.clock_hz:.3f} [get_ports clk]\n{paths}"
 
 
+def _fields(fields: dict[str, int]) -> str:
+    """Fields and their bits, as a line of Markdown."""
+    places = itertools.accumulate(fields.values(), initial=0)
+    there = [
+        (name, place, place + bits - 1) for (name, bits), place in zip(fields.items(), places, strict=False) if bits
+    ]
+    return ", ".join(f"`{name}` [{high}:{low}]" if high > low else f"`{name}` [{low}]" for name, low, high in there)
+
+
 def readme(skin: Skin, known: list[Port]) -> str:
     """The ports, the settings and how to try it."""
     rows = "".join(
@@ -321,6 +414,7 @@ def readme(skin: Skin, known: list[Port]) -> str:
     )
     settings = "".join(f"    {line}\n" for line in skin.to_toml().splitlines())
     scan = skin.derived.frame_clocks
+    record, closing = (_fields(fields) for fields in (record_fields(skin), closing_fields(skin)))
     return f"""# {NAME}
 
 contactfpga {__version__} for {skin.rows}x{skin.columns} switches, as Verilog-2005 without primitives of a vendor.
@@ -331,13 +425,18 @@ One clock, synchronous reset.
 {rows}
 - Clock: {skin.clock_hz:,} Hz. The core counts clocks, so another frequency needs another core (`clock_hz`).
 - A scan takes {scan:,} clocks, {scan * 1e6 / skin.clock_hz:,.1f} us.
-- Packets are those of docs/protocol.md: bytes of COBS with a check, and a 0 at the end. The first one is a hello, which
-  says the size of the sheet. If a frame is ready while an older one waits, it takes its place.
-- `m_axis` keeps the rules of AXI4-Stream: what is offered stays until it is taken, and `tvalid` does not wait for
-  `tready`.
+- Both streams keep the rules of AXI4-Stream: what is offered stays until it is taken, and `tvalid` does not wait for
+  `tready`. Tie `tready` of one that you do not use low.
+- `m_axis` has the packets of docs/protocol.md: bytes of COBS with a check, and a 0 at the end. The first one is a
+  hello, which says the size of the sheet. If a frame is ready while an older one waits, it takes its place.
+- `m_axis_records` has the same frames as words: records, at most {skin.derived.max_items:,}, then one with `tlast`.
+  - record: {record}
+  - with `tlast`: {closing}
+- A frame is offered when it is whole. If one waits and the first record of the next one comes, that takes its place:
+  `number` counts replaced frames, too, so a gap of n says that n are missing.
 
     iverilog -g2012 -o tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v && ./tb
-    verilator --binary --assert --top {NAME}_tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v
+    verilator --binary --assert -CFLAGS -std=c++20 --top {NAME}_tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v
     ./obj_dir/V{NAME}_tb
 
 `example.v` is a peripheral with the core inside, `{NAME}.sdc` has the clock. The settings, to make it again with

@@ -130,7 +130,7 @@ FIRST, LAST = 2.0, 13.0
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame with the largest error of its zone at its time, for a finger of 10 N that starts at any phase of a scan;
+    """The frame with the largest error of its zone at its time, for a finger of 10 N that starts at any phase;
     infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]

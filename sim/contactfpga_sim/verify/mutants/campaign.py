@@ -7,6 +7,9 @@ stimuli and longer proofs. The final survivors are listed.
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -35,11 +38,15 @@ _FIRST_LOOK = 512
 Events = Mapping[str, np.ndarray]
 
 
-def survivors(design: Design, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus]) -> list[int]:
-    """The mutants that no stimulus distinguishes from the gateware."""
+def survivors(
+    design: Design, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus], until: float = math.inf
+) -> list[int]:
+    """The mutants that no stimulus tells from the gateware as it should be, of those that begin before ``until``."""
     left = list(numbers)
     with _board(design, model) as board:
         for stimulus in stimuli:
+            if time.monotonic() >= until:
+                break
             events = expected(board, stimulus)
             left = [number for number in left if killed_at(board, number, stimulus, events) is None]
     return left
@@ -139,7 +146,7 @@ CHECKED = 2
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """Fate of a mutant: ``killed``, ``equivalent`` or ``alive``."""
+    """What became of a mutant: ``killed``, ``equivalent``, ``alive``, or ``open`` where time was up before."""
 
     skin: str
     mutant: Mutant
@@ -153,24 +160,34 @@ def chosen(name: str) -> tuple[Design, tuple[str, ...]]:
     return SEVERAL[name] if name in SEVERAL else OPTIONS[name]
 
 
-def left_by(design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) -> list[Mutant]:
-    """The mutants that agree with the golden model under every stimulus."""
-    given = list(stimuli)
+def left_by(
+    design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus], until: float = math.inf
+) -> list[Mutant]:
+    """The mutants that behave as the golden model says under every stimulus, of those that begin before ``until``, a
+    time of :func:`time.monotonic`."""
+    given = list(itertools.takewhile(lambda _: time.monotonic() < until, stimuli))
     left: list[Mutant] = []
     for start in range(0, len(mutants), BATCH):
         batch = mutants[start : start + BATCH]
         model = netlist.model(design, batch)
-        left += [batch[n - 1] for n in survivors(design, model, range(1, len(batch) + 1), given)]
+        left += [batch[n - 1] for n in survivors(design, model, range(1, len(batch) + 1), given, until)]
     return left
 
 
 def examine(
-    name: str, count: int, seed: int, long_s: int = proof.LONG_S, say: Callable[[str], None] = lambda _: None
+    name: str,
+    count: int,
+    seed: int,
+    long_s: int = proof.LONG_S,
+    say: Callable[[str], None] = lambda _: None,
+    budget_s: float = math.inf,
 ) -> list[Result]:
-    """The fates of ``count`` mutants of the :func:`chosen` design; ``long_s``: seconds of a longer proof.
+    """The fates of ``count`` mutants of what is :func:`chosen`; ``long_s`` are the seconds of a longer proof. After
+    ``budget_s`` seconds no proof and no long stimulus begins.
 
     Raises :class:`contactfpga_sim.verify.mutants.proof.Contradiction` if a killed mutant is proved equivalent.
     """
+    until = time.monotonic() + budget_s
     design, stages = chosen(name)
     given = sheets if isinstance(design, Several) else stimuli
     say("draw")
@@ -179,22 +196,22 @@ def examine(
     left = left_by(design, drawn, given.quick(design))
     say(f"{len(left)} left, proofs")
     killed = [mutant for mutant in drawn if mutant not in left][:CHECKED]
-    proved = _proved(design, [*left, *killed], proof.QUICK_S)
+    proved = _proved(design, [*left, *killed], proof.QUICK_S, until)
     if wrong := proved & {*killed}:
         raise proof.Contradiction(f"killed, yet proved equivalent: {', '.join(map(str, wrong))}")
     left = [mutant for mutant in left if mutant not in proved]
     say(f"{len(left)} left, long stimuli")
-    longest = [stimuli.until_time_wraps(SKINS[name])] if name in SKINS else []  # minutes in the model of an option
-    left = left_by(design, left, [*given.thorough(design), *longest])
+    if time.monotonic() < until:
+        longest = [stimuli.until_time_wraps(SKINS[name])] if name in SKINS else []  # minutes in the model of an option
+        left = left_by(design, left, itertools.chain(given.thorough(design), longest), until)
     say(f"{len(left)} left, longer proofs")
-    proved |= _proved(design, left, long_s)
-    alive = {*left} - proved
-    say(f"{len(alive)} alive")
-    fates = (
-        (mutant, "equivalent" if mutant in proved else "alive" if mutant in alive else "killed") for mutant in drawn
-    )
-    return [Result(name, mutant, fate) for mutant, fate in fates]
+    proved |= _proved(design, left, long_s, until)
+    rest = "alive" if time.monotonic() < until else "open"
+    fates = {mutant: "equivalent" if mutant in proved else rest for mutant in (*left, *proved)}
+    say(f"{len({*left} - proved)} {rest}")
+    return [Result(name, mutant, fates.get(mutant, "killed")) for mutant in drawn]
 
 
-def _proved(design: Design, mutants: Sequence[Mutant], limit_s: int) -> set[Mutant]:
-    return {mutant for mutant, same in zip(mutants, proof.equivalent(design, mutants, limit_s)) if same}
+def _proved(design: Design, mutants: Sequence[Mutant], limit_s: int, until: float) -> set[Mutant]:
+    found = proof.equivalent(design, mutants, limit_s, until=until)
+    return {mutant for mutant, same in zip(mutants, found) if same}

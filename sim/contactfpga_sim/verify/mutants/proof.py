@@ -10,8 +10,10 @@ stays unreachable is unreachable in the whole design.
 
 from __future__ import annotations
 
+import math
 import re
 import tempfile
+import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -69,10 +71,11 @@ class Prover:
     def __exit__(self, kind: type | None, error: BaseException | None, traceback: TracebackType | None) -> None:
         self._folder.cleanup()
 
-    def equivalent(self, mutant: Mutant, limit_s: int) -> bool:
-        """Whether the mutant is proved equivalent; at most ``limit_s`` CPU seconds per question."""
+    def equivalent(self, mutant: Mutant, limit_s: int, until: float = math.inf) -> bool:
+        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds of one processor for each question, and
+        none is put after ``until``, a time of :func:`time.monotonic`."""
         number = self._mutants.index(mutant) + 1
-        return any(self._never_differs(number, cut, limit_s) for cut in self._cuts(mutant))
+        return any(self._never_differs(number, cut, limit_s, until) for cut in self._cuts(mutant))
 
     def _cuts(self, mutant: Mutant) -> Iterator[frozenset[int]]:
         """Sets of cut registers, the largest first."""
@@ -82,9 +85,9 @@ class Prover:
         yield every - inside - (self._named("scan.") - self._named(*_CLOCKS))
         yield store
 
-    def _never_differs(self, number: int, cut: frozenset[int], limit_s: int) -> bool:
+    def _never_differs(self, number: int, cut: frozenset[int], limit_s: int, until: float) -> bool:
         twins: dict[int, int] = {}
-        while True:  # it ends, as each turn doubles a register
+        while time.monotonic() < until:  # it ends, as each turn doubles a register
             latches = list(self._latches)
             for index, twin in twins.items():
                 latches[index] = twin
@@ -103,6 +106,7 @@ class Prover:
             if not found or found & cut:
                 return False
             twins |= {index: self._graph.variable() for index in sorted(found)}
+        return False
 
     def _placed(self, number: int, latches: Sequence[int]) -> tuple[list[int], list[int]]:
         """Mutant ``number`` over these latches: their next states, and the outputs."""
@@ -148,14 +152,19 @@ def _value(values: dict[int, int], literal: int) -> int:
 
 
 def equivalent(
-    design: Design, mutants: Sequence[Mutant], limit_s: int = QUICK_S, done: Callable[[], None] = lambda: None
+    design: Design,
+    mutants: Sequence[Mutant],
+    limit_s: int = QUICK_S,
+    done: Callable[[], None] = lambda: None,
+    until: float = math.inf,
 ) -> list[bool]:
-    """Whether each mutant is proved equivalent; ``done()`` is called after each."""
-    verdicts = []
-    if not mutants:
-        return []
+    """For each mutant whether it is proved equivalent; ``done()`` is called after each. Limits: see
+    :meth:`Prover.equivalent`."""
+    verdicts: list[bool] = []
+    if not mutants or time.monotonic() >= until:
+        return [False] * len(mutants)
     with Prover(design, mutants) as prover:
         for mutant in mutants:
-            verdicts.append(prover.equivalent(mutant, limit_s))
+            verdicts.append(prover.equivalent(mutant, limit_s, until))
             done()
     return verdicts

@@ -1,0 +1,132 @@
+"""A frame's records side by side, for a design that reads zones and not packets."""
+
+import math
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import TIME_BITS, Derived
+from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
+
+NUMBER_BITS = 16
+
+
+def closing_layout(derived: Derived) -> data.StructLayout:
+    """What closes a frame: the trailer of docs/protocol.md without what only the host needs.
+
+    ``number`` counts frames from 0 on, those that are replaced among them.
+    """
+    motion = {"motion": 1} if derived.skin.reads_rows else {}
+    counted = {"cells": derived.area_bits, "zones": derived.zones_bits}
+    flags = {"overflow": 1, "mismatch": 1, "fault": 1} | motion
+    return data.StructLayout({"time": TIME_BITS, "number": NUMBER_BITS} | counted | flags)
+
+
+def word_bits(derived: Derived) -> int:
+    """Of a record and of what closes a frame: whole bytes."""
+    return 8 * max(derived.item_bytes, math.ceil(closing_layout(derived).size / 8))
+
+
+class Records(wiring.Component):
+    """Offers whole frames: records, then a last word with what closes the frame (:func:`closing_layout`).
+
+    Of two halves of a memory one is filled while the other is read. A frame that is whole waits until the reader has
+    the one before; if the next frame's first record comes earlier, it takes its place. A reader that never takes
+    anything holds up nothing and keeps the frame that it was offered. With ``send = "on_change"`` the frame after a
+    replaced one counts as changed, so that the newest cells always arrive.
+
+    item (in), taken (in): what the packer takes, and when: a frame's items and its end mark.
+    send (in): with the end mark, that the frame is sent.
+    tag, summary (in): describe the frame in that clock.
+    restart (in): what was filled of a frame is forgotten.
+    words (out): records and closings. The first word of a frame is offered three clocks after its end mark is taken if
+    the reader has the frame before, and each further one in the clock after the one before is taken.
+
+    A flipped bit of its own registers or memory may spoil a frame or two, which nothing tells.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self.derived = skin.derived
+        word = data.StructLayout({"data": word_bits(self.derived), "last": 1})
+        super().__init__(
+            {
+                "item": In(item_layout(self.derived)),
+                "taken": In(1),
+                "send": In(1),
+                "tag": In(tag_layout(self.derived)),
+                "summary": In(summary_layout(self.derived)),
+                "restart": In(1),
+                "words": Out(stream.Signature(word)),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        place = Signal(range(self.derived.max_items + 1))  # of the next word to be written
+        end = Signal.like(place)  # the last word of the frame that waits
+        waits = Signal()  # a whole frame does
+        owed = Signal()  # one was replaced, so the next one is kept
+        half = Signal()  # that is read
+        reads = Signal()  # words of it are left
+        hands = waits & ~reads  # the halves change places
+        owes = owed | waits & ~hands
+        keeps = self.item.end & (self.send | owes)
+        m.submodules.store = store = memory.Memory(shape=word_bits(self.derived), depth=2 << len(place), init=[])
+        write = store.write_port()
+        m.d.comb += [
+            write.en.eq(self.taken),
+            write.addr.eq(Cat(place, ~half ^ hands)),
+            write.data.eq(Mux(self.item.end, self._closing(m, self.taken & keeps), self.item.data)),
+        ]
+        self._read(m, store.read_port(), half, reads, hands, end)
+        with m.If(hands):
+            m.d.sync += [waits.eq(0), half.eq(~half)]
+        with m.If(self.taken):
+            m.d.sync += [
+                place.eq(Mux(self.item.end, 0, place + 1)),
+                end.eq(place),
+                waits.eq(keeps),
+                owed.eq(owes & ~self.item.end),
+            ]
+        with m.If(self.restart):
+            m.d.sync += place.eq(0)
+        return m
+
+    def _read(self, m: Module, read: memory.ReadPort, half: Value, reads: Signal, hands: Value, end: Value) -> None:
+        """Offer the words of the half that is read."""
+        words = self.words
+        place, last = Signal.like(end), Signal.like(end)
+        closes = Signal()  # the word that is offered
+        fetches = Signal()
+        m.d.comb += [
+            fetches.eq(reads & (~words.valid | words.ready)),
+            read.en.eq(fetches),
+            read.addr.eq(Cat(place, half)),
+            words.payload.data.eq(read.data),
+            words.payload.last.eq(closes),
+        ]
+        m.d.sync += words.valid.eq(fetches | words.valid & ~words.ready)
+        with m.If(fetches):
+            m.d.sync += [place.eq(place + 1), closes.eq(place == last), reads.eq(place != last)]
+        with m.If(hands):
+            m.d.sync += [place.eq(0), last.eq(end), reads.eq(1)]
+
+    def _closing(self, m: Module, kept: Value) -> Value:
+        number = Signal(NUMBER_BITS)
+        m.d.sync += number.eq(number + kept)
+        closing = Signal(closing_layout(self.derived))
+        m.d.comb += [
+            closing.time.eq(self.tag.time),
+            closing.number.eq(number),
+            closing.cells.eq(self.summary.cells),
+            closing.zones.eq(self.summary.zones),
+            closing.overflow.eq(self.summary.overflow),
+            closing.mismatch.eq(self.summary.mismatch),
+            closing.fault.eq(self.tag.fault),
+        ]
+        if self.skin.reads_rows:
+            m.d.comb += closing.motion.eq(self.tag.motion)
+        return closing.as_value()
