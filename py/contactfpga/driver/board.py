@@ -92,6 +92,8 @@ class Board(BoardFacts):
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
         if self.live:
+            if (zones := self._frames.shown(timeout, max_age_s)) is not None:
+                return zones
             self._link.take_what_came()
             self._frames.keep_last()
         return self._frames.next(timeout) if max_age_s is None else self._frames.newest(max_age_s, checked(timeout))

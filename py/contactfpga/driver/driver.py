@@ -21,7 +21,7 @@ from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
-READERS = ("thread", "process")
+READERS = ("thread", "native", "process")
 """What may read a port."""
 
 
@@ -106,10 +106,16 @@ def _opened(
 
         return Board(remote.open_link(port, baud, skin, record), skin)
     transport = connect(port, baud)
+    if reader == "native":
+        from contactfpga.driver.native_link import NativeLink, NativePort
+
+        core = transport = NativePort(transport)
     try:
         if record is not None:
             tap = FileTap(record) if isinstance(record, (str, Path)) else record
             transport = RecordingTransport(transport, tap)
+        if reader == "native":
+            return Board(NativeLink(core, transport, skin), skin, record.opened if isinstance(record, Opening) else None)
         return Board(transport, skin, record.opened if isinstance(record, Opening) else None)
     except BaseException:
         transport.close()

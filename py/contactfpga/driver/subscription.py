@@ -47,6 +47,7 @@ class Listening(Generic[Item]):
     @property
     def dropped(self) -> int:
         """Frames that were not taken in time."""
+        self._link.catch_up()
         return self._frames.dropped
 
     def next(self, timeout: float = 1.0) -> Item:
@@ -189,6 +190,12 @@ class Subscription(Listening[Zones]):
         return Batch.of(frames or [self.next(timeout)])
 
     # ---- for the board
+
+    def shown(self, timeout: float, max_age_s: float | None) -> Zones | None:
+        """The newest frame, where it is known before the others were taken; see :meth:`Link.newest`."""
+        if max_age_s is not None or timeout == 0:
+            return None
+        return self._link.newest(self._frames, checked(timeout))
 
     def newest(self, max_age_s: float, timeout: float) -> Zones:
         """The next frame, none that came or was scanned longer ago than this; raises :class:`NoData` as soon as there
