@@ -445,6 +445,11 @@ class HostClock:
         """None in a recording."""
         return self._fit
 
+    @property
+    def begun(self) -> bool:
+        """Whether :meth:`take_reads` may be called."""
+        return self._fit is None or self._fit.bounds() is not None
+
     def end(self, now: float) -> None:
         """These were all."""
         if self._fit is not None and self._latest is not None:

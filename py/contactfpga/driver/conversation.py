@@ -79,6 +79,8 @@ class Conversation:
         self._timeline = Timeline(self.stats, live)
         self._clock = HostClock(live)
         self._reader = protocol.HelloReader()
+        self.decodes: tuple[Widths, bytes] | None = None
+        """What frames are decoded with, and what their check begins with; None where they come only one by one."""
         self._widths: Widths | None = None
         self._rest = b""
         self._noticed = math.inf
@@ -140,7 +142,8 @@ class Conversation:
     def receive_reads(self, reads: Reads) -> Iterator[tuple[float, list[Event | Run]]]:
         """The same of many reads in turn: when what was completed came, and that. Where nothing but frames came of
         which each continues the one before, many reads give one run."""
-        ends = None if reads.decoded is None else _ends(continues(reads.decoded.packets))
+        table = reads.decoded
+        ends = None if table is None or len(table.packets) < FEW_IN_RUN else _ends(continues(table.packets))
         at = 0
         while at < len(reads):
             end = at if ends is None else self._steady(reads, at, ends)
@@ -148,25 +151,18 @@ class Conversation:
                 yield reads.at_s[end - 1], [self._take_reads(reads, at, end)]
                 at = end
                 continue
-            if reads.paused[at]:
-                self.doubt(reads.at_s[at])
-            self._noticed = reads.at_s[at]
+            now = reads.at_s[at]
+            if reads.paused(at):
+                self.doubt(now)
+            self._noticed = now
             decoded = reads.decoded_at(at) if self.decodes == reads.decodes else None
-            yield reads.at_s[at], self.receive_runs(reads.data_of(at), reads.at_s[at], decoded)
+            yield now, self.receive_runs(reads.data_of(at), now, decoded)
             at += 1
 
     def lost_track(self, rest: bytes, missing: int) -> None:
         """So many bytes came and are gone; the next read completes this packet."""
         self._rest = rest
         self.stats.bytes += missing
-
-    @property
-    def decodes(self) -> tuple[Widths, bytes] | None:
-        """What frames are decoded with, and what their check begins with; None where they come only one by one."""
-        widths = self._widths
-        if widths is None or not widths.report.zones or widths.sheet.ghosts:
-            return None
-        return widths, self._before()
 
     def steady(self) -> tuple[float, ...] | None:
         """What :attr:`Timeline.last` says of the last frame, what :meth:`ClockFit.bounds` says, and what a byte takes on
@@ -188,9 +184,12 @@ class Conversation:
         line = fit.line_from(line_s, arrived_s)
         return Zones(frame, self._widths.sheet, time_us, before, line, faults, self.units.history)
 
-    def noticed(self, now: float) -> None:
-        """Someone else sees to it that nobody pauses for long (:meth:`doubt`), and did until now."""
+    def pass_time(self, now: float, paused: bool) -> None:
+        """Nothing came until now. Who reads sees to it that nobody ``paused`` for long, as :meth:`doubt` wants."""
+        if paused:
+            self.doubt(now)
         self._noticed = now
+        self._requests.poll(now, hello=not self._timeline.known)
 
     def _split(self, data: bytes, now: float) -> list[bytes]:
         self.stats.bytes += len(data)
@@ -207,8 +206,7 @@ class Conversation:
         end = reads.last_within(at, ends[first + 1] if first + 1 < len(ends) else first)
         if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.decodes != reads.decodes:
             return at
-        fit = self._clock.fit
-        if not self._requests.idle or self.lines.fading or (fit is not None and fit.bounds() is None):
+        if not self._requests.idle or self.lines.fading or not self._clock.begun:
             return at
         assert reads.decoded is not None
         valid, time_us, _, heard, *_ = reads.decoded.packets[first].item()
@@ -349,7 +347,7 @@ class Conversation:
         self.stats.foreign_version += 1
         if not old.hello:
             return None
-        self.hello = self.sheet = self._widths = None
+        self.hello = self.sheet = self._widths = self.decodes = None
         self._timeline = Timeline(self.stats, self._live)
         self._clock.forget()
         return VersionMismatch(
@@ -367,7 +365,13 @@ class Conversation:
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
             told = self._reader.take(plain)
-            return None if told is None else self._take_hello(told, now)
+            if told is None:
+                return None
+            event = self._take_hello(told, now)
+            widths = self._widths
+            many_at_once = widths is not None and widths.report.zones and not widths.sheet.ghosts
+            self.decodes = (widths, self._before()) if widths is not None and many_at_once else None
+            return event
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):
             return self._take_lines(plain, hello)

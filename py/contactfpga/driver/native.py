@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga.driver import forks
-from contactfpga.driver.reads import Reads
+from contactfpga.driver.reads import Read, Reads
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import FIELDS, PacketTable
 from contactfpga.zones.run import frame_of
@@ -28,11 +28,9 @@ LIBRARY = Path(__file__).with_name("_reader.so")
 
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
-_READ = np.dtype([("at_s", "f8"), ("bytes", "u8"), ("packets", "u8"), ("records", "u8"), ("odd", "u8")])
-_PAUSED, _NOISE = 1, 2
+_READS = np.dtype([(name, np.float64 if name == "at_s" else np.int64) for name in Read._fields])
 _NEWEST = struct.Struct("Qqqdd")
 _FRAME = struct.Struct("?7x8q")
-_FIELDS = len(FIELDS.names or ())
 
 
 class Sheet(ctypes.Structure):
@@ -224,36 +222,29 @@ class Port:
         memory = np.empty(size, np.uint8)
         self._library.take(self._address, memory.ctypes.data, size)
         count, packets, records, length, partial, gap, first_packet, first_byte = _TAKEN.unpack_from(memory)
-        place = _TAKEN.size
-
-        def part(items: int, kind: Any) -> np.ndarray:
-            nonlocal place
-            found = memory[place : place + items * np.dtype(kind).itemsize].view(kind)
-            place += items * np.dtype(kind).itemsize
-            return found
-
-        read, fields, starts, sizes = (
-            part(items, kind) for items, kind in ((count, _READ), (packets, FIELDS), (packets + 1, "i8"), (packets, "i8"))
-        )
-        carried = part(records * self._columns, "i8").reshape(-1, self._columns)
-        begun = memory[place : place + partial].tobytes()
-        data = memory[place + partial : place + partial + length].tobytes()
-        table = None if self._decodes is None else PacketTable(fields, starts, carried)
-        reads = Reads(
-            read["at_s"],
-            read["bytes"] - np.uint64(first_byte),
-            (read["packets"] - np.uint64(first_packet)).astype(np.int64),
-            read["odd"] & _PAUSED > 0,
-            read["odd"] & _NOISE > 0,
-            data,
+        columns = self._columns
+        reads = _TAKEN.size
+        fields = reads + count * _READS.itemsize
+        starts = fields + packets * FIELDS.itemsize
+        sizes = starts + (packets + 1) * _WORD
+        carried = sizes + packets * _WORD
+        begun = carried + records * columns * _WORD
+        data, end = begun + partial, begun + partial + length
+        table = None
+        if self._decodes is not None:
+            rows = memory[carried:begun].view(np.int64).reshape(-1, columns)
+            table = PacketTable(memory[fields:starts].view(FIELDS), memory[starts:sizes].view(np.int64), rows)
+        found = Reads(
+            Read(0.0, first_byte, first_packet, 0, 0),
+            memory[reads:fields].view(_READS).tolist(),
+            memory[data:end].tobytes(),
             self._decodes,
             table,
-            sizes,
+            memory[sizes:carried].view(np.int64),
         )
-        self.taken = first_packet + packets
         missing = first_byte - self._bytes if gap else 0
-        self._bytes = first_byte + length
-        return reads, begun, missing
+        self.taken, self._bytes = first_packet + packets, first_byte + length
+        return found, memory[begun:data].tobytes(), missing
 
     # ---- the newest frame
 

@@ -58,6 +58,7 @@ class NativeLink(Link):
         self._port, self._core = port, port.core
         self._record = transport.take if isinstance(transport, RecordingTransport) else None
         self._settled = self._taking = False
+        self._ahead: set[FrameQueue] = set()  # of which frames were shown before they were taken
         self._shown: tuple[int, Frame | None] = 0, None  # number and frame of what was shown last
         super().__init__(transport, skin)
 
@@ -88,13 +89,10 @@ class NativeLink(Link):
                 return
             self._taking = True
             try:
-                while (found := self._core.take()) is not None:
+                if (found := self._core.take()) is not None:
                     self._take_reads(*found)
-                now, said = self.transport.clock(), self._said
-                if self._core.paused(now):
-                    said.doubt(now)
-                said.noticed(now)
-                said.receive_runs(b"", now)
+                now = self.transport.clock()
+                self._said.pass_time(now, self._core.paused(now))
             finally:
                 self._taking = False
             if self._failure is None and (failure := self._core.failure):
@@ -113,8 +111,9 @@ class NativeLink(Link):
                 if isinstance(event, (Arrival, Run, ContactFPGAError)):
                     self._last_s = at_s
         self._core.decode(said.decodes)
-        for queue in self._queues:
+        for queue in self._ahead:
             queue.ahead = 0
+        self._ahead.clear()
 
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
         with self.changed:
@@ -186,6 +185,7 @@ class NativeLink(Link):
             return None
         queue.clear()
         queue.ahead = found.packets - core.taken
+        self._ahead.add(queue)
         frame, before = core.frame(), None
         if found.before:
             known, shown = self._shown
