@@ -2,6 +2,7 @@
 
 import random
 
+from contactfpga.driver import native
 from contactfpga.driver.link import Link
 from contactfpga.driver.native import Port
 from contactfpga.driver.native_link import NativeLink
@@ -54,15 +55,25 @@ class Pair:
 
     def take(self, data):
         """Both get these bytes; the native one does not look at them yet."""
+        for start in range(0, len(data), native.CHUNK):
+            piece = data[start : start + native.CHUNK]
+            self._take(piece)
+            self.native._core.feed(piece, self.now)
+
+    def pass_time(self):
+        """Nothing came until now."""
+        self._take(b"")
+        self.native.catch_up()
+        self.native._send()
+
+    def _take(self, data):
         with self.thread.changed:
             self.thread._take(data)
         self.thread._send()
-        self.native._core.feed(data, self.now)
 
     def sent(self):
         """What both sent to the board since the last call, which is the same."""
-        self.native.catch_up()
-        self.native._send()
+        self.pass_time()
         first, second = (line.sent for line in self.lines)
         assert first == second
         for line in self.lines:

@@ -26,6 +26,9 @@ from contactfpga.zones.run import frame_of
 LIBRARY = Path(__file__).with_name("_reader.so")
 """Where installing puts the library."""
 
+CHUNK = 16_384
+"""Bytes of a read, at most."""
+
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
 _READS = np.dtype([(name, np.float64 if name == "at_s" else np.int64) for name in Read._fields])
@@ -166,7 +169,7 @@ class Port:
             self._library.wake(self._address)
 
     def feed(self, data: bytes, now: float) -> None:
-        """These bytes came."""
+        """These bytes came, at most :data:`CHUNK`."""
         self._library.feed(self._address, data, len(data), now)
 
     def wait(self, packets: int, seconds: float) -> None:

@@ -108,7 +108,7 @@ class NativeLink(Link):
         for at_s, events in said.receive_reads(reads):
             for event in events:
                 self._pass_on(event)
-                if isinstance(event, (Arrival, Run, ContactFPGAError)):
+                if isinstance(event, (Arrival, Run)):
                     self._last_s = at_s
         self._core.decode(said.decodes)
         for queue in self._ahead:
