@@ -548,6 +548,12 @@ void cfpga_take(port *p, uint8_t *out, size_t room) {
         if (size_of(p, &from, told.reads + 1, next) > room) break;
         to = *next;
     }
+    if (!told.reads) { /* reads were overwritten since cfpga_waiting, and it says more now */
+        told.partial = told.gap = 0;
+        memcpy(out, &told, sizeof told);
+        pthread_mutex_unlock(&p->lock);
+        return;
+    }
     told.packets = to.packets - from.packets;
     told.records = to.records - from.records;
     told.bytes = to.bytes - from.bytes;

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga.driver import forks
+from contactfpga.driver.address import Serial, parse
 from contactfpga.driver.reads import Read, Reads
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import FIELDS, PacketTable
@@ -132,11 +133,18 @@ def missing() -> str:
     return ""
 
 
+def refusal(port: object) -> str:
+    """Why the thread in C cannot read a port; empty where it can."""
+    if not isinstance(port, str) or not isinstance(parse(port), Serial):
+        return "only the bytes of a serial port come by themselves, from a descriptor that C can read"
+    return missing()
+
+
 class Port:
     """A port that the thread reads; with a descriptor of -1 it gets what :meth:`feed` gives."""
 
     def __init__(self, descriptor: int, now: float):
-        self._library = library()
+        self._library, self._inherited = library(), False
         self._address = self._library.open(descriptor, now)
         if not self._address:
             raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
@@ -145,8 +153,8 @@ class Port:
         self.taken = 0
         """Packets that were taken, and those that were overwritten before."""
         self._bytes = 0  # the same
-        self._inherited = False
-        self._base, self._newest = Base(), np.zeros(0, np.uint8)
+        self._base = Base()
+        self._make_room()
         forks.watch(self)
 
     def forked(self) -> None:
@@ -154,18 +162,22 @@ class Port:
         self._inherited = True
 
     def __del__(self) -> None:
-        if getattr(self, "_address", None) and not self._inherited:
-            self._library.close(self._address)
-            self._library.free(self._address)
+        if self._mine():
+            address, self._address = self._address, None  # what ends with it may still call wake() or close()
+            self._library.close(address)
+            self._library.free(address)
+
+    def _mine(self) -> bool:
+        return bool(getattr(self, "_address", None)) and not self._inherited
 
     def close(self) -> None:
         """Read no more; who waits goes on. May be called twice."""
-        if not self._inherited:
+        if self._mine():
             self._library.close(self._address)
 
     def wake(self) -> None:
         """Who waits goes on, now and later."""
-        if not self._inherited:
+        if self._mine():
             self._library.wake(self._address)
 
     def feed(self, data: bytes, now: float) -> None:
@@ -209,11 +221,17 @@ class Port:
                 int.from_bytes(before, "little"),
             )
             self._columns, self._room = len(widths.record_bits), widths.max_items
+        else:
+            self._columns = 3
+        self._make_room()
+        self._library.sheet(self._address, ctypes.byref(told))
+        self._decodes = decodes
+
+    def _make_room(self) -> None:
+        """For the newest frame and the one before it."""
         self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
         self._newest_words = self._newest.view(np.int64)
         self._newest_at = self._newest.ctypes.data
-        self._library.sheet(self._address, ctypes.byref(told))
-        self._decodes = decodes
 
     # ---- what came
 
@@ -225,6 +243,8 @@ class Port:
         memory = np.empty(size, np.uint8)
         self._library.take(self._address, memory.ctypes.data, size)
         count, packets, records, length, partial, gap, first_packet, first_byte = _TAKEN.unpack_from(memory)
+        if not count:
+            return None
         columns = self._columns
         reads = _TAKEN.size
         fields = reads + count * _READS.itemsize

@@ -130,7 +130,7 @@ class NativeLink(Link):
     # ---- who waits
 
     def wait_for(self, found: Callable[[], Result | None], deadline: float, timeout: float) -> Result:
-        start = -1
+        start = self._said.stats.bytes
         while True:
             with self.changed:
                 self.check_open()
@@ -140,13 +140,12 @@ class NativeLink(Link):
                 if (result := found()) is not None:
                     return result
                 left, seen = self._left(deadline, timeout, start), self._core.taken
-                start = max(start, self._said.stats.bytes)
             self._send()
             self._core.wait(seen, min(left, READ_S))
 
     def _left(self, deadline: float, timeout: float, start: int) -> float:
-        """Seconds until the deadline; raises what :meth:`wait_for` does where nothing may come by then. ``start``: of
-        the bytes that had come when it began to wait; -1: all."""
+        """Seconds until the deadline; raises what :meth:`wait_for` does where nothing can come by then. ``start``:
+        bytes that had come when it began to wait."""
         if self._failure is not None:
             raise self._failure.with_traceback(None)
         if (left := deadline - self.transport.clock()) > 0:
@@ -159,7 +158,7 @@ class NativeLink(Link):
             self.catch_up()
 
     def newest(self, queue: FrameQueue, timeout: float) -> Zones | None:
-        deadline, start = self.clock() + timeout, -1
+        deadline, start = self.clock() + timeout, self._said.stats.bytes
         while True:
             with self.changed:
                 self.check_open()
@@ -171,7 +170,6 @@ class NativeLink(Link):
                 if queue:
                     return None
                 left, seen = self._left(deadline, timeout, start), self._core.taken + queue.ahead
-                start = max(start, self._said.stats.bytes)
             self._core.wait(seen, min(left, READ_S))
 
     def _newest(self, queue: FrameQueue) -> Zones | None:
