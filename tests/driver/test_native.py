@@ -191,8 +191,8 @@ def test_what_it_cannot_read_is_refused(port):
     with pytest.raises(contactfpga.AddressError) as caught:
         contactfpga.open(port, reader="native")
     assert str(caught.value) == (
-        f"{port}: reader='native' cannot read it: only the bytes of a serial port come by themselves, from a descriptor "
-        "that C can read; leave reader out"
+        f"{port}: reader='native' cannot read it: only the bytes of a serial port come by themselves, "
+        "from a descriptor that C can read; leave reader out"
     )
 
 

@@ -134,8 +134,7 @@ class Newest:
         self.seen = self.shown = 0
 
     def step(self):
-        thread, fast = self.links
-        found = [self.taken(self.queues[0]), self.newest(fast, self.queues[1])]
+        found = [self.taken(self.queues[0]), self.newest(self.links[1], self.queues[1])]
         assert told(found[0]) == told(found[1])
         self.seen += found[0] is not None
 
@@ -328,9 +327,7 @@ def test_what_the_ring_overwrites_counts_as_lost(pairs):
     assert not stats.unexplained
     left = list(iter(queue.pop, None))
     assert len(left) == stats.frames
-    assert [zones.time_us for zones in left[-5000:]] == list(
-        range(board.time_us - 5000 * 96, board.time_us, 96)
-    )
+    assert [zones.time_us for zones in left[-5000:]] == list(range(board.time_us - 5000 * 96, board.time_us, 96))
 
 
 def test_a_batch_is_the_same(pairs):

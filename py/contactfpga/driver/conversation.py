@@ -122,9 +122,7 @@ class Conversation:
         self._end(now)
         return events
 
-    def receive_runs(
-        self, data: bytes, now: float, decoded: many.PacketTable | None = None
-    ) -> list[Event | Run]:
+    def receive_runs(self, data: bytes, now: float, decoded: many.PacketTable | None = None) -> list[Event | Run]:
         """The same, but most of many frames come in runs: those that answer no request that none before them does.
         ``decoded``: all packets that ``data`` completes, of the sheet and check of the last hello."""
         packets = self._split(data, now)
@@ -165,8 +163,8 @@ class Conversation:
         self.stats.bytes += missing
 
     def steady(self) -> tuple[float, ...] | None:
-        """What :attr:`Timeline.last` says of the last frame, what :meth:`ClockFit.bounds` says, and what a byte takes on
-        the wire in s; None where a frame that continues the last one might change anything else than counters."""
+        """What :attr:`Timeline.last` says of the last frame, what :meth:`ClockFit.bounds` says, and what a byte takes
+        on the wire in s; None where a frame that continues the last one might change anything else than counters."""
         last, fit = self._timeline.last, self._clock.fit
         bounds = None if fit is None else fit.bounds()
         if last is None or bounds is None or self.lines.fading or self.decodes is None:

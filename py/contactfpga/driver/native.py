@@ -1,8 +1,8 @@
 """The thread in C that reads ports (c/reader.c), by ctypes.
 
-A library of plain C needs no header of Python's and no build for each of its versions; installing compiles it where there
-is a C compiler (hatch_build.py). Calls that wait release the interpreter's lock, the others keep it: so the newest frame
-is copied after a thread that waited has the lock again, and is as new as it can be.
+A library of plain C needs no header of Python's and no build for each of its versions; installing compiles it where
+there is a C compiler (hatch_build.py). Calls that wait release the interpreter's lock, the others keep it: so the newest
+frame is copied after a thread that waited has the lock again, and is as new as it can be.
 """
 
 from __future__ import annotations
@@ -230,6 +230,7 @@ class Port:
     def _make_room(self) -> None:
         """For the newest frame and the one before it."""
         self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
+        self._newest_view = self._newest.data
         self._newest_words = self._newest.view(np.int64)
         self._newest_at = self._newest.ctypes.data
 
@@ -242,7 +243,7 @@ class Port:
             return None
         memory = np.empty(size, np.uint8)
         self._library.take(self._address, memory.ctypes.data, size)
-        count, packets, records, length, partial, gap, first_packet, first_byte = _TAKEN.unpack_from(memory)
+        count, packets, records, length, partial, gap, first_packet, first_byte = _TAKEN.unpack_from(memory.data)
         if not count:
             return None
         columns = self._columns
@@ -286,7 +287,7 @@ class Port:
         found = self._library.newest(self._address, packets, self._newest_at)
         if found < 0:
             raise Unsettled
-        return Newest(*_NEWEST.unpack_from(self._newest)) if found else None
+        return Newest(*_NEWEST.unpack_from(self._newest_view)) if found else None
 
     def frame(self) -> Any:
         """That frame, as it came over the wire."""
@@ -299,10 +300,10 @@ class Port:
     def _frame(self, index: int) -> Any:
         assert self._decodes is not None
         place = _NEWEST.size + index * FIELDS.itemsize
-        fields = _FRAME.unpack_from(self._newest, place)
+        fields = _FRAME.unpack_from(self._newest_view, place)
         start = _NEWEST.size + 2 * FIELDS.itemsize
         if index:
-            start += _FRAME.unpack_from(self._newest, _NEWEST.size)[-1] * self._columns * _WORD
+            start += _FRAME.unpack_from(self._newest_view, _NEWEST.size)[-1] * self._columns * _WORD
         start //= _WORD
         records = self._newest_words[start : start + fields[-1] * self._columns].reshape(-1, self._columns).copy()
         return frame_of(fields, records, self._decodes[0].sheet)

@@ -1,8 +1,8 @@
 """A port that a thread in C reads, and everyone who waits for it: no other thread of Python's has to run first.
 
-That thread notes when bytes came and decodes frames (:mod:`contactfpga.driver.native`). Whoever calls takes what came and
-has the conversation say what it means, as it does for a :class:`~contactfpga.driver.link.Link` with a thread in Python.
-While nobody calls, a thread does so some times a second.
+That thread notes when bytes came and decodes frames (:mod:`contactfpga.driver.native`). Whoever calls takes what came
+and has the conversation say what it means, as it does for a :class:`~contactfpga.driver.link.Link` with a thread in
+Python. While nobody calls, a thread does so some times a second.
 """
 
 from __future__ import annotations

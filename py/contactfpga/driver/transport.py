@@ -123,7 +123,7 @@ class SerialTransport:
 
     def fileno(self) -> int:
         """Its descriptor."""
-        return self._port.fileno()
+        return int(self._port.fileno())
 
     def lost(self, error: Exception) -> PortLost:
         """What is told of a port that is gone."""
