@@ -1,8 +1,8 @@
 """The thread in C that reads ports (c/reader.c), by ctypes.
 
 A library of plain C needs no header of Python's and no build for each of its versions; installing compiles it where
-there is a C compiler (hatch_build.py). Calls that wait release the interpreter's lock, the others keep it: so the newest
-frame is copied after a thread that waited has the lock again, and is as new as it can be.
+there is a C compiler (hatch_build.py). Calls that wait release the interpreter's lock, the others keep it: so the
+newest frame is copied after a thread that waited has the lock again, and is as new as it can be.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ CHUNK = 16_384
 
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
-_READS = np.dtype([(name, np.float64 if name == "at_s" else np.int64) for name in Read._fields])
+_READ = struct.Struct("d4q")
 _NEWEST = struct.Struct("Qqqdd")
 _FRAME = struct.Struct("?7x8q")
 
@@ -248,7 +248,7 @@ class Port:
             return None
         columns = self._columns
         reads = _TAKEN.size
-        fields = reads + count * _READS.itemsize
+        fields = reads + count * _READ.size
         starts = fields + packets * FIELDS.itemsize
         sizes = starts + (packets + 1) * _WORD
         carried = sizes + packets * _WORD
@@ -256,19 +256,20 @@ class Port:
         data, end = begun + partial, begun + partial + length
         table = None
         if self._decodes is not None:
-            rows = memory[carried:begun].view(np.int64).reshape(-1, columns)
-            table = PacketTable(memory[fields:starts].view(FIELDS), memory[starts:sizes].view(np.int64), rows)
-        found = Reads(
+            rows = np.frombuffer(memory, np.int64, records * columns, carried).reshape(-1, columns)
+            found = np.frombuffer(memory, FIELDS, packets, fields)
+            table = PacketTable(found, np.frombuffer(memory, np.int64, packets + 1, starts), rows)
+        came = Reads(
             Read(0.0, first_byte, first_packet, 0, 0),
-            memory[reads:fields].view(_READS).tolist(),
+            list(_READ.iter_unpack(memory.data[reads:fields])),
             memory[data:end].tobytes(),
             self._decodes,
             table,
-            memory[sizes:carried].view(np.int64),
+            np.frombuffer(memory, np.int64, packets, sizes),
         )
         missing = first_byte - self._bytes if gap else 0
         self.taken, self._bytes = first_packet + packets, first_byte + length
-        return found, memory[begun:data].tobytes(), missing
+        return came, memory[begun:data].tobytes(), missing
 
     # ---- the newest frame
 
