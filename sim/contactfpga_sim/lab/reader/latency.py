@@ -1,4 +1,4 @@
-"""From the last byte to user code, with a thread or a process that reads, beside a C program on the same line."""
+"""From the last byte to user code, with a thread in C or in Python that reads, beside a C program on the same line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ENDED_S = 0.8
 """A stream has ended when no frame came for so long."""
 BEGUN = 20
 """Frames after which a stream has begun; a few come while the board makes the others."""
-READERS = ("thread", "process")
+READERS = ("native", "thread")
 
 
 class Found(NamedTuple):
