@@ -1,13 +1,14 @@
 /* reader.c: reads the ports of boards in a thread of its own, for py/contactfpga/driver/native.py.
  *
- * One thread reads all ports of a process. It notes when bytes came, decodes the packets that are whole frames of a
+ * One thread reads all ports of a process; who waits for a port reads it meanwhile, which saves a change of threads. It
+ * notes when bytes came, decodes the packets that are whole frames of a
  * known sheet, and keeps both in rings, of which the oldest reads are overwritten. What a packet means is for the Python
  * driver to say. It takes what came when it likes; meanwhile the newest frame can be had as long as every packet since
  * continues the frame before it, which is what the driver itself would find (struct base).
  *
  * C99 and POSIX threads. All memory is allocated in cfpga_open. Every function may be called by several threads.
  */
-#define _POSIX_C_SOURCE 200809L
+#define _GNU_SOURCE /* ppoll */
 #define _DARWIN_C_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -92,6 +93,9 @@ typedef struct {
     pthread_mutex_t lock;
     pthread_cond_t came, full; /* a packet came; much came */
     int waiting, patient;      /* threads that wait for either */
+    bool polling, left_out;    /* a thread that waits reads; so the hub does not */
+    int wake[2];               /* ends the poll of that thread */
+    uint8_t *data;             /* of its reads */
     contactfpga_reader decoder;
     bool known;
     unsigned columns; /* of a record */
@@ -298,30 +302,26 @@ static void wake_all(port *p) {
 
 /* ---- the thread ---- */
 
-static void read_port(port *p, double at_s) {
-    ssize_t count = read(p->descriptor, hub.data, sizeof hub.data);
-    int failure = count < 0 ? errno : -1;
-    pthread_mutex_lock(&p->lock);
+/* Read once; the port's lock is held. */
+static void read_port(port *p, uint8_t *data) {
+    ssize_t count = read(p->descriptor, data, CHUNK);
     if (count > 0) {
-        feed(p, hub.data, (size_t)count, at_s);
-    } else if (failure != EAGAIN && failure != EINTR) {
-        p->failure = failure;
+        feed(p, data, (size_t)count, now_s());
+    } else if (!count || (errno != EAGAIN && errno != EINTR)) {
+        p->failure = count ? errno : -1;
         wake_all(p);
     }
-    pthread_mutex_unlock(&p->lock);
 }
 
 static void serve(int count) {
     double at_s = now_s();
     for (int i = 0; i < count; i++) {
         port *p = hub.ports[i];
-        if (hub.polled[i + 1].revents) {
-            read_port(p, at_s = now_s());
-        } else {
-            pthread_mutex_lock(&p->lock);
-            notice(p, at_s);
-            pthread_mutex_unlock(&p->lock);
-        }
+        pthread_mutex_lock(&p->lock);
+        if (!hub.polled[i + 1].revents) notice(p, at_s);
+        else if (p->polling) p->left_out = true;
+        else read_port(p, hub.data);
+        pthread_mutex_unlock(&p->lock);
     }
 }
 
@@ -332,8 +332,12 @@ static void *run(void *nothing) {
         int count = hub.count;
         uint64_t changes = hub.changes;
         hub.polled[0] = (struct pollfd){hub.wake[0], POLLIN, 0};
-        for (int i = 0; i < count; i++)
-            hub.polled[i + 1] = (struct pollfd){hub.ports[i]->failure ? -1 : hub.ports[i]->descriptor, POLLIN, 0};
+        for (int i = 0; i < count; i++) {
+            port *p = hub.ports[i];
+            pthread_mutex_lock(&p->lock);
+            hub.polled[i + 1] = (struct pollfd){p->failure || p->left_out ? -1 : p->descriptor, POLLIN, 0};
+            pthread_mutex_unlock(&p->lock);
+        }
         pthread_mutex_unlock(&hub.lock);
         int ready = poll(hub.polled, (nfds_t)count + 1, count ? 1000 : -1);
         pthread_mutex_lock(&hub.lock);
@@ -352,18 +356,24 @@ static void wake_thread(void) {
     (void)ignored; /* where there is no room, it is woken already */
 }
 
+static int make_pipe(int ends[2]) {
+    if (pipe(ends)) return errno;
+    for (int i = 0; i < 2; i++) {
+        fcntl(ends[i], F_SETFD, FD_CLOEXEC);
+        fcntl(ends[i], F_SETFL, O_NONBLOCK);
+    }
+    return 0;
+}
+
 static int start(void) {
     pthread_t thread;
     sigset_t all, before;
-    if (pipe(hub.wake)) return errno;
-    for (int i = 0; i < 2; i++) {
-        fcntl(hub.wake[i], F_SETFD, FD_CLOEXEC);
-        fcntl(hub.wake[i], F_SETFL, O_NONBLOCK);
-    }
+    int failure = make_pipe(hub.wake);
+    if (failure) return failure;
     make_condition(&hub.turned);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    int failure = pthread_create(&thread, NULL, run, NULL);
+    failure = pthread_create(&thread, NULL, run, NULL);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (failure) {
         close(hub.wake[0]);
@@ -390,9 +400,11 @@ static int add(port *p) {
 /* ---- what Python calls ---- */
 
 void cfpga_free(port *p) {
+    for (int i = 0; i < 2 && p->descriptor >= 0; i++) close(p->wake[i]);
     pthread_mutex_destroy(&p->lock);
     pthread_cond_destroy(&p->came);
     pthread_cond_destroy(&p->full);
+    free(p->data);
     free(p->bytes);
     free(p->packets);
     free(p->records);
@@ -407,25 +419,36 @@ port *cfpga_open(int descriptor, double at_s) {
     pthread_mutex_init(&p->lock, NULL);
     make_condition(&p->came);
     make_condition(&p->full);
+    p->data = malloc(CHUNK);
     p->bytes = malloc(BYTES);
     p->packets = malloc(PACKETS * sizeof *p->packets);
     p->records = malloc(RECORDS * 4 * sizeof *p->records);
     p->reads = malloc(READS * sizeof *p->reads);
-    p->descriptor = descriptor;
+    p->descriptor = -1;
     p->noticed_s = at_s;
-    int failure = p->bytes && p->packets && p->records && p->reads ? 0 : ENOMEM;
-    if (!failure && descriptor >= 0) failure = add(p);
+    int failure = p->data && p->bytes && p->packets && p->records && p->reads ? 0 : ENOMEM;
+    if (!failure && descriptor >= 0 && !(failure = make_pipe(p->wake))) {
+        p->descriptor = descriptor;
+        failure = add(p);
+    }
     if (!failure) return p;
     cfpga_free(p);
     errno = failure;
     return NULL;
 }
 
+static void end_waits(port *p) {
+    p->closing = true;
+    wake_all(p);
+    ssize_t ignored = p->descriptor < 0 ? 0 : write(p->wake[1], "", 1);
+    (void)ignored; /* where there is no room, it is woken already */
+}
+
 /* Read no more: the descriptor may be closed when this returns. Whoever waits goes on. May be called twice. */
 void cfpga_close(port *p) {
     pthread_mutex_lock(&p->lock);
-    p->closing = true;
-    wake_all(p);
+    end_waits(p);
+    while (p->polling) pthread_cond_wait(&p->came, &p->lock);
     pthread_mutex_unlock(&p->lock);
     pthread_mutex_lock(&hub.lock);
     for (int i = 0; i < hub.count; i++) {
@@ -475,6 +498,35 @@ void cfpga_sheet(port *p, const sheet *told) {
     pthread_mutex_unlock(&p->lock);
 }
 
+static void poll_until(struct pollfd *polled, nfds_t count, double until_s) {
+    double left_s = until_s - now_s();
+    if (left_s < 0) left_s = 0;
+#ifdef __linux__
+    struct timespec left = {(time_t)left_s, (long)((left_s - floor(left_s)) * 1e9)};
+    ppoll(polled, count, &left, NULL);
+#else
+    poll(polled, count, (int)ceil(left_s * 1e3));
+#endif
+}
+
+/* Read until there are more packets than these, in the place of the hub. The port's lock is held, but not while it
+ * waits. */
+static void read_until(port *p, uint64_t packets, double until_s) {
+    p->polling = true;
+    while (!p->closing && !p->failure && p->head.packets <= packets && now_s() < until_s) {
+        struct pollfd polled[] = {{p->descriptor, POLLIN, 0}, {p->wake[0], POLLIN, 0}};
+        pthread_mutex_unlock(&p->lock);
+        poll_until(polled, 2, until_s);
+        pthread_mutex_lock(&p->lock);
+        if (polled[0].revents && !p->closing) read_port(p, p->data);
+        else notice(p, now_s());
+    }
+    p->polling = false;
+    if (p->left_out) wake_thread();
+    p->left_out = false;
+    pthread_cond_broadcast(&p->came); /* another thread may wait, or have to close */
+}
+
 /* Wait until there are more packets than these, or with ``patient`` until much has come; at most so long, and not where
  * the port is closed or lost. */
 void cfpga_wait(port *p, uint64_t packets, int patient, double seconds) {
@@ -483,8 +535,10 @@ void cfpga_wait(port *p, uint64_t packets, int patient, double seconds) {
     int *count = patient ? &p->patient : &p->waiting;
     ++*count;
     while (!p->closing && !p->failure && now_s() < until_s
-        && !(patient ? quarters(p) : p->head.packets > packets))
-        wait_until(patient ? &p->full : &p->came, &p->lock, until_s);
+        && !(patient ? quarters(p) : p->head.packets > packets)) {
+        if (!patient && p->descriptor >= 0 && !p->polling) read_until(p, packets, until_s);
+        else wait_until(patient ? &p->full : &p->came, &p->lock, until_s);
+    }
     --*count;
     pthread_mutex_unlock(&p->lock);
 }
@@ -492,8 +546,7 @@ void cfpga_wait(port *p, uint64_t packets, int patient, double seconds) {
 /* Whoever waits goes on, now and later. */
 void cfpga_wake(port *p) {
     pthread_mutex_lock(&p->lock);
-    p->closing = true;
-    wake_all(p);
+    end_waits(p);
     pthread_mutex_unlock(&p->lock);
 }
 
