@@ -74,7 +74,15 @@ def by_python(packet, widths, before):
 
 def fields(frame):
     records = frame.moments if frame.barycenters is None else frame.barycenters
-    plain = (frame.sequence, frame.time_us, sorted(frame.flags), frame.overwritten, frame.heard, frame.zones, frame.cells)
+    plain = (
+        frame.sequence,
+        frame.time_us,
+        sorted(frame.flags),
+        frame.overwritten,
+        frame.heard,
+        frame.zones,
+        frame.cells,
+    )
     return *plain, records.tolist()
 
 

@@ -21,7 +21,7 @@ from terminals import environment
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.driver import driver, native
+from contactfpga.driver import driver, health, native
 from contactfpga.driver.native_link import NativeLink
 
 pytestmark = pytest.mark.skipif(bool(native.missing()), reason=native.missing())
@@ -35,6 +35,9 @@ def opened(board, **options):
 def test_frames_come_in_every_way(board):
     with opened(board) as host:
         assert isinstance(host._link, NativeLink), "this tests a thread in Python"
+        assert [found.sentence for found in health.reader(host)] == [
+            f"{board.path} is read in C, which waits for no Python thread"
+        ]
         assert len(host.next(LONG)) == 1
         first, second = host.read(LONG), host.read(LONG)
         assert second.time_us > first.time_us
@@ -206,6 +209,11 @@ def test_without_the_library_a_thread_in_python_reads(board, monkeypatch, tmp_pa
     with contactfpga.open(board.path, timeout=LONG) as host:
         assert not isinstance(host._link, NativeLink)
         assert len(host.read(LONG)) == 1
+        (found,) = health.reader(host)
+        assert found.verdict == "note"
+        assert found.sentence.startswith(
+            f"{board.path} is read in Python, not in C: it was installed without a C compiler"
+        )
     with pytest.raises(contactfpga.AddressError, match="installed without a C compiler; install one, then the package"):
         opened(board)
 

@@ -105,9 +105,9 @@ def hello(board: Board) -> Iterator[Finding]:
 def reader(board: Board) -> Iterator[Finding]:
     """Who reads the port."""
     if why := native.refusal(board.port):
-        yield Finding("note", f"{board.port} is read by a thread in Python, not in C: {why}")
+        yield Finding("note", f"{board.port} is read in Python, not in C: {why}")
     else:
-        yield Finding("ok", f"{board.port} is read by a thread in C, which waits for no other Python thread")
+        yield Finding("ok", f"{board.port} is read in C, which waits for no Python thread")
 
 
 def clock(board_s: float, host_s: float) -> Iterator[Finding]:

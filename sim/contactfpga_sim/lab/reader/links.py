@@ -70,4 +70,3 @@ def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str,
     if not 0 <= place < len(feeder.written_s) or arrived_s is None:
         return 0.0
     return time.monotonic() - feeder.written_s[place]
-
