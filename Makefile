@@ -48,7 +48,7 @@ test: $(VENV)/.stamp-test | compiler ## run the quick tests, in some minutes; wi
 test-all: $(VENV)/.stamp-test | compiler ## run the slow tests, too, and write what became of each into build/tests.xml
 	$(PY) -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder -m "not campaign" --junitxml build/tests.xml $(ARGS)
 
-verification: $(VENV)/.stamp-test ## write docs/verification.md from tests/claims.toml
+verification: $(VENV)/.stamp-test ## write docs/verification.md and its list of claims from tests/claims.toml
 	$(PY) scripts/verification.py
 
 # Said before anything is installed.

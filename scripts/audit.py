@@ -1,6 +1,6 @@
 """``make audit SEED=n``: draws what the pages claim by a seed of yours, and looks whether it is so.
 
-Ten claims of docs/verification.md are drawn, and their tests run without those of the campaign. Ten tables of the pages
+Ten claims of tests/claims.toml are drawn, and their tests run without those of the campaign. Ten tables of the pages
 are drawn, of those of which a part takes seconds to make, and that part is made anew and compared with the page. Ten
 mutants of the gateware of one Skin are drawn and simulated: stimuli that are compared with the golden model tell each
 of them from the gateware, or a proof says that it changes nothing. The result is a page, build/audit.md. The status is

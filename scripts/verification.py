@@ -1,4 +1,5 @@
-"""Writes docs/verification.md from tests/claims.toml; with ``--results`` judges the claims by a run instead.
+"""Writes docs/verification.md and its list of claims from tests/claims.toml; with ``--results`` judges the claims by a
+run instead.
 
 tests/claims.toml lists what is claimed and the tests that show it. A claim whose tests are missing, skipped or failed
 in the run is an error. Only where it ``needs`` something that the machine lacks may they be skipped. A test says how
@@ -6,6 +7,8 @@ many cases it ran with ``record_property("cases", n)``; one that says nothing co
 """
 
 import argparse
+import csv
+import io
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -15,12 +18,47 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "verification.md"
 
+CLAIMS = ROOT / "docs" / "tables" / "verification.csv"
+
 HEAD = """# Verification
 
-What is claimed, and the tests that show it. CI runs `make test-all` and fails when a test named here fails, is missing
-or is skipped; `make test` runs a share of these tests that takes a few minutes. Where *command* is another one, it runs
-more cases than `make test-all`. `make verification` writes this page from `tests/claims.toml`.
+For people who doubt this project or change it: how far its parts were checked, and where each claim has its tests. You
+do not need it to use a sheet. To decide whether to trust a figure, read [Status](status.md).
 
+## What was compared with what
+
+| part | compared with | on what |
+|---|---|---|
+| golden model | scipy and OpenCV, which share no code with it | all frames of small sheets, recordings, random frames |
+| gateware, simulated | the golden model, in each clock, at each stage | all options in pairs, sheets of the pages |
+| gateware, proved | its claims, for any input | [small sizes](formal.md) |
+| netlist | the golden model, both output pins in each clock | small sheets on the ECP5 |
+| bitstream | the golden model, in the same way | [small sheets on the iCE40](bitstream.md) |
+| board | nothing: none was programmed | |
+| sheet | its layout files, traced back to the wiring table; nothing was ordered | the kits and other sizes |
+| host | the simulated board's stream, damaged at random | driver, recordings, network, ROS 2 |
+| physics of cover and arm | other integrations, boundary elements, MuJoCo | the [cover](cover.md), the [arm](arm.md) |
+| tests | [faults planted at random](mutants.md) | gateware |
+
+## How to check a claim
+
+- `make audit SEED=7` draws ten claims, ten tables of the pages and ten faults in the gateware by your number, checks
+  each in some minutes and writes one page.
+- `make test` runs the quick tests, in minutes. `make test-all` runs tests of all claims. `make campaign` runs more
+  cases of some of them, in hours.
+- To check one claim, look up its tests in the list. `test_scan::*` is every test of `test_scan.py`, which is in a
+  folder of `tests`:
+
+      python -m pytest tests/gateware/test_scan.py
+
+CI runs `make test-all` and fails when a test of a claim fails, is missing or is skipped. Tests are skipped only where
+the list names a tool that they need and the machine lacks.
+
+## Claims by subject
+
+"""
+FOOT = """
+`make verification` writes this page and the list from `tests/claims.toml`.
 """
 
 
@@ -68,16 +106,29 @@ def matching(test: str, results: dict[str, Outcome]) -> list[Outcome]:
 
 
 def page(claims: dict) -> str:
-    """The page in Markdown."""
-    text = HEAD
+    """The page in Markdown: how many claims a subject has, and what was not verified."""
+    rows = [(section["title"], section["claim"]) for section in claims["section"]]
+    text = HEAD + "| subject | claims | files of tests |\n|---|---|---|\n"
+    for title, listed in rows:
+        files = {test.split("::")[0] for claim in listed for test in claim["tests"]}
+        text += f"| {title} | {len(listed)} | {len(files)} |\n"
+    total = sum(len(listed) for _, listed in rows)
+    text += f"\nThe list has [all {total} claims]({CLAIMS.parent.name}/{CLAIMS.name}), each with its tests.\n"
+    text += "\n## Not verified\n\n| what | because |\n|---|---|\n"
+    return text + "".join(f"| {waived['claim']} | {waived['because']} |\n" for waived in claims["waived"]) + FOOT
+
+
+def listed_claims(claims: dict) -> str:
+    """Each claim with its tests, the command that runs them all, and what a machine may lack for them: lines of a CSV
+    file."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(("subject", "claim", "tests", "command", "needs"))
     for section in claims["section"]:
-        text += f"## {section['title']}\n\n| claim | tests | command |\n|---|---|---|\n"
         for claim in section["claim"]:
-            tests = "<br>".join(f"`{test}`" for test in claim["tests"])
-            text += f"| {claim['claim']} | {tests} | `{claim.get('command', 'make test-all')}` |\n"
-        text += "\n"
-    text += "## Waived\n\n| claim | because |\n|---|---|\n"
-    return text + "".join(f"| {waived['claim']} | {waived['because']} |\n" for waived in claims["waived"])
+            command = claim.get("command", "make test-all")
+            rows.writerow((section["title"], claim["claim"], " ".join(claim["tests"]), command, claim.get("needs", "")))
+    return text.getvalue()
 
 
 def judge(claims: dict, results: dict[str, Outcome]) -> tuple[list[str], list[str]]:
@@ -101,7 +152,8 @@ def main() -> int:
     claims = tomllib.loads((ROOT / "tests" / "claims.toml").read_text())
     if not args.results:
         PAGE.write_text(page(claims))
-        print(f"wrote {PAGE.relative_to(ROOT)}")
+        CLAIMS.write_text(listed_claims(claims))
+        print(f"wrote {PAGE.relative_to(ROOT)} and {CLAIMS.relative_to(ROOT)}")
         return 0
     lines, wrong = judge(claims, read_results(args.results))
     print("cases of each claim:", *lines, sep="\n")

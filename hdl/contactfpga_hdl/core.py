@@ -1,4 +1,4 @@
-"""A Skin's gateware as a part of another design."""
+"""A Skin's gateware as part of another design."""
 
 from typing import ClassVar
 
@@ -15,7 +15,7 @@ STREAM = {"m_axis_tdata": Out(8), "m_axis_tvalid": Out(1), "m_axis_tready": In(1
 
 
 class StreamTop(Top):
-    """A Skin's gateware with ``bytes`` (out), a stream, in place of the transmit pin."""
+    """A Skin's gateware with ``bytes`` (out), a stream, instead of the transmit pin."""
 
     LINE: ClassVar = {"bytes": Out(stream.Signature(8)), "rx": In(1, init=1)}
 
@@ -30,11 +30,12 @@ class StreamTop(Top):
 class Core(wiring.Component):
     """A Skin's gateware between the pins of the sheet and a stream of bytes, in one clock domain.
 
-    The pins of the sheet, ``rx``, ``contact`` and the pins that options add are those of :class:`Top`. ``rx`` takes
-    requests and commands; where it stays high, the board sends what it does by itself.
+    The pins of the sheet, ``rx``, ``contact`` and the pins of options are those of :class:`Top`.
+
+    rx (in): requests and commands; while it stays high, the board sends what it does by itself.
     m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): the packets of docs/protocol.md as an
-    AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A frame that is ready
-    while another one waits takes its place, so the reader may take its time and gets the newest one.
+        AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A newer frame replaces
+        a waiting one, so a slow reader gets the newest.
 
     A Skin with ``dual`` has none: its two copies are compared at the transmit pin.
     """

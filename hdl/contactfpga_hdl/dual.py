@@ -7,21 +7,21 @@ from amaranth.lib.wiring import Out
 from contactfpga.skin import Skin
 
 PAUSE_BITS = 16
-"""Bits of the line for which it is broken, and then for which it rests: more than a byte takes."""
+"""Bits for which the line is broken, and then for which it rests: more than a byte."""
 
 
 class Dual(wiring.Component):
-    """What ``first`` is, as long as ``second`` says the same a clock later.
+    """The gateware ``first``, as long as ``second`` gives the same a clock later.
 
-    Each input reaches ``second`` a clock after ``first``, and it starts a clock later, so that no register of the two
-    ever holds the same by construction and synthesis has nothing to merge. The outputs are those of ``first``, in the
-    same clock, but with ``fail_safe`` ``contact`` a clock later, as copies give it without a register. Two clocks after
-    the first difference at the latest ``tx`` is low, for longer than a byte: the packet on the line ends without its
-    check. Then it rests, both copies start from reset, and the host hears a board that was restarted. With
-    ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart.
+    Each input reaches ``second`` a clock after ``first``, and it starts a clock later, so that no two registers are
+    equal by construction and synthesis cannot merge them. The outputs are those of ``first``, in the same clock, except
+    ``contact`` with ``fail_safe``, a clock later, as copies give it without a register. At most two clocks after the
+    first difference ``tx`` is low, for longer than a byte: the packet on the line ends without its check. Then it
+    rests, both copies start from reset, and the host sees a restarted board. With ``fail_safe`` the pin ``contact`` is
+    high from the difference until a scan after the restart.
 
-    This component keeps no state but the time that a restart takes, which counts itself to its end, and the register
-    at ``contact``, which is written in every clock.
+    The only state here is the restart's counter, which always ends, and the register at ``contact``, written in every
+    clock.
 
     first (component): may have probes, which are passed on.
     second (component): the same without probes.
@@ -62,7 +62,7 @@ class Dual(wiring.Component):
             m.d.comb += [inside.eq(outside), getattr(self.second, name).eq(later)]
 
     def _compare(self, m: Module) -> Value:
-        """High in the clock after one in which the two copies gave different outputs."""
+        """High in the clock after one in which the copies' outputs differ."""
         names = [name for name, member in self.second.signature.members.items() if member.flow == Out]
         said = Cat(getattr(self.first, name) for name in names)
         before = Signal(len(said))
@@ -70,7 +70,7 @@ class Dual(wiring.Component):
         return before != Cat(getattr(self.second, name) for name in names)
 
     def _restart(self, m: Module, differs: Value, breaks: Value, holds: Value) -> Value:
-        """Returns what is high from a difference to the end of the restart."""
+        """Restart both copies; returns a level that is high from a difference to the end of the restart."""
         pause = PAUSE_BITS * self.skin.derived.bit_clocks
         scan = self.skin.derived.frame_clocks
         left = Signal(range(scan + 2 * pause + 1))  # of the restart, in clocks

@@ -1,4 +1,4 @@
-"""What the stages hand to each other."""
+"""Data layouts between the stages."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
@@ -10,13 +10,13 @@ from contactfpga.wire.framing import DIGIT_BITS
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
-    """A sampled row: one bit per column, whether it is the frame's last, and its number where the scan skips rows."""
+    """A sampled row: one bit per column, whether it is the frame's last, and its number if the scan skips rows."""
     number = {"y": row_bits(derived)} if derived.skips else {}
     return data.StructLayout({"cells": derived.skin.columns, "last": 1, **number})
 
 
 def row_bits(derived: Derived) -> int:
-    """Of a row's number."""
+    """Width in bits of a row number."""
     return max(1, (derived.skin.rows - 1).bit_length())
 
 
@@ -28,7 +28,7 @@ def moments_layout(derived: Derived) -> data.StructLayout:
 def zone_layout(derived: Derived) -> data.StructLayout:
     """A zone; with ``report = "moments"`` as bits, lowest first, a zone record on the wire.
 
-    ``turned``, where the sheet's ends meet, counts the cells past the seam: fewer than all, or as many in a ``ring``,
+    ``turned``, for a sheet whose ends meet, counts the cells past the seam: fewer than all, or as many in a ``ring``,
     or all ones in a zone that is ``wound``.
     """
     moments = moments_layout(derived).members
@@ -36,27 +36,27 @@ def zone_layout(derived: Derived) -> data.StructLayout:
 
 
 def record_layout(derived: Derived) -> data.StructLayout:
-    """A zone, or with ``end`` the mark after a frame's last one."""
+    """A zone, or with ``end`` the mark after a frame's last."""
     return data.StructLayout({"zone": zone_layout(derived), "end": 1})
 
 
 def passed_layout(derived: Derived) -> data.StructLayout:
-    """What the audit lets through: items, or zones that are still to be divided."""
+    """Output of the audit: items, or zones still to be divided."""
     return record_layout(derived) if derived.skin.report == "barycenter" else item_layout(derived)
 
 
 def item_layout(derived: Derived) -> data.StructLayout:
-    """A part of a frame that is packed as it comes: a zone record or a bitmap row, or the mark after the last."""
+    """A part of a frame that is packed unchanged: a zone record or a bitmap row, or the mark after the last."""
     return data.StructLayout({"data": 8 * derived.item_bytes, "end": 1})
 
 
 def tag_layout(derived: Derived) -> data.StructLayout:
-    """What the scanner knows of a frame besides its cells; ``slots``, where they differ and the link counts them, are
-    its row times.
+    """The scanner's data of a frame besides its cells; ``slots``, if they vary and the link counts them, are its row
+    times.
 
-    ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
-    the frame before. ``fault``: columns are stuck, or other faults were told. ``motion``, where the scan reads rows, is
-    complete with the frame's last row: one read touched as the frame began, and empty when it was driven.
+    ``heard`` is of the last request before the frame's first sample; ``requested``: it came since the previous frame's.
+    ``fault``: columns are stuck, or other faults were reported. ``motion``, if the scan reads rows, is complete with
+    the frame's last row: a row read touched as the frame began, and empty when driven.
     """
     uneven = not derived.scan.even and not derived.scan.waits
     slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
@@ -66,9 +66,9 @@ def tag_layout(derived: Derived) -> data.StructLayout:
 
 
 def faults_layout(derived: Derived) -> data.StructLayout:
-    """What the scanner of a Skin with ``guard`` or ``self_test`` knows of its lines: rows and columns that are open
-    before their far ends, columns, the guard column last, that read pressed while no row was driven, and whether the
-    self-test found lines or directions that are joined."""
+    """The fault word of a Skin with ``guard`` or ``self_test``: rows and columns open before their far ends; columns,
+    the guard column last, that read pressed while no row was driven; and whether the self-test found joined lines or
+    directions."""
     skin = derived.skin
     lines = {"rows": skin.rows, "columns": skin.columns, "stuck": skin.column_lines} if skin.guard else {}
     return data.StructLayout(lines | ({"joined": 1} if skin.self_test else {}))
@@ -81,7 +81,7 @@ def slots_layout(derived: Derived) -> data.StructLayout:
 
 
 def summary_layout(derived: Derived) -> data.StructLayout:
-    """What a frame's trailer says of it, valid when its end mark is packed."""
+    """A frame's trailer, valid when its end mark is packed."""
     return data.StructLayout(
         {
             "cells": derived.area_bits,
@@ -94,8 +94,7 @@ def summary_layout(derived: Derived) -> data.StructLayout:
 
 
 def row_number(m: Module, derived: Derived, row: data.View, taken: Value) -> Value:
-    """The number of the row on offer: it comes with a row where the scan skips rows, otherwise rows are counted as they
-    are ``taken``."""
+    """The number of the offered row: part of it if the scan skips rows, otherwise counted as rows are ``taken``."""
     if derived.skips:
         return row.y
     y_next = Signal(range(max(2, derived.skin.rows)))
@@ -105,7 +104,7 @@ def row_number(m: Module, derived: Derived, row: data.View, taken: Value) -> Val
 
 
 def labeller_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Rows of cells in, zones out.
+    """Ports of a labeller.
 
     rows (in): a frame's rows in ascending order.
     records (out): its zones, then an end mark.

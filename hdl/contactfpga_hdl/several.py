@@ -1,4 +1,4 @@
-"""Several sheets at one FPGA: a whole chain for each, and one UART."""
+"""Several sheets on one FPGA: a whole chain for each, and one UART."""
 
 from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring
@@ -10,15 +10,14 @@ from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 
 _INSIDE = ("bits", "bytes", "grant", "holds", "contact")
-"""Ports of a sheet's :class:`Top` that do not lead outside."""
+"""Internal ports of a sheet's :class:`Top`."""
 
 
 class SeveralTop(wiring.Component):
-    """A :class:`Top` for each sheet, its pins and probes named as there with the sheet's number after them, as
-    ``row_data_0``; ``tx``, ``rx`` and ``contact`` are shared. ``contact`` is high in the clock after one in
-    which any sheet's is.
+    """A :class:`Top` for each sheet, its pins and probes with the sheet's number appended, as ``row_data_0``; ``tx``,
+    ``rx`` and ``contact`` are shared. ``contact`` is high in the clock after one in which any sheet's is.
 
-    Sheets know nothing of each other but which of them may send. Each keeps its newest frame until then.
+    Sheets share nothing but the right to send. Each keeps its newest frame until then.
     """
 
     def __init__(self, several: Several, probes: bool = False):
@@ -58,7 +57,7 @@ class SeveralTop(wiring.Component):
         return m
 
     def _outside(self):
-        """(number, name, member) of each port of a sheet that leads outside."""
+        """(number, name, member) of each external port of a sheet."""
         for number, sheet in enumerate(self.sheets):
             for name, member in sheet.signature.members.items():
                 if name not in _INSIDE:
@@ -66,11 +65,10 @@ class SeveralTop(wiring.Component):
 
 
 class RoundRobin(wiring.Component):
-    """Grants the line to one sheet after the other. The sheet with the grant may begin a packet, and keeps it
-    to its end; one with nothing to send passes it on in the same clock. So a sheet waits for one packet of each other
-    sheet at most.
+    """Grants the line to the sheets in turn. The sheet with the grant may begin a packet, and keeps it to its end; one
+    with nothing to send passes it on in the same clock. So a sheet waits for at most one packet of each other sheet.
 
-    holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at while it has the grant.
+    holds (in), by sheet: a packet begins in this clock, or does not end in it; only considered with the grant.
     grant (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
     """
 

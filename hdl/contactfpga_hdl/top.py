@@ -1,4 +1,4 @@
-"""The whole chain for one Skin; wiring only."""
+"""The whole chain for one Skin: wiring only."""
 
 from typing import Any, ClassVar, TypeVar
 
@@ -26,26 +26,26 @@ _SHARED_LINE = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "grant
 class Top(wiring.Component):
     """A Skin's gateware between the pins of the sheet and those of the host.
 
-    rows (out), columns (in): one pin per row and column; or in their place those of the shift registers, see
-    :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
+    rows (out), columns (in): one pin per row and column; or those of the shift registers, see
+        :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
     tx (out), rx (in): the UART.
     contact (out): high while something touches the sheet; with units a clock later, and while a threshold is reached;
-    with ``fail_safe`` a clock later, too, and while a fault is known or units have no threshold.
+        with ``fail_safe`` a clock later, too, and while a fault is known or units have no threshold.
     spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, those at their converter.
     alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: see
     :func:`~contactfpga_hdl.probes.probe_ports`.
 
-    Where the scan or the link finds that a register of it flipped by itself, all begins again within two clocks but for
-    what sends bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin
+    If the scan or the link finds that one of its registers flipped by itself, everything except the transmitter
+    restarts within two clocks: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin
     ``contact`` is high until a frame after that is packed.
 
-    A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``, whose ``contact``
+    A Skin with ``dual`` has two copies, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``, whose ``contact``
     is not from a register with ``fail_safe``.
 
-    With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the
-    UART it has ``bits`` (in), ``bytes`` (out), and ``grant`` (in) and ``holds`` (out) of its link.
+    With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): instead of the UART
+    it has ``bits`` (in), ``bytes`` (out), and ``grant`` (in) and ``holds`` (out) of its link.
     """
 
     LINE: ClassVar = {"tx": Out(1, init=1), "rx": In(1, init=1)}
@@ -126,7 +126,7 @@ class Top(wiring.Component):
         connect_lines(m, self.skin, scan.pins, self)
 
     def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
-        """Add what reads requests, and the UART, if it is this sheet's alone."""
+        """Add the request reader, and the UART unless it is shared."""
         if self.place is None:
             m.submodules.transmitter = transmitter = Transmitter(self.derived.bit_clocks)
             receiver = self._put(m, "receiver", receiver_of(self.derived))
@@ -141,8 +141,8 @@ class Top(wiring.Component):
         m.d.comb += [link.grant.eq(self.grant), self.holds.eq(link.holds)]
 
     def _put(self, m: Module, name: str, stage: _Stage) -> _Stage:
-        """Add a stage that begins again when a register is found wrong. The transmitter is none of them, so that the
-        byte on the line is whole and a hello follows it."""
+        """Add a stage that restarts when a register is found wrong. The transmitter is not reset, so that the byte on
+        the line is completed and a hello follows it."""
         m.submodules[name] = stage if self.skin.dual else ResetInserter(self._restarts)(stage)
         return stage
 
@@ -156,7 +156,7 @@ class Top(wiring.Component):
         return units
 
     def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: wiring.Component | None) -> None:
-        """What a fault does to the pins, and what units do."""
+        """Connect the effects of faults on the pins, and the units."""
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
@@ -176,7 +176,7 @@ class Top(wiring.Component):
             m.d.comb += [alive.well.eq(_packed(packer) | watched), alive.fault.eq(fault), self.alive.eq(alive.pin)]
 
     def _blind(self, m: Module, packer: Packer) -> Value:
-        """From a restart until a whole scan after it."""
+        """High from a restart until a whole scan after it."""
         blind = Signal()
         m.d.sync += blind.eq(self._restarts | blind & ~_packed(packer))
         return blind
@@ -204,7 +204,7 @@ class Top(wiring.Component):
         return debounce.rows
 
     def _hand_over(self, m: Module, rows: stream.Interface, taken: stream.Interface, free: Value) -> None:
-        """Where the scan waits, a row waits until it can be counted, too; otherwise rows are never that close."""
+        """If the scan waits, a row also waits until it can be counted; otherwise rows are never that close."""
         if not self.derived.scan.waits:
             wiring.connect(m, rows, taken)
             return
@@ -238,7 +238,7 @@ class Top(wiring.Component):
         return divide.items
 
     def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
-        """Items of a frame's rows as they are, and its summary."""
+        """Items of a frame's rows, unchanged, and its summary."""
         from contactfpga_hdl.report.bitmap import Bitmap
 
         bitmap = self._put(m, "bitmap", Bitmap(self.skin))
@@ -257,7 +257,7 @@ class Top(wiring.Component):
 
 
 def receiver_of(derived: Derived) -> wiring.Component:
-    """What reads the receive pin."""
+    """The reader of the receive pin."""
     if not derived.pulsed:
         return Receiver(derived.bit_clocks)
     from contactfpga_hdl.link.pulses import PulseReceiver
@@ -274,6 +274,6 @@ def _unit_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def _packed(packer: Packer) -> Value:
-    """A frame is packed in this clock, or left out."""
+    """High in a clock in which a frame is packed, or dropped."""
     frames = packer.frames
     return frames.commit | frames.decide & ~frames.verdict.send

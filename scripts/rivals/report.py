@@ -20,7 +20,7 @@ class Row:
     name: str
     checked: Checked
     scrambled_wrong: int | None
-    """Frames that are wrong if words read while they are written are; None: not tried."""
+    """Wrong frames with corrupted read-during-write data; None: not tried."""
     sizes: Mapping[tuple[str, str], Size]
     """By the device's title and the setting."""
 
@@ -54,8 +54,8 @@ def provenance(measured: Measured) -> str:
 
 def exactness_table(measured: Measured) -> str:
     """Right or wrong, and how late."""
-    collided = "wrong if words read while they are written are"
-    late = ("last record after the last cell", "after the last row is there")
+    collided = "wrong with corrupted read-during-write data"
+    late = ("last record after the last cell", "after the last row")
     rows = [("sheet", "labeller", "frames", "wrong", collided, *late)]
     for row in measured.rows:
         found = row.checked
@@ -90,7 +90,7 @@ def _cell(size: Size | None) -> str:
 
 def summary_table(measured: Measured) -> str:
     """The performance page's: how late, and the sizes with what our builds tell Yosys."""
-    worst = "last record after the last row is there, worst"
+    worst = "last record after the last row, worst"
     rows = [("sheet", "labeller", worst, *(device.title for device in DEVICES))]
     for row in measured.rows:
         cells = (_cell(row.sizes.get((device.title, OURS))) for device in DEVICES)

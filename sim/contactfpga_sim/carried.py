@@ -1,9 +1,9 @@
-"""What the package carries as WebAssembly: boards, and the C header for a page in a browser.
+"""The WebAssembly files of the package: boards, and the C header for a page in a browser.
 
     python -m contactfpga_sim.carried
 
-builds those that are not of these sources, in a clone and with the extra ``release``, which is not needed where the
-gateware is what it was and only its text is another one.
+builds the outdated ones, in a clone and with the extra ``release``, which is not needed if only the gateware's text
+changed.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
 
 
 def skins() -> dict[str, Skin]:
-    """By name: what ``sim://`` and ``view`` show by themselves, what ``make sim`` runs, and the kits."""
+    """Skins by name: those of ``sim://``, ``view`` and ``make sim``, and the kits."""
     kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
     shown = {"reference": Skin(), "view": opening.own_skin(), "view-flat": opening.own_skin(flat=True)}
     return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
 
 
 def keys() -> dict[str, str]:
-    """By name the key that each file has to have."""
+    """The key that each file must have, by name."""
     boards = {name: compiled.carried_key(skin) for name, skin in skins().items()}
     return boards | {DECODER: webassembly.c_key(_DECODER_C)}
 
@@ -42,13 +42,13 @@ def stale() -> list[str]:
 
 
 def check() -> None:
-    """End the program where the package would be released with one of them."""
+    """End the program if the package would be released with a stale file."""
     if names := stale():
         sys.exit(f"{', '.join(names)}: not built from these sources; run python -m contactfpga_sim.carried")
 
 
 def build(name: str) -> bytes:
-    """What a file holds."""
+    """The content of a file."""
     with tempfile.TemporaryDirectory() as folder:
         if name == DECODER:
             return webassembly.build_c(_DECODER_C, Path(folder))
@@ -56,7 +56,7 @@ def build(name: str) -> bytes:
 
 
 def main() -> int:
-    """Build what is of another design, and write the list."""
+    """Build the files of changed designs, and write the list."""
     files, late = dict(webassembly.listed()["files"]), stale()
     for name, key in keys().items():
         if name in late:
@@ -67,7 +67,7 @@ def main() -> int:
 
 
 def _renewed(name: str, before: dict[str, str]) -> str:
-    """The key of a file's design; the file is built where it is not of that design."""
+    """The key of a file's design; the file is rebuilt if it is of another design."""
     design = webassembly.c_key(_DECODER_C) if name == DECODER else compiled.design_key(skins()[name])
     path = webassembly.path_of(name)
     whole = path.is_file() and webassembly.sum_of(path.read_bytes()) == before.get("sha256")

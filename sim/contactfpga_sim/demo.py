@@ -1,4 +1,4 @@
-"""What ``make sim`` runs: scenes through the gateware, each compared clock by clock with the golden model."""
+"""The demo of ``make sim``: scenes through the gateware, each compared clock by clock with the golden model."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_nat
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 FORCED = "pushing"
-"""The scene with force: it runs on a board with pressure units."""
+"""The scene with force, which runs on a board with pressure units."""
 
 LOOKS = 240
-"""Clocks between two looks at the scene's forces."""
+"""Clocks between two samples of the scene's forces."""
 
 SCANS = 4
-"""An untouched scan, then the scene; the first touched frame is complete after the second."""
+"""An untouched scan, then the scene; the first touched frame is complete after the second scan."""
 
 TOUCH_SCAN = 1
 
@@ -48,7 +48,7 @@ RUNS = {
     "fingertip": ("compiled", "Amaranth", "cocotb, Verilator"),
     **{name: ("compiled",) for name in (*scenes.NAMES,) if name not in ("fingertip", "nothing")},
 }
-"""Which engines a scene goes through."""
+"""Engines of each scene."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,19 +60,19 @@ class DemoResult:
     engine: str
     cells: np.ndarray
     frame: Frame | None
-    """The first touched frame as it came over the wire."""
+    """The first touched frame as received."""
     last_record: int | None
     """Clocks from the frame's last row to its last record."""
     first_byte_us: float
     last_byte_us: float
     size: int
     events: int
-    """Events at the stage boundaries that agree with the golden model."""
+    """Events at the stage boundaries, equal to the golden model's."""
     difference: str
 
 
 def run(name: str, engine: str, skin: Skin) -> DemoResult:
-    """The scene from the second scan on; compared over all cycles."""
+    """Run the scene from the second scan on; all cycles are compared."""
     scan = skin.derived.frame_clocks
     scene = scenes.scene(skin, name)
     untouched = np.zeros((skin.rows, skin.columns), bool)
@@ -103,7 +103,7 @@ def run(name: str, engine: str, skin: Skin) -> DemoResult:
 
 
 def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]]]:
-    """What the pressure units of a Skin that has some read from cycle to cycle; they feel the scene from the start."""
+    """Readings of a Skin's pressure units by cycle, if it has some; they feel the scene from the start."""
     if not skin.units:
         return []
     read = UnitReadings(scenes.CONTACTS[name](skin), load_cells(), skin)
@@ -111,7 +111,7 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
 
 
 def skin_of(name: str) -> Skin:
-    """Of the board that a scene runs on."""
+    """The Skin of a scene's board."""
     if name in scenes.AROUND:
         return forearm()
     return with_force() if name == FORCED else Skin()
@@ -123,17 +123,17 @@ def with_force() -> Skin:
 
 
 def forearm() -> Skin:
-    """A sheet of the same size whose ends meet."""
+    """A sheet of the reference size whose ends meet."""
     return Skin.load(examples() / "forearm.toml")
 
 
 def load_cells() -> LoadCells:
-    """Those units."""
+    """The pressure units of the scene with force."""
     return LoadCells.load(examples() / "units-flat.toml")
 
 
 def feel() -> str:
-    """The scene with force once more, through the driver: what its contacts push with, and what is found."""
+    """Run the scene with force through the driver; returns the contacts' pushes, true and estimated."""
     skin, cells = with_force(), load_cells()
     with driver.open(VirtualBoard(skin, FORCED, units=cells), skin) as board:
         frames = WithReadings(board)
@@ -165,7 +165,7 @@ LEGEND = (
     'touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is '
     "the median and the worst of touches at any instant of a scan.",
 )
-"""Which number of the table is which."""
+"""Explanation of the table's numbers."""
 
 TITLE = (
     "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud; "

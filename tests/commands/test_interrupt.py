@@ -9,8 +9,10 @@ import time
 
 import numpy as np
 import pytest
+from child_processes import alive, descendants
+from fake_board import wait_until
 from sample import sample
-from terminals import OnTerminal, alive, descendants, environment, listening, wait_for
+from terminals import OnTerminal, environment, listening
 
 from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import pool
@@ -52,14 +54,14 @@ def interrupted(arguments, ready, keys, cache, **variables):
     by a signal to its first process alone. Nothing that it started may be left."""
     terminal = OnTerminal(command(arguments), 80, CONTACTFPGA_CACHE=str(cache), **variables)
     try:
-        wait_for(lambda: terminal.process.poll() is not None or ready(terminal), 120)
+        wait_until(lambda: terminal.process.poll() is not None or ready(terminal), 120, pause_s=0.05)
         assert terminal.process.poll() is None, terminal.said[-1000:]
         below = descendants(terminal.process.pid)
         started = time.monotonic()
         terminal.type("\x03") if keys else terminal.process.send_signal(signal.SIGINT)
         status = terminal.wait(30)
         took = time.monotonic() - started
-        wait_for(lambda: not alive(below), SOON_S)
+        wait_until(lambda: not any(map(alive, below)), SOON_S)
         return status, took, terminal.said
     finally:
         terminal.process.kill()
@@ -209,7 +211,7 @@ def test_no_worker_outlives_the_pool(how, tmp_path):
         arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=listening, env=environment()
     ) as process:
         process.stdout.readline()
-        wait_for(lambda: sum("sleep 60" in line for line in descendants(process.pid).values()) == 2)
+        wait_until(lambda: sum("sleep 60" in line for line in descendants(process.pid).values()) == 2, pause_s=0.05)
         below = descendants(process.pid)
         assert len(below) >= 4
         started = time.monotonic()
@@ -218,7 +220,7 @@ def test_no_worker_outlives_the_pool(how, tmp_path):
         process.stdout.read()
         process.wait(30)
         assert time.monotonic() - started < 1 + SOON_S + SLACK_S
-        wait_for(lambda: not alive(below), SOON_S)
+        wait_until(lambda: not any(map(alive, below)), SOON_S)
 
 
 def test_a_pool_that_is_done_ends_as_usual():

@@ -9,11 +9,11 @@ import time
 
 import numpy as np
 import pytest
-from fake_board import FakeBoard
+from fake_board import FakeBoard, wait_until
 from rich.cells import cell_len
 from rich.console import Console
 from sample import sample
-from terminals import OnTerminal, environment, on_terminal, wait_for
+from terminals import OnTerminal, environment, on_terminal
 
 from contactfpga import Skin, terminal
 from contactfpga.tools.console.tables import tables
@@ -94,9 +94,11 @@ def test_no_color_where_none_is_wanted(variables, files):
 
 def test_a_terminal_that_cannot_be_rewritten_is_not():
     dumb = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", "zones", "sim://"], 80, TERM="dumb")
-    wait_for(lambda: "this terminal cannot be redrawn, so one frame per second is shown" in " ".join(dumb.said.split()))
+    wait_until(
+        lambda: "this terminal cannot be redrawn, so one frame per second is shown" in " ".join(dumb.said.split())
+    )
     began = time.monotonic()
-    wait_for(lambda: dumb.said.count("cells pressed") == 3)
+    wait_until(lambda: dumb.said.count("cells pressed") == 3)
     dumb.type("\x03")
     assert dumb.wait() == 0
     assert "\x1b" not in dumb.said
@@ -109,7 +111,7 @@ def test_the_live_view_of_a_large_sheet_stays_on_the_screen(columns, lines):
         board.moments = [(9, 300, 300), (4, 8, 240), (30, 60, 30)]
         board.stream = board.frame
         on = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", "zones", board.path], columns, lines)
-        wait_for(lambda: on.said.count("cells pressed") > 2, 120)
+        wait_until(lambda: on.said.count("cells pressed") > 2, 120)
         on.type("\x03")
         assert on.wait() == 0
     frames = re.split(r"\x1b\[2K(?:\x1b\[1A\x1b\[2K)+|\x1b\[\?25l", on.said)

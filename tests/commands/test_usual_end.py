@@ -7,9 +7,9 @@ import subprocess
 import sys
 
 import pytest
-from fake_board import FakeBoard
+from fake_board import FakeBoard, wait_until
 from sample import sample
-from terminals import OnTerminal, environment, wait_for
+from terminals import OnTerminal, environment
 
 import contactfpga
 from contactfpga.tools import cli
@@ -44,7 +44,7 @@ def test_it_is_the_usual_end(words, number, tmp_path):
         arguments = [str(named.get(word, word)) for word in [*words.split(), "--timeout", "30"]]
         terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *arguments], 80)
         try:
-            wait_for(lambda: terminal.process.poll() is not None or RUNNING[words] in terminal.said, 60)
+            wait_until(lambda: terminal.process.poll() is not None or RUNNING[words] in terminal.said, 60)
             terminal.process.send_signal(number)
             status, said = terminal.wait(30), terminal.said[-2000:]
         finally:

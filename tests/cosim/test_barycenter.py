@@ -4,15 +4,15 @@ import contextlib
 import itertools
 import json
 import math
-from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from amaranth.back import rtlil
 from fake_board import FakeBoard
+from recorded_frames import recorded
 from sample import sample
 from scipy import ndimage
+from zone_oracles import nearest, zones_by_scipy
 
 import contactfpga
 from contactfpga import Skin
@@ -30,22 +30,12 @@ from contactfpga_sim.verify.cosim.covering import stimulus
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 SHEET = Skin(rows=13, columns=6, pitch_x_mm=3.4, pitch_y_mm=5.0, report="barycenter", barycenter_bits=3)
-
-
-def nearest(total, area, bits):
-    """The nearest step of 1/2^bits, half a step upward."""
-    return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
 
 
 def rounded_zones(cells, bits, connectivity=8):
     """Sorted (area, x, y) of scipy's zones, x and y in steps."""
-    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
-    y, x = np.nonzero(labels)
-    number = labels[y, x]
-    sums = [np.bincount(number, weights, count + 1)[1:] for weights in (None, x, y)]
-    zones = zip(*(np.asarray(column, int).tolist() for column in sums))
+    zones = zones_by_scipy(cells, connectivity)
     return sorted((area, nearest(sum_x, area, bits), nearest(sum_y, area, bits)) for area, sum_x, sum_y in zones)
 
 
@@ -88,11 +78,7 @@ LONG = ("sdh13x6", "feet45x52", "bed64x32", "popu64x27")
 @pytest.mark.recordings
 @pytest.mark.parametrize("name", ["dtmf16x16", *(pytest.param(name, marks=pytest.mark.campaign) for name in LONG)])
 def test_recordings_have_scipys_barycenters_rounded(record_property, name):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"]
+    frames = recorded(name)
     frames = frames[:: max(1, len(frames) // 1000)]
     assert_replayed(frames, 4, most=64)  # the board of the test above where the sheet is the same
     record_property("cases", len(frames))

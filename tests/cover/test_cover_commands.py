@@ -1,6 +1,5 @@
 """The commands `contactfpga cover design` and `contactfpga cover figures`."""
 
-import functools
 import json
 import math
 import sys
@@ -14,12 +13,6 @@ from contactfpga.design.cover import elastic, sense
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRST, SECOND = (ROOT / "examples" / f"paper-{name}-design.toml" for name in ("first", "second"))
-
-
-@pytest.fixture
-def run(run):
-    """Runs `contactfpga cover`; returns status, output and errors."""
-    return functools.partial(run, "cover")
 
 
 # ---- commands

@@ -1,7 +1,7 @@
 """The design algorithm, its file, and the commands of `contactfpga cover`."""
 
-import dataclasses
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -71,18 +71,18 @@ def test_what_is_relaxed_as_said_fits():
     for name in ("Plastazote LD33", "Sylodyn ND", "PORON 4701-30, 320"):
         foams = (find(name),)
         narrow = {"foams": foams, "free": False, "plates_m": (), "model": Model("halfspace", "point")}
-        first = design(_changed(task, **narrow)).candidates[0]
+        first = design(replace(task, **narrow)).candidates[0]
         assert not first.fits or name == "Plastazote LD33"
         relaxed = {
             "time_s": min(task.time_s, 0.9999 * first.hit.time_s),
             "thickness_m": max(task.thickness_m, 1.0001 * first.thickness_m),
             "force_n": max(task.force_n, 1.0001 * first.least.value),
         }
-        assert design(_changed(task, **narrow, **relaxed)).best is not None
+        assert design(replace(task, **narrow, **relaxed)).best is not None
 
 
 def test_mass_peak_and_finest_pitch_are_limits_too():
-    task = _changed(Task.load(FIRST), foams=(find("Plastazote LD33"),), free=False, plates_m=())
+    task = replace(Task.load(FIRST), foams=(find("Plastazote LD33"),), free=False, plates_m=())
     fits = design(task).best
     assert fits.mass_kg_m2 == pytest.approx(33 * fits.thickness_m)
     for change, name, message in (
@@ -90,7 +90,7 @@ def test_mass_peak_and_finest_pitch_are_limits_too():
         ({"peak_n": 10.0}, "peak", "peak_n at least 14.95 N"),
         ({"pitch_min_m": 0.008}, "pitch", "pitch_min_m at most"),
     ):
-        broken = design(_changed(task, **change))
+        broken = design(replace(task, **change))
         assert broken.best is None
         assert [check.name for check in broken.candidates[0].checks if not check.holds] == [name]
         assert message in broken.relax[0]
@@ -101,19 +101,19 @@ def test_lightest_first_and_unknown_mass_last():
     light = Foam("light", 1.6e5, "made up", density_kg_m3=30.0, strain=0.6)
     heavy = Foam("heavy", 1.6e5, "made up", density_kg_m3=300.0, strain=0.6)
     unknown = Foam("unknown", 1.6e5, "made up", strain=0.6)
-    task = _changed(Task.load(FIRST), foams=(unknown, heavy, light), free=False, plates_m=())
+    task = replace(Task.load(FIRST), foams=(unknown, heavy, light), free=False, plates_m=())
     assert [one.foam.name for one in design(task).candidates] == ["light", "heavy", "unknown"]
 
 
 def test_without_a_named_model_the_simplest_that_holds_is_taken():
-    task = _changed(Task.load(FIRST), model=None)
+    task = replace(Task.load(FIRST), model=None)
     for one in design(task).candidates:
         if one.sure is not None and isinstance(one.sure.value, float):
             assert abs(one.sure.error) <= task.tolerance
             reach = one.pitch_m / math.sqrt(2)
             bonded = PaddedSheet(task.switch, one.thickness_m).force_n(Model("bonded", "point"), reach)
             assert one.sure.value == pytest.approx(bonded, rel=0.06)
-    patch = design(_changed(task, contact="patch"))
+    patch = design(replace(task, contact="patch"))
     on_axis = [one for one in patch.candidates if one.least and isinstance(one.least.value, float)]
     assert on_axis
     assert all(one.least.model.contact == "patch" for one in on_axis)
@@ -121,7 +121,7 @@ def test_without_a_named_model_the_simplest_that_holds_is_taken():
 
 
 def test_no_solution_is_an_answer():
-    task = _changed(Task.load(FIRST), foams=(Foam("jelly", 1.0, "made up"),), free=False)
+    task = replace(Task.load(FIRST), foams=(Foam("jelly", 1.0, "made up"),), free=False)
     found = design(task)
     assert found.best is None
     assert found.relax[0].startswith("the foam is too soft: it would be pressed in by")
@@ -161,12 +161,12 @@ def test_a_faster_reaction_needs_a_thinner_cover():
         assert values[0] > 1.5 * values[-1], name
     assert last.by_energy_m / first.by_energy_m == pytest.approx(last.latency_s / first.latency_s)
     assert last.force_n > first.force_n
-    slow = design(_changed(task, other_s=2e-3))
+    slow = design(replace(task, other_s=2e-3))
     assert slow.thinning[-1].latency_s == pytest.approx(found.sheet_s + 2e-3)
 
 
 def test_where_a_braked_arm_stops_against_scipy():
-    task = _changed(Task.load(FIRST), foams=(find("paper"),), free=False)
+    task = replace(Task.load(FIRST), foams=(find("paper"),), free=False)
     hit = design(task).candidates[0].hit
     for thin in design(task).thinning:
 
@@ -185,7 +185,3 @@ def test_where_a_braked_arm_stops_against_scipy():
         )
         assert thin.pressed_m == pytest.approx(before.y[0, -1], rel=1e-4)
         assert thin.stopped_m == pytest.approx(after.y_events[0][0][0], rel=1e-4)
-
-
-def _changed(task, **changes):
-    return dataclasses.replace(task, **changes)

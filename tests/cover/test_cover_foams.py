@@ -1,6 +1,6 @@
 """The table of foams, the file of a design, and the line of Fig. 9."""
 
-import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +92,7 @@ def test_a_file_that_cannot_be_is_refused(tmp_path, old, new, message):
 
 def test_nothing_to_choose_from():
     with pytest.raises(CoverError, match="foams is empty and free is false; there is nothing to choose from"):
-        _changed(Task.load(FIRST), foams=(), free=False)
+        replace(Task.load(FIRST), foams=(), free=False)
 
 
 # ---- the line of Fig. 9
@@ -134,7 +134,3 @@ def test_points_that_cannot_be_are_refused(tmp_path, text, message):
 def test_points_without_a_line():
     with pytest.raises(CoverError, match="force and deformation do not vary together; there is no line"):
         line.fit(np.array([1.0, 1, 1]), np.array([1.0, 2, 3]))
-
-
-def _changed(task, **changes):
-    return dataclasses.replace(task, **changes)

@@ -1,6 +1,5 @@
 """Whether a light finger is felt: the function and the command `contactfpga cover felt`."""
 
-import functools
 import itertools
 import json
 
@@ -13,12 +12,6 @@ from contactfpga.design.cover.felt import spread_evenly
 
 TILES = contactfpga.examples() / "tiles.toml"
 SHEET = Sheet(7, 9, 10e-3, 8e-3)
-
-
-@pytest.fixture
-def run(run):
-    """Runs `contactfpga cover`; returns status, output and errors."""
-    return functools.partial(run, "cover")
 
 
 def tiles(force=1.0, **switch):

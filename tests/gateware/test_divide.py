@@ -9,6 +9,7 @@ from amaranth.hdl import Cat, Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from sample import sample
+from zone_oracles import nearest
 
 from contactfpga import Skin
 from contactfpga_hdl.report.backlog import Backlog
@@ -65,7 +66,7 @@ class Oracle:
 
     def barycenter(self, *moments):
         area, *sums = moments
-        return [math.floor(Fraction(total * 2**self.bits, area) + Fraction(1, 2)) for total in sums]
+        return [nearest(total, area, self.bits) for total in sums]
 
     def every_zone(self):
         """(area, sum x, sum y) of every set of cells that is not empty: all that a labeller can emit."""

@@ -5,6 +5,8 @@ import itertools
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
+from bench import split
+from guard_lines import breaks
 from sample import sample
 
 from contactfpga import Skin
@@ -93,11 +95,9 @@ def told_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
     watched = sim.watch(dut.faults)
     sim.sink(dut.rows)
     ports = [getattr(dut.pins, name) for name in sheet.reads]
-    places = list(itertools.accumulate((len(port) for port in ports), initial=0))
 
     def levels(cycle, pins):
-        seen = [pins >> begin & (1 << end - begin) - 1 for begin, end in itertools.pairwise(places)]
-        return sheet.pins(cycle, dict(zip(sheet.reads, seen, strict=True)))[0]
+        return sheet.pins(cycle, dict(zip(sheet.reads, split(pins, map(len, ports)), strict=True)))[0]
 
     sim.drive(getattr(dut.pins, sheet.drives[0]), levels, Cat(*ports))
     sim.run(cycles)
@@ -142,19 +142,6 @@ RETRY_BIT = 7
 BREAKS = Skin(rows=3, columns=4, report="cells", settle_us=10, release_us=2, **TINY)
 
 
-def breaks() -> list[tuple[Cuts, int]]:
-    """Each line, guard lines too, cut at each place, and the word that tells it: rows in bits 0 to 2, columns in bits 3
-    to 6. After the last guard switch there is nothing to lose."""
-    found = []
-    for end in range(5):
-        found += [(Cuts({row: end}), 1 << row) for row in range(3)]
-        found.append((Cuts({3: end}), (0b1111 << end & 0b1111) << 3))
-    for end in range(4):
-        found += [(Cuts({}, {column: end}), 1 << 3 + column) for column in range(4)]
-        found.append((Cuts({}, {4: end}), 0b111 << end & 0b111))
-    return found
-
-
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
 def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_else(bench, monkeypatch, diodes):
     """Whatever is pressed. Cut in any clock of a frame; mended, and told no more after the clock toggles next."""
@@ -162,13 +149,13 @@ def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_e
     skin, rng = BREAKS.replace(diodes=diodes), np.random.default_rng(7)
     frame, retry = facts(skin).scan_clocks, 1 << RETRY_BIT
     spacing = 5 * frame + 2 * retry
-    at = [number * spacing + int(rng.integers(frame)) for number in range(len(breaks()))]
-    cuts = [(start, cut) for start, (cut, _) in zip(at, breaks(), strict=True)]
+    at = [number * spacing + int(rng.integers(frame)) for number in range(len(breaks(3, 4)))]
+    cuts = [(start, cut) for start, (cut, _) in zip(at, breaks(3, 4), strict=True)]
     cuts += [(start + 2 * frame, Cuts()) for start in at]
     cycles = len(at) * spacing
     pieces = [(start, rng.random((3, 4)) < rng.random(), None) for start in range(0, cycles, frame // 2)]
     words = told_words(skin, Timeline(pieces, cuts=sorted(cuts, key=lambda cut: cut[0])), cycles, bench)
-    for start, (cut, wanted) in zip(at, breaks(), strict=True):
+    for start, (cut, wanted) in zip(at, breaks(3, 4), strict=True):
         meanwhile = words[start : start + spacing - frame]
         assert {word | wanted for word in meanwhile} == {wanted}, cut
         assert words[start + 2 * frame + 3] == wanted, cut

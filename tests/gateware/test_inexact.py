@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rivals import campaign, exactness
 from rivals.inexact import INEXACT
-from scipy import ndimage
+from zone_oracles import cells_of, zones_by_scipy
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "rivals.md").read_text(encoding="utf-8")
@@ -20,22 +20,13 @@ MODELS = {one.name: one.model for one in INEXACT}
 def drawn(name):
     """(R, C) bool: the frame that the page draws for a labeller."""
     (text,) = re.findall(rf"^{re.escape(name)}: areas .*\n\n```text\n([.#\n]+)\n```", PAGE, re.MULTILINE)
-    return np.array([[cell == "#" for cell in row] for row in text.split()])
-
-
-def by_scipy(cells):
-    """(area, sum x, sum y) of each zone, sorted."""
-    labels, count = ndimage.label(cells, np.ones((3, 3)))
-    y, x = np.indices(cells.shape)
-    numbers = range(1, count + 1)
-    sums = (ndimage.sum(cells * what, labels, numbers) for what in (np.ones_like(x), x, y))
-    return sorted(zip(*(np.round(one).astype(int).tolist() for one in sums), strict=True))
+    return cells_of(text)
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_frame_on_the_page_is_wrong_in_the_model_and_right_in_ours(name):
     cells = drawn(name)
-    right = by_scipy(cells)
+    right = zones_by_scipy(cells)
     assert sorted(MODELS[name](cells)) != right
     assert measure_inexact.exact(cells[None]) == [right]
 
@@ -46,7 +37,7 @@ def test_models_are_right_where_their_fault_is_not(name):
     teeth = np.zeros((6, 5), bool)
     teeth[:, ::2] = True
     for cells in (np.eye(1, dtype=bool), np.ones((5, 5), bool), teeth):
-        assert sorted(MODELS[name](cells)) == by_scipy(cells)
+        assert sorted(MODELS[name](cells)) == zones_by_scipy(cells)
 
 
 @pytest.mark.parametrize(("name", "smaller"), [("detectinator", 6), ("ObNoDog", 7)])
@@ -58,20 +49,20 @@ def test_no_smaller_frame_is_wrong(name, smaller):
             places = np.arange(rows * columns)
             for number in range(1 << len(places)):
                 cells = (number >> places & 1).astype(bool).reshape(rows, columns)
-                assert sorted(MODELS[name](cells)) == by_scipy(cells)
+                assert sorted(MODELS[name](cells)) == zones_by_scipy(cells)
 
 
 def test_one_cell_or_line_less_is_right():
     lone, solid = drawn("High Throughput CLE"), drawn("CLE of the CVSD course")
     lone[-1, -1] = False
     for name, cells in (("High Throughput CLE", lone), ("CLE of the CVSD course", solid[1:])):
-        assert sorted(MODELS[name](cells)) == by_scipy(cells)
+        assert sorted(MODELS[name](cells)) == zones_by_scipy(cells)
 
 
 def test_the_search_finds_the_frame_of_the_page():
     found = measure_inexact.fault(INEXACT[0])
     assert np.array_equal(found.cells, drawn("detectinator"))
-    assert found.right == by_scipy(found.cells)
+    assert found.right == zones_by_scipy(found.cells)
 
 
 @pytest.mark.slow

@@ -4,8 +4,10 @@ import functools
 import itertools
 
 import pytest
+from bench import split
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from label_rules import pieces, row_rule
 from sample import sample
 
 from contactfpga import Skin
@@ -58,55 +60,6 @@ def skin_of(rows, columns, connectivity, labeller):
     )
 
 
-def pieces(cells, connectivity):
-    """Connected sets of (y, x) in a frame given as row words, by flood fill."""
-    left = {(y, x) for y, word in enumerate(cells) for x in range(word.bit_length()) if word >> x & 1}
-    around = [(0, 1), (0, -1), (1, 0), (-1, 0)]
-    if connectivity == 8:
-        around += [(1, 1), (1, -1), (-1, 1), (-1, -1)]
-    while left:
-        piece, edge = set(), [left.pop()]
-        while edge:
-            y, x = edge.pop()
-            piece.add((y, x))
-            near = {(y + dy, x + dx) for dy, dx in around} & left
-            left -= near
-            edge += near
-        yield piece
-
-
-def runs(cells):
-    """Number of horizontal runs in a set of cells."""
-    return sum((y, x - 1) not in cells for y, x in cells)
-
-
-def run_rule(clusters, columns, connectivity):
-    """By the step rule: the clock in which each cluster is done, clocks for the row, and until the end mark."""
-    steps, done = 0, []
-    for cluster in clusters:
-        before = {cell for cell in cluster if cell[0] == 0}
-        steps += max(runs(before), runs(cluster - before))
-        done.append(steps + 2)
-    return done, steps + 1, steps + 3
-
-
-def serial_rule(clusters, columns, connectivity):
-    """By the column rule, the same."""
-    cells = set().union(*clusters)
-    clocks, done_by_column = 0, []
-    for x in range(columns):
-        clocks += 1
-        begins_before = (0, x) in cells and (0, x - 1) not in cells
-        diagonal = {(1, x), (0, x - 1)} <= cells and not {(0, x), (1, x - 1)} & cells
-        if begins_before or (connectivity == 4 and diagonal):
-            clocks += 1
-        done_by_column.append(clocks)
-    return [done_by_column[max(x for _, x in cluster)] + 1 for cluster in clusters], clocks + 2, clocks + 2
-
-
-RULES = {"run": run_rule, "serial": serial_rule}
-
-
 def frame_rule(cells, columns, connectivity, labeller, start):
     """By the labeller's rule: cycles at which the rows are handed over, {cycle: zone}, and the end mark's cycle.
 
@@ -118,10 +71,9 @@ def frame_rule(cells, columns, connectivity, labeller, start):
     for y, word in enumerate(cells):
         handed.append(cycle)
         pair = (cells[y - 1] if y else 0, word)
-        clusters = sorted(pieces(pair, connectivity), key=lambda piece: min(x for _, x in piece))
-        done, busy, end = RULES[labeller](clusters, columns, connectivity)
+        clusters, busy, end = row_rule(pair, columns, connectivity, labeller)
         last_clock = {}  # of the rightmost cluster that holds a cell of the zone
-        for cluster, clock in zip(clusters, done, strict=True):
+        for cluster, clock in clusters:
             for index, zone in enumerate(zones):
                 if any((y - 1 + below, x) in zone for below, x in cluster):
                     last_clock[index] = clock
@@ -167,13 +119,7 @@ def label(bench, frames, columns, connectivity, labeller, rng=None, gap=0.0, sta
 def fields(payload, rows, columns):
     """Area, sum x, sum y: each as wide as its largest value on this sheet (docs/protocol.md)."""
     largest = (rows * columns, rows * sum(range(columns)), columns * sum(range(rows)))
-    values = []
-    for most in largest:
-        width = max(1, most.bit_length())
-        values.append(payload & (1 << width) - 1)
-        payload >>= width
-    assert payload == 0
-    return tuple(values)
+    return split(payload, (max(1, most.bit_length()) for most in largest))
 
 
 def assert_exact(bench, frames, columns, connectivity, labeller):

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import zone_oracles
-from zone_oracles import RING, RULES, WOUND, every_frame, recorded, skin_of
+from bench import split
+from recorded_frames import recorded
+from zone_oracles import RING, RULES, WOUND, cells_of, every_frame, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model.golden import all_departures, label
@@ -36,10 +38,6 @@ SHAPES = {
 }  # fmt: skip
 
 
-def cells_of(picture):
-    return np.array([[mark == "#" for mark in line] for line in picture.split()])
-
-
 def simulated(bench, frames, connectivity, labeller, rng=None, gap=0.0, stall=0.0):
     """(N, R, C) frames back to back in Amaranth's simulator: cycles of the rows, and (cycle, record, or None for an end
     mark)."""
@@ -59,14 +57,6 @@ def simulated(bench, frames, connectivity, labeller, rng=None, gap=0.0, stall=0.
         80 * len(words) * (columns + 2), until=lambda: sum(word >> end for _, word in sink.transfers) == len(frames)
     )
     return source.transfers, [(cycle, None if word >> end else split(word, widths)) for cycle, word in sink.transfers]
-
-
-def split(word, widths):
-    fields = []
-    for width in widths:
-        fields.append(word & (1 << width) - 1)
-        word >>= width
-    return tuple(fields)
 
 
 def check_simulated(bench, frames, connectivity, labeller):

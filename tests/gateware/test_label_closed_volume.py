@@ -4,14 +4,13 @@ docs/timing.md."""
 import numpy as np
 import pytest
 import zone_oracles
+from recorded_frames import RECORDINGS, recorded
 from sample import sample
-from zone_oracles import RULES, every_frame, recorded, skin_of
+from zone_oracles import RULES, every_frame, skin_of
 
 from contactfpga_sim.model.golden import all_departures, row_clocks
 from contactfpga_sim.model.scenes import shapes
 from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
-
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 
 
 def mazes(rows, columns, count, seed):

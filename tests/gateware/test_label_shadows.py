@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from sample import sample
-from zone_oracles import moments, zones_by_image_tools
+from zone_oracles import cells_of, moments, zones_by_image_tools
 
-from contactfpga.skin import Skin
 from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.scenes import shapes
-from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 LABELLERS = ("projection", "single")
 SIZES = ((4, 4), (1, 1), (1, 7), (7, 1), (9, 12), (16, 16), (3, 64))
@@ -27,21 +25,6 @@ def frames_of(rows, columns, count=400):
     return np.array([*noise, *known, np.zeros((rows, columns), bool)])
 
 
-@pytest.fixture(scope="module")
-def benches():
-    built = {}
-
-    def bench(labeller, rows, columns):
-        skin = Skin(rows=rows, columns=columns, labeller=labeller, settle_us=20.0)
-        if skin not in built:
-            built[skin] = LabelBench(skin)
-        return built[skin]
-
-    yield bench
-    for one in built.values():
-        one.close()
-
-
 @pytest.mark.parametrize("labeller", LABELLERS)
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_the_model_takes_for_zones_what_the_shadows_say(labeller, size):
@@ -53,7 +36,7 @@ def test_the_model_takes_for_zones_what_the_shadows_say(labeller, size):
 @pytest.mark.parametrize(("labeller", "size"), sample(BENCHES, QUICK_BENCHES), ids=str)
 def test_every_record_comes_in_its_clock(benches, record_property, labeller, size):
     frames = frames_of(*size)
-    got = benches(labeller, *size).run(frames)
+    got = benches(*size, 8, labeller).run(frames)
     handed, wanted, ends = int(got.first_row[0]), [], []
     for index, cells in enumerate(frames):
         work = labelling(cells, 8, labeller)
@@ -73,7 +56,7 @@ def test_every_record_comes_in_its_clock(benches, record_property, labeller, siz
 @pytest.mark.parametrize(("gap", "stall"), [(0, 50), (50, 0), (30, 30), (10, 90)])
 def test_stalls_change_no_zone(benches, labeller, size, gap, stall):
     frames = frames_of(*size)[-2000:]
-    bench = benches(labeller, *size)
+    bench = benches(*size, 8, labeller)
     free, stalled = bench.run(frames), bench.run(frames, gap=gap, stall=stall, seed=gap + stall)
     assert np.array_equal(stalled.frame, free.frame)
     assert np.array_equal(stalled.moments, free.moments)
@@ -82,7 +65,7 @@ def test_stalls_change_no_zone(benches, labeller, size, gap, stall):
 @pytest.mark.parametrize("labeller", LABELLERS)
 def test_no_cell_is_lost(benches, labeller):
     frames = frames_of(9, 12)
-    got = benches(labeller, 9, 12).run(frames)
+    got = benches(9, 12, 8, labeller).run(frames)
     sums = np.zeros((len(frames), 3), int)
     np.add.at(sums, got.frame, got.moments)
     assert sums.tolist() == [list(moments(cells)) for cells in frames]
@@ -102,7 +85,7 @@ def test_no_cell_is_lost(benches, labeller):
     ],
 )
 def test_what_shadows_join(benches, picture, zones):
-    cells = np.array([[mark == "#" for mark in line] for line in picture.split()])
+    cells = cells_of(picture)
     frame = np.zeros((4, 4), bool)
     frame[: len(cells)] = cells
-    assert len(benches("projection", 4, 4).run(frame[None]).moments) == zones
+    assert len(benches(4, 4, 8, "projection").run(frame[None]).moments) == zones

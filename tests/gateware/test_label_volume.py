@@ -1,12 +1,12 @@
 """The compiled labeller on very many frames: every record with its exact cycle, against the golden model."""
 
 import itertools
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_frames import RECORDINGS, recorded
 from sample import sample
+from zone_oracles import every_frame
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
@@ -18,8 +18,6 @@ EXACT = tuple(name for name, labeller in LABELLERS.items() if labeller.exact)
 BOTH = pytest.mark.parametrize("labeller", EXACT)
 RULES = (*itertools.product((8, 4), EXACT),)  # each costs a compiler's run for every size of sheet
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 SQUARES = (8, 16, 33, 64)
 RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a tenth
     (1, 1): 200,
@@ -34,27 +32,6 @@ RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a te
 }
 QUICK_RANDOM = [((8, 8), 8, "run")]
 SLOW_RANDOM = [((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES if "run" in rule)]
-
-
-@pytest.fixture(scope="module")
-def benches() -> Iterator[dict]:
-    built: dict[Skin, LabelBench] = {}
-
-    def bench(rows: int, columns: int, connectivity: int, labeller: str) -> LabelBench:
-        skin = Skin(rows=rows, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=20.0)
-        if skin not in built:
-            built[skin] = LabelBench(skin)
-        return built[skin]
-
-    yield bench
-    for one in built.values():
-        one.close()
-
-
-def every_frame(rows: int, columns: int, first: int = 0, count: int | None = None) -> np.ndarray:
-    cells = rows * columns
-    numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
-    return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
 
 
 def random_frames(rows: int, columns: int, count: int, seed: int) -> np.ndarray:
@@ -177,11 +154,7 @@ def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivit
     ),
 )
 def test_recordings(benches, record_property, name, connectivity, labeller):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"]
+    frames = recorded(name)
     check_exact(benches(*frames.shape[1:], connectivity, labeller), frames)
     record_property("cases", len(frames))
 

@@ -65,6 +65,18 @@ def paced(sim, port):
     return sink
 
 
+def held(changes):
+    """What (cycle, word) pairs set and hold, cycle by cycle; 0 before."""
+    words, word = dict(changes), 0
+
+    def now(cycle):
+        nonlocal word
+        word = words.get(cycle, word)
+        return word
+
+    return now
+
+
 def feed(sim, dut, frames, changes, asked=()):
     """Puts frames, faults and wishes for a hello through."""
     words = [word for frame in frames for word in (*frame.items, 1 << 16)]
@@ -78,15 +90,7 @@ def feed(sim, dut, frames, changes, asked=()):
         sim.drive(dut.summary[name], described(name))
     for name in TAG:
         sim.drive(dut.tag[name], described(name))
-    at = dict(changes)
-    word = 0
-
-    def now(cycle):
-        nonlocal word
-        word = at.get(cycle, word)
-        return word
-
-    sim.drive(Value.cast(dut.faults), now)
+    sim.drive(Value.cast(dut.faults), held(changes))
     sim.drive(dut.asked, lambda cycle: int(cycle in asked))
 
 
@@ -160,15 +164,7 @@ def test_slots_of_the_self_test_go_out_whole_and_are_acknowledged(bench, rng, na
     slots = [(rng.randrange(1 << 14), rng.randrange(16), rng.randrange(16)) for _ in range(12)]
     cycles = 6000
     changes = random_words(rng, cycles - 2000, BITS[name], 900)
-    words = dict(changes)
-    word = 0
-
-    def now(cycle):
-        nonlocal word
-        word = words.get(cycle, word)
-        return word
-
-    sim.drive(Value.cast(dut.faults), now)
+    sim.drive(Value.cast(dut.faults), held(changes))
     source = sim.source(dut.slots, [number | rows << 14 | columns << 18 for number, rows, columns in slots], rng, 0.99)
     ready = [rng.random() < 0.5 for _ in range(cycles + 1)]
     sink = sim.sink(dut.bytes, ready=ready.__getitem__)

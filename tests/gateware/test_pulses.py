@@ -3,8 +3,8 @@
 import itertools
 
 import pytest
-from amaranth.hdl import Elaboratable, Module
-from amaranth.lib import wiring
+from listener import IDLE, Listener, give_bits
+from wire import line
 
 from contactfpga.wire import framing, protocol
 from contactfpga_hdl.link.pulses import PulseReceiver
@@ -12,49 +12,20 @@ from contactfpga_hdl.link.request import RequestReader
 from contactfpga_sim.model.golden.request import command, heard, pulses, request
 
 BITS = (2, 3)
-IDLE = 5
 ONE, MARK, ZERO = 0xFF, 0xF0, 0x00
-
-
-class Listener(Elaboratable):
-    """A receive pin and what is read from it."""
-
-    def __init__(self, bit_clocks):
-        self.receiver, self.reader = PulseReceiver(bit_clocks), RequestReader()
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules += [self.receiver, self.reader]
-        wiring.connect(m, self.receiver.bits, self.reader.bits)
-        return m
 
 
 @pytest.fixture(scope="module", params=BITS)
 def listen(bench, request):
     """Requests (cycle, number, hello) in levels that begin in cycle ``IDLE``, and the number in each cycle."""
-    dut = Listener(request.param)
+    dut = Listener(PulseReceiver(request.param))
     sim = bench(dut)
 
     def listen(levels):
-        levels = [1] * IDLE + levels + [1] * 12
-        sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
-        received, hello, low, number = (
-            sim.watch(port) for port in (dut.reader.received, dut.reader.hello, dut.reader.heard, dut.reader.number)
-        )
-        sim.run(len(levels))
-        found = [(at, number[at + 1], bool(hello[at])) for at, taken in enumerate(received.values) if taken]
-        assert all(low[at + 1] == number[at + 1] % 8 for at, _, _ in found)
-        return found, number.values
+        return dut.listen(sim, levels)
 
     listen.bit = request.param
     return listen
-
-
-def line(data, bit):
-    """Levels of bytes without gaps."""
-    return [
-        level for byte in data for one in (0, *(byte >> place & 1 for place in range(8)), 1) for level in [one] * bit
-    ]
 
 
 def sampled(data, bit, phase, jitter, rng):
@@ -137,11 +108,9 @@ def read(bench):
             bits = (bits + 1) % 8
             if not bits:
                 events.append((0, 0, 0, 1, 0))
-        events += [(1, 0, 0, 0, 0)] * 2
-        for place, name in enumerate(("level", "bit", "index", "good", "bad")):
-            sim.drive(getattr(dut.bits, name), lambda cycle, place=place: events[min(cycle, len(events) - 1)][place])
+        cycles = give_bits(sim, dut.bits, events)
         received, hello, number = sim.watch(dut.received), sim.watch(dut.hello), sim.watch(dut.number)
-        sim.run(len(events))
+        sim.run(cycles)
         return [(number[at + 1], bool(hello[at])) for at, taken in enumerate(received.values) if taken]
 
     return read
@@ -186,22 +155,17 @@ def test_a_request_in_the_other_form_is_none(listen, rng):
 
 
 def test_commands_come_as_pulses_too(bench, rng):
-    dut = RequestReader(commands=True)
     for clocks in BITS:
         sent = [(rng.randrange(1, 1 << 21), rng.randrange(128), rng.randrange(1 << 21)) for _ in range(3)]
         data = b"".join(command(*one, hello=True, bit_clocks=clocks) for one in sent)
         assert [(one.number, *one.command) for one in heard([(0, data)], clocks, commands=True).requests] == sent
         assert heard([(0, data)], clocks).requests == []
-    whole = Module()
-    receiver = PulseReceiver(BITS[0])
-    whole.submodules += [receiver, dut]
-    wiring.connect(whole, receiver.bits, dut.bits)
-    sim = bench(whole)
+    dut = Listener(PulseReceiver(BITS[0]), commands=True)
+    sim, reader = bench(dut), dut.reader
     data = b"".join(command(*one, hello=True, bit_clocks=BITS[0]) for one in sent)
-    levels = [1] * IDLE + line(data, BITS[0])
-    sim.drive(receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
-    command_, what, value, number = (sim.watch(port) for port in (dut.command, dut.what, dut.value, dut.number))
-    sim.run(len(levels) + 12)
+    cycles = dut.receive(sim, line(data, BITS[0]))
+    command_, what, value, number = map(sim.watch, (reader.command, reader.what, reader.value, reader.number))
+    sim.run(cycles)
     cycles = [cycle for cycle, high in enumerate(command_.values) if high]
     assert [(number[cycle + 1], what[cycle], value[cycle]) for cycle in cycles] == sent
     assert cycles == [one.cycle for one in heard([(IDLE, data)], BITS[0], commands=True).requests]

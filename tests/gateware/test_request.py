@@ -1,10 +1,9 @@
 """What the board takes for a request or a command among the bytes it receives."""
 
 import pytest
-from amaranth.hdl import Elaboratable, Module
-from amaranth.lib import wiring
 from cobs import cobs
-from wire import check
+from listener import IDLE, Listener, give_bits
+from wire import check, line
 
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver
@@ -14,43 +13,16 @@ BIT = 3
 BYTE = 10 * BIT
 
 
-class Listener(Elaboratable):
-    """A receive pin and what is read from it."""
-
-    def __init__(self, bit_clocks=BIT, commands=False):
-        self.receiver, self.reader = Receiver(bit_clocks), RequestReader(commands)
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules += [self.receiver, self.reader]
-        wiring.connect(m, self.receiver.bits, self.reader.bits)
-        return m
-
-
 @pytest.fixture(scope="module")
 def listen(bench):
     """Requests (number, hello) in some bytes that follow each other without a gap, each with the cycle after its first
     byte's first at which it is taken; and the number in each cycle."""
-    dut = Listener()
+    dut = Listener(Receiver(BIT))
     sim = bench(dut)
 
     def listen(data):
-        levels = [1] * 5
-        for byte in data:
-            for bit in [0, *(byte >> index & 1 for index in range(8)), 1]:
-                levels += [bit] * BIT
-        levels += [1] * 12
-        sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
-        received, hello, heard, number = (
-            sim.watch(port) for port in (dut.reader.received, dut.reader.hello, dut.reader.heard, dut.reader.number)
-        )
-        sim.run(len(levels))
-        found = []
-        for cycle, value in enumerate(received.values):
-            if value:
-                assert heard[cycle + 1] == number[cycle + 1] % 8
-                found.append((cycle - 5, number[cycle + 1], bool(hello[cycle])))
-        return found, number.values
+        found, numbers = dut.listen(sim, line(data, BIT))
+        return [(cycle - IDLE, number, hello) for cycle, number, hello in found], numbers
 
     return listen
 
@@ -67,11 +39,9 @@ def obey(bench):
         for at, byte in enumerate(data):
             stop = (0, 0, 0, 0, 1) if at == broken else (1, 0, 0, 1, 0)
             events += [*((byte >> index & 1, 1, index, 0, 0) for index in range(8)), stop]
-        events += [(1, 0, 0, 0, 0)] * 2
-        for place, name in enumerate(("level", "bit", "index", "good", "bad")):
-            sim.drive(getattr(dut.bits, name), lambda cycle, place=place: events[min(cycle, len(events) - 1)][place])
+        cycles = give_bits(sim, dut.bits, events)
         seen = {name: sim.watch(getattr(dut, name)) for name in OUTPUTS}
-        sim.run(len(events))
+        sim.run(cycles)
         return [one[1:] for one in taken(seen)]
 
     return obey
@@ -226,16 +196,13 @@ def test_a_packet_one_of_whose_bytes_has_no_stop_bit_is_not_taken(obey, packet):
 
 
 def test_a_board_without_commands_ignores_them(bench):
-    dut = Listener()
+    dut = Listener(Receiver(BIT))
     assert not hasattr(dut.reader, "command")
     sim = bench(dut)
     data = b"\0" + sealed(order(9, 1)) + sealed(plain(10))
-    levels = [1] * 5
-    for byte in data:
-        levels += [bit for bit in [0, *(byte >> index & 1 for index in range(8)), 1] for _ in range(BIT)]
-    sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+    cycles = dut.receive(sim, line(data, BIT))
     received, number = sim.watch(dut.reader.received), sim.watch(dut.reader.number)
-    sim.run(len(levels) + 12)
+    sim.run(cycles)
     assert [number[cycle + 1] for cycle, taken in enumerate(received.values) if taken] == [10]
 
 
@@ -285,7 +252,7 @@ def test_no_burst_of_up_to_sixteen_bits_makes_another_command(obey, rng):
 def test_any_bytes_hold_what_the_model_finds(bench, rng):
     """Requests, commands, parts of some, anything: in each clock, the number too."""
     bit_clocks = 4
-    dut = Listener(bit_clocks, commands=True)
+    dut = Listener(Receiver(bit_clocks), commands=True)
     data = b"\0"
     for _ in range(40):
         asks = rng.random() < 0.5
@@ -293,15 +260,12 @@ def test_any_bytes_hold_what_the_model_finds(bench, rng):
         command = order(number, rng.randrange(128), rng.randrange(1 << 21), asks, rng.choice([10, 10, 5]))
         part = rng.choice([sealed(plain(number, asks)), sealed(command), sealed(command), b"\0", rng.randbytes(3)])
         data += part[: rng.randrange(len(part) + 1)] if rng.random() < 0.2 else part
-    levels = [1] * 5
-    for byte in data:
-        levels += [bit for bit in (0, *(byte >> index & 1 for index in range(8)), 1) for _ in range(bit_clocks)]
     sim = bench(dut)
-    sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+    cycles = dut.receive(sim, line(data, bit_clocks))
     seen = {name: sim.watch(getattr(dut.reader, name)) for name in OUTPUTS}
-    sim.run(len(levels) + 12)
-    told = heard([(5, data)], bit_clocks, commands=True)
+    sim.run(cycles)
+    told = heard([(IDLE, data)], bit_clocks, commands=True)
     assert taken(seen) == [(one.cycle, one.number, one.hello, one.command) for one in told.requests]
-    assert seen["number"].values == [told.number(cycle) for cycle in range(len(levels) + 12)]
+    assert seen["number"].values == [told.number(cycle) for cycle in range(cycles)]
     assert sum(one.command is not None for one in told.requests) > 4
     assert sum(one.command is None for one in told.requests) > 2

@@ -1,12 +1,13 @@
 """Line reversal with guard lines: each break is told and nothing else, when touches are seen, and motion in a frame."""
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
-from reversal import FAST, any_skin, checked_soon, noted_pins, selected_changes, small, touches
+from bench import split
+from guard_lines import breaks
+from reversal import FAST, any_skin, noted_pins, selected_changes, small, touches
 from sample import sample
 
 from contactfpga.skin import Skin
@@ -44,11 +45,9 @@ def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
     sim, sheet = bench(dut), InputDriver(skin, timeline)
     sink, packed, driven = sim.sink(dut.rows), [], []
     ports = [getattr(dut.pins, name) for name in sheet.reads]
-    places = list(itertools.accumulate((len(port) for port in ports), initial=0))
 
     def levels(cycle: int, pins: int) -> int:
-        seen = [pins >> begin & (1 << end - begin) - 1 for begin, end in itertools.pairwise(places)]
-        named = dict(zip(sheet.reads, seen, strict=True))
+        named = dict(zip(sheet.reads, split(pins, map(len, ports)), strict=True))
         driven.append((named["rows_drive"], named["columns_drive"], named["columns_level"]))
         columns, rows, _ = sheet.pins(cycle, named)
         return columns | rows << skin.column_lines
@@ -63,11 +62,6 @@ def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
     words, contact, motion = sim.watch(dut.faults), sim.watch(dut.contact), sim.watch(dut.tag.motion)
     sim.run(cycles)
     return Life(words.values, contact.values, motion.values, driven, packed)
-
-
-@pytest.fixture
-def soon(monkeypatch):
-    checked_soon(monkeypatch)
 
 
 def cut_now_and_then(skin: Skin, rng, cycles: int) -> list[tuple[int, Cuts]]:
@@ -141,18 +135,6 @@ def test_frames_come_between_reports_of_faults_and_tell_of_both():
     flags = [one.frame.flags for one in frames_in(skin, trace.bytes)]
     assert {"fault", "motion"} in flags
     assert flags[0] == frozenset()
-
-
-def breaks(rows: int, columns: int) -> list[tuple[Cuts, int]]:
-    """Each line, guard lines too, cut at each place, and the word that tells it."""
-    found = []
-    for end in range(columns + 1):
-        found += [(Cuts({row: end}), 1 << row) for row in range(rows)]
-        found.append((Cuts({rows: end}), (1 << columns) - (1 << end) << rows))
-    for end in range(rows + 1):
-        found += [(Cuts({}, {column: end}), 1 << rows + column) for column in range(columns)]
-        found.append((Cuts({}, {columns: end}), (1 << rows) - (1 << end)))
-    return found
 
 
 def in_turn(rng, spacing: int, lasts: int) -> tuple[list[int], list[tuple[int, Cuts]]]:

@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
-from reversal import any_skin, checked_soon, small, touches
+from bench import split
+from reversal import any_skin, small, touches
 from sample import sample
 
 from contactfpga.instruments.self_test import SelfTest
@@ -20,11 +21,6 @@ from contactfpga_sim.model.sheet.matrix import Shorts
 from contactfpga_sim.model.sheet.shift import SheetAtPins
 from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare
-
-
-@pytest.fixture
-def soon(monkeypatch):
-    checked_soon(monkeypatch)
 
 
 def asked(skin: Skin, rng, cycles: int) -> list[tuple[int, bytes]]:
@@ -94,11 +90,9 @@ def self_test(bench, skin: Skin, pressed: np.ndarray, shorts: Shorts, stuck: np.
     sheet.matrix.join(shorts)
     sheet.matrix.press(pressed, stuck)
     ports = [getattr(dut.pins, name) for name in sheet.reads]
-    places = list(itertools.accumulate((len(port) for port in ports), initial=0))
 
     def levels(_: int, pins: int) -> int:
-        seen = [pins >> begin & (1 << end - begin) - 1 for begin, end in itertools.pairwise(places)]
-        columns, rows = sheet.step(dict(zip(sheet.reads, seen, strict=True)))
+        columns, rows = sheet.step(dict(zip(sheet.reads, split(pins, map(len, ports)), strict=True)))
         return columns | rows << skin.column_lines
 
     sim.drive(Cat(dut.pins.columns, dut.pins.rows_read), levels, Cat(*ports))

@@ -8,6 +8,7 @@ import random
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
+from bench import split
 from sample import sample
 
 from contactfpga import Skin
@@ -85,11 +86,9 @@ def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, dist
     driven = []
 
     def levels(cycle, word):
-        pins = {}
-        for name, port in zip(sheet.reads, ports):
-            pins[name] = word & (1 << len(port)) - 1
-            word >>= len(port)
-            seen[name].append(pins[name])
+        pins = dict(zip(sheet.reads, split(word, map(len, ports)), strict=True))
+        for name, value in pins.items():
+            seen[name].append(value)
         disturb(cycle, sheet)
         columns = np.array([stuck(cycle) >> column & 1 for column in range(skin.columns)], bool)
         sheet.matrix.press(cells[min(cycle, len(cells) - 1)], columns)

@@ -1,21 +1,13 @@
 """The UART's two halves, level by level."""
 
 import pytest
+from wire import line
 
 from contactfpga_hdl.link.uart import Receiver, Transmitter
 
 BIT_CLOCKS = (2, 3, 4, 104)
 SAMPLED = (4, 5, 104)
 """With fewer clocks a board reads pulses."""
-
-
-def line(data, bit_clocks):
-    """The levels that carry the bytes: 8 data bits, lowest first, between a start and a stop bit."""
-    levels = []
-    for byte in data:
-        for bit in [0, *(byte >> index & 1 for index in range(8)), 1]:
-            levels += [bit] * bit_clocks
-    return levels
 
 
 def received(bench, bit_clocks, levels, idle=3):

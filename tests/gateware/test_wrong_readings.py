@@ -8,15 +8,13 @@ import random
 
 import numpy as np
 import pytest
-from reversal import FAST, any_skin, small
+from reversal import FAST, any_skin, checked_soon, small
 from sample import sample
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
-from contactfpga_sim.model.golden import Timeline, guard, predict, requests
-from contactfpga_sim.model.golden import reversal_lines as golden_guard
+from contactfpga_sim.model.golden import Timeline, predict, requests
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.sheet.matrix import Matrix
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
@@ -148,11 +146,7 @@ def any_history(rng: random.Random, skin: Skin, cycles: int) -> Timeline:
 @pytest.fixture
 def soon(monkeypatch):
     """Columns are tried every 64 us, and a sheet at rest is checked every 16 us."""
-    monkeypatch.setattr(reversal, "RETRY_BIT", 6)
-    monkeypatch.setattr(guard, "RETRY_US", 2**6)
-    for module in (reversal, reversal_guard):
-        monkeypatch.setattr(module, "CHECK_BIT", 4)
-    monkeypatch.setattr(golden_guard, "CHECK_US", 2**4)
+    checked_soon(monkeypatch, check_bit=4, retry_bit=6)
 
 
 KINDS = [

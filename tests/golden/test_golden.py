@@ -1,15 +1,13 @@
 """The golden model of the whole chain: rules of docs/timing.md worked by hand, and packets read back."""
 
-import math
 import re
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cobs import cobs
-from reversal import small, zones
-from zone_oracles import zones_by_image_tools
+from reversal import small
+from zone_oracles import nearest, zones_by_image_tools, zones_by_scipy
 
 from contactfpga.choices import labellers
 from contactfpga.skin import Skin
@@ -278,9 +276,8 @@ def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
 
 def rounded(zone: tuple[int, int, int], bits: int) -> tuple[int, int, int]:
     """Area, and both sums over it, to the nearest step of 1/2^bits, half a step upward."""
-    area, *sums = zone
-    x, y = (math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2)) for total in sums)
-    return area, x, y
+    area, sum_x, sum_y = zone
+    return area, nearest(sum_x, area, bits), nearest(sum_y, area, bits)
 
 
 def test_widths_of_barycenters_agree_with_the_gatewares_table_for_every_sheet():
@@ -355,4 +352,4 @@ def test_moments_of_zones_in_rows_that_were_driven_count_the_rows_between(labell
     if labeller == "single":
         assert found == [(len(rows), sum(rows))]
     else:
-        assert found == sorted((area, sum_y) for area, _, sum_y in zones(cells, 8))
+        assert found == sorted((area, sum_y) for area, _, sum_y in zones_by_scipy(cells))

@@ -3,7 +3,8 @@
 import cv2
 import numpy as np
 import pytest
-from scipy import ndimage
+from label_rules import row_rule
+from zone_oracles import cells_of, every_frame, zones_by_scipy, zones_of_frames
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model import golden
@@ -60,25 +61,9 @@ RINGS = """
 """
 
 
-def drawn(art: str) -> np.ndarray:
-    return np.array([[mark == "#" for mark in line] for line in art.split()])
-
-
 def random_frames(rng: np.random.Generator, shape: tuple[int, int], count: int) -> np.ndarray:
     density = rng.random((count, 1, 1))
     return rng.random((count, *shape)) < density
-
-
-def scipy_zones(frames: np.ndarray, connectivity: int) -> list[tuple[int, int, int, int]]:
-    """Sorted (frame, area, sum x, sum y) of (N, R, C) frames, found in one call."""
-    structure = np.zeros((3, 3, 3), int)
-    structure[1] = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
-    labels, count = ndimage.label(frames, structure)
-    index = np.arange(1, count + 1)
-    frame, y, x = np.indices(frames.shape)
-    columns = [ndimage.minimum(frame, labels, index)] if count else [np.zeros(0)]
-    columns += [ndimage.sum_labels(weight, labels, index) for weight in (np.ones_like(x), x, y)]
-    return sorted(map(tuple, np.array(columns).T.astype(int).tolist()))
 
 
 def cv2_zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
@@ -95,11 +80,6 @@ def vector_zones(frames: np.ndarray, connectivity: int) -> list[tuple[int, int, 
     return list(map(tuple, np.column_stack([found.frame, found.sorted_moments()]).tolist()))
 
 
-def every_frame(rows: int, columns: int) -> np.ndarray:
-    numbers = np.arange(2 ** (rows * columns))[:, None]
-    return (numbers >> np.arange(rows * columns) & 1).astype(bool).reshape(-1, rows, columns)
-
-
 @pytest.mark.parametrize("connectivity", CONNECTIVITIES)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_flood_fill_agrees_with_scipy_and_opencv(shape, connectivity):
@@ -107,13 +87,13 @@ def test_flood_fill_agrees_with_scipy_and_opencv(shape, connectivity):
     for cells in random_frames(rng, shape, 12):
         found = golden.zones(cells, connectivity)
         assert found == cv2_zones(cells, connectivity)
-        assert found == [zone[1:] for zone in scipy_zones(cells[None], connectivity)]
+        assert found == zones_by_scipy(cells, connectivity)
 
 
 @pytest.mark.parametrize("connectivity", CONNECTIVITIES)
 def test_every_4x4_frame_agrees_with_scipy(connectivity):
     frames = every_frame(4, 4)
-    assert vector_zones(frames, connectivity) == scipy_zones(frames, connectivity)
+    assert vector_zones(frames, connectivity) == zones_of_frames(frames, connectivity)
 
 
 @pytest.mark.parametrize("connectivity", CONNECTIVITIES)
@@ -134,6 +114,26 @@ def test_many_frames_at_once_agree_with_flood_fill_and_the_labellers_rule(shape,
         assert end[index, -1] == one.end
         final = [zone.clock for zone in one.departures if zone.row == shape[0] - 1]
         assert clocks[index] == max(final, default=0)
+
+
+@pytest.mark.parametrize("closed", [False, True], ids=["plane", "closed"])
+@pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+@pytest.mark.parametrize("labeller", [name for name, labeller in LABELLERS.items() if labeller.exact])
+def test_clocks_of_rows_are_those_of_the_rules_worked_cell_by_cell(labeller, connectivity, closed):
+    compared = 0
+    for rows, columns, count in ((4, 4, 1500), (3, 3, 1000), (5, 7, 500), (3, 16, 150), (2, 64, 25)):
+        frames = random_frames(np.random.default_rng([rows, columns, connectivity]), (rows, columns), count)
+        rule = LABELLERS[labeller].load_golden()
+        leaves, busy, end = (rule.closed if closed else rule).strips(frames, connectivity)
+        words = (frames.astype(object) << np.arange(columns)).sum(axis=2)
+        for frame, y in np.ndindex(words.shape):
+            pair = (words[frame, y - 1] if y else 0, words[frame, y])
+            clusters, *clocks = row_rule(pair, columns, connectivity, labeller, closed)
+            assert [busy[frame, y], end[frame, y]] == clocks
+            for cluster, clock in clusters:
+                assert max(leaves[frame, y, x] for _, x in cluster) == clock
+                compared += 1
+    assert compared > 10_000
 
 
 @pytest.mark.slow
@@ -161,7 +161,7 @@ def test_frames_beyond_one_portion_keep_their_places():
     ],
 )
 def test_known_shapes(art, connectivity, zones):
-    cells = drawn(art)
+    cells = cells_of(art)
     assert golden.zones(cells, connectivity) == zones
     assert vector_zones(cells[None], connectivity) == [(0, *zone) for zone in zones]
 
@@ -188,7 +188,7 @@ def test_known_shapes(art, connectivity, zones):
     ],
 )
 def test_step_rule_by_hand(art, connectivity, steps, departures):
-    work = labelling(drawn(art), connectivity)
+    work = labelling(cells_of(art), connectivity)
     assert work.busy == tuple(count + 1 for count in steps)
     assert work.end == steps[-1] + 3
     assert [(zone.row, zone.clock - 2) for zone in work.departures] == departures
@@ -210,7 +210,7 @@ def test_step_rule_by_hand(art, connectivity, steps, departures):
     ],
 )
 def test_column_rule_by_hand(art, connectivity, busy, departures):
-    work = labelling(drawn(art), connectivity, "serial")
+    work = labelling(cells_of(art), connectivity, "serial")
     assert work.busy == busy
     assert work.end == busy[-1]
     assert [(zone.row, zone.clock) for zone in work.departures] == departures

@@ -9,7 +9,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("jvrc_description")
 
 import mujoco
-from mujoco_rig import TILES, compiled
+from mujoco_rig import TILES, compiled, random_touches
 
 import contactfpga
 from contactfpga.mujoco import Sheets, wear
@@ -103,17 +103,6 @@ def test_frames_are_those_of_pinocchio(robot):
     assert compared == 5 * (model.nbody - 1) > 200
 
 
-def random_touches(rng, link, skin, count):
-    """Pushes of 2 to 8 N, at least 40 mm apart and a pitch from the edges."""
-    found = []
-    while len(found) < count:
-        x, y = rng.uniform(10, 140), rng.uniform(10, 140)
-        x *= skin.pitch_x_mm / 10
-        if all(np.hypot(x - other[1], y - other[2]) > 40 for other in found):
-            found.append((link, float(x), float(y), float(rng.uniform(2, 8))))
-    return found
-
-
 def heard(robot, touches, golden, seconds=0.06):
     """The contacts of a snapshot in the base frame, and those of MuJoCo: point, normal out of the link, force in N."""
     model, data = standing(robot, touches)
@@ -142,7 +131,7 @@ def test_each_touch_of_four_links_is_where_mujoco_has_it(robot):
     rng, links = np.random.default_rng(0), Body.load(robot).links
     errors, stated, normals = [], [], []
     for _ in range(2):
-        touches = [one for name, plan in links.items() for one in random_touches(rng, name, plan.skin, 2)]
+        touches = [one for name, plan in links.items() for one in random_touches(rng, 2, name, plan.skin.pitch_x_mm)]
         contacts, true = heard(robot, touches, golden=True)
         assert len(contacts) == len(true) == 8
         pairs = paired(contacts, true)
@@ -162,7 +151,7 @@ def test_the_places_of_480_touches_are_as_the_page_says(robot):
     rng, links = np.random.default_rng(100), Body.load(robot).links
     errors, stated, normals = [], [], []
     for _ in range(60):
-        touches = [one for name, plan in links.items() for one in random_touches(rng, name, plan.skin, 2)]
+        touches = [one for name, plan in links.items() for one in random_touches(rng, 2, name, plan.skin.pitch_x_mm)]
         contacts, true = heard(robot, touches, golden=True)
         assert len(contacts) == len(true) == 8
         for one, other in paired(contacts, true):
@@ -179,7 +168,7 @@ def test_the_forces_of_units_are_mujocos(robot):
     rng, skin = np.random.default_rng(1), Body.load(with_units(robot)).links["chest"].skin
     shares = []
     for count in (1, 2):
-        contacts, true = heard(robot, random_touches(rng, "chest", skin, count), golden=False)
+        contacts, true = heard(robot, random_touches(rng, count, "chest", skin.pitch_x_mm), golden=False)
         assert len(contacts) == len(true) == count
         shares += [one.normal_n / other[2] - 1 for one, other in paired(contacts, true)]
     assert np.abs(shares).max() < 0.1

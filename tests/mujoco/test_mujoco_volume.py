@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from mujoco_rig import pressed, robot
+from mujoco_rig import pressed, random_touches, robot
 
 from contactfpga.mujoco import Sheets
 
@@ -27,7 +27,7 @@ def test_pushes_are_as_the_page_says(tmp_path):
     rng, errors, inside = np.random.default_rng(7), {1: [], 2: [], 3: []}, {1: [], 2: [], 3: []}
     for seed in range(1020):
         count = 1 + seed % 3
-        contacts, true = heard(toml, places(rng, count), 7000 + seed)
+        contacts, true = heard(toml, random_touches(rng, count), 7000 + seed)
         assert len(contacts) == len(true) == count
         for one in contacts:
             nearest = min(true, key=lambda other: np.linalg.norm(np.array(other.point_m) - one.point_m))
@@ -40,16 +40,6 @@ def test_pushes_are_as_the_page_says(tmp_path):
     shares = [100 * float(np.mean(each)) for each in inside.values()]
     assert shares == pytest.approx([93.2, 97.4, 96.7], abs=0.06)
     assert 93 < 100 * np.mean(np.concatenate(list(inside.values()))) < 97
-
-
-def places(rng, count):
-    """Pushes of 2 to 8 N, at least 40 mm apart."""
-    found = []
-    while len(found) < count:
-        x, y = rng.uniform(10, 140, 2)
-        if all(np.hypot(x - other[1], y - other[2]) > 40 for other in found):
-            found.append(("link", float(x), float(y), float(rng.uniform(2, 8))))
-    return found
 
 
 def heard(toml, touches, seed):

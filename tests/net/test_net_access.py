@@ -156,11 +156,6 @@ def test_who_may_not_read_the_bytes_is_told(keys, monkeypatch):
             contactfpga.open(keys.port(), timeout=0.5)
 
 
-@pytest.fixture
-def endpoint():
-    return free_endpoint()
-
-
 def port(endpoint):
     return f"zenoh://left?connect={endpoint}"
 

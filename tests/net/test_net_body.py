@@ -4,7 +4,6 @@ import json
 
 import pytest
 from fake_board import wait_until
-from net_processes import free_endpoint
 from small_port import SmallPort, published
 
 import contactfpga
@@ -24,11 +23,6 @@ port = "zenoh://robot/{name}?connect={endpoint}"
 late_s = 1.0
 silent_s = 1.5
 """
-
-
-@pytest.fixture
-def endpoint():
-    return free_endpoint()
 
 
 @pytest.fixture

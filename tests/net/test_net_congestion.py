@@ -32,9 +32,8 @@ class FirstKept(net_port.ZenohPort):
 
 
 @pytest.mark.parametrize("block", [False, True], ids=["drop", "block"])
-def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch):
+def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoint):
     monkeypatch.setattr(net_port, "ZenohPort", FirstKept)
-    endpoint = free_endpoint()
     source = SmallPort()
     with (
         session.listening(f"{endpoint}#so_sndbuf=4096") as network,

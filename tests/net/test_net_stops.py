@@ -56,9 +56,8 @@ def go_on(board, reader, since_s):
 
 
 @pytest.mark.slow
-def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted():
+def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted(endpoint):
     """Shortly, so that Zenoh does not notice, and for so long that it closes connections."""
-    endpoint = free_endpoint()
     port = f"zenoh://contactfpga/left-forearm?connect={endpoint}&wait=60"
     with (
         Streaming(SKIN, every_s=0.01) as board,

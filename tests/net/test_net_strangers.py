@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, wait_until
-from net_processes import Streaming, free_endpoint, publish, router
+from net_processes import Streaming, publish, router
 
 import contactfpga
 from contactfpga.robot.net import session
@@ -39,8 +39,7 @@ def first_message(network):
 
 
 @pytest.mark.parametrize("far", [1, 1 << 20, 1 << 63])
-def test_one_forged_message_of_any_number_silences_no_reader(far):
-    endpoint = free_endpoint()
+def test_one_forged_message_of_any_number_silences_no_reader(far, endpoint):
     with Streaming(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
         with contactfpga.open(publisher.line, timeout=LONG) as reader, session.connected(endpoint) as stranger:
             read = first_message(stranger)
@@ -55,8 +54,7 @@ def test_one_forged_message_of_any_number_silences_no_reader(far):
             wait_until(lambda: reader.next(LONG) and reader.stats.frames > frames + 50, LONG)
 
 
-def test_a_forged_token_keeps_no_publisher_from_starting_and_hides_no_death():
-    endpoint = free_endpoint()
+def test_a_forged_token_keeps_no_publisher_from_starting_and_hides_no_death(endpoint):
     with Streaming(SKIN) as board, router(endpoint), session.connected(endpoint) as stranger:
         stranger.liveliness().declare_token(f"{KEY}/alive/00000000deadbeef")
         with publish(board.path, "--connect", endpoint) as publisher:

@@ -54,8 +54,7 @@ def take_until(board, condition, sent_us):
     return found
 
 
-def test_a_published_board_is_a_board(streaming):
-    endpoint = free_endpoint()
+def test_a_published_board_is_a_board(streaming, endpoint):
     with publish(streaming.path, "--listen", endpoint) as publisher:
         assert publisher.line == port(endpoint)
         with contactfpga.open(publisher.line, SKIN, timeout=LONG) as board:
@@ -83,8 +82,7 @@ def assert_given_back(pid, path):
         wait_until(lambda: path not in {os.readlink(one).removesuffix(" (deleted)") for one in held.iterdir()})
 
 
-def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming):
-    endpoint = free_endpoint()
+def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming, endpoint):
     other = FakeBoard(contactfpga.Skin(name="chest", rows=9))
     with other, publish(streaming.path, "--listen", endpoint, others=[other.path]) as publisher:
         lines = [publisher.line, publisher.process.stdout.readline().strip()]
@@ -103,8 +101,7 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
 
 
 @pytest.mark.slow
-def test_a_killed_publisher_shows_within_a_second(streaming):
-    endpoint = free_endpoint()
+def test_a_killed_publisher_shows_within_a_second(streaming, endpoint):
     with router(endpoint), publish(streaming.path, "--connect", endpoint) as publisher:
         with contactfpga.open(publisher.line, timeout=LONG) as board:
             take(board, 0.3, streaming.sent_us)
@@ -118,8 +115,7 @@ def test_a_killed_publisher_shows_within_a_second(streaming):
 
 
 @pytest.mark.slow
-def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(streaming):
-    endpoint = free_endpoint()
+def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(streaming, endpoint):
     with router(endpoint):
         with publish(streaming.path, "--connect", endpoint) as publisher:
             board = contactfpga.open(port(endpoint, wait_s=60), timeout=LONG)
@@ -134,8 +130,7 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
 
 
 @pytest.mark.slow
-def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming):
-    endpoint = free_endpoint()
+def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming, endpoint):
     with router(endpoint) as first, publish(streaming.path, "--connect", endpoint):
         with contactfpga.open(port(endpoint, wait_s=60), timeout=LONG) as board:
             take(board, 0.3, streaming.sent_us)
@@ -149,8 +144,7 @@ def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming):
                 assert stats.restarts == 0
 
 
-def test_a_link_that_flaps_loses_frames_and_counts_them(streaming):
-    endpoint = free_endpoint()
+def test_a_link_that_flaps_loses_frames_and_counts_them(streaming, endpoint):
     with publish(streaming.path, "--listen", endpoint), Relay(endpoint) as relay:
         with contactfpga.open(port(relay.endpoint, wait_s=60), timeout=LONG) as board:
             for pause_s in (0.1, 1.0):
@@ -201,8 +195,7 @@ def test_a_port_that_is_named_twice_is_told_as_that(streaming, tmp_path, capsys)
         assert capsys.readouterr().err == said
 
 
-def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys):
-    endpoint = free_endpoint()
+def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys, endpoint):
     with router(endpoint):
         assert cli.main(["publish", streaming.path, "--listen", endpoint, "--timeout", "60"]) == 1
     errors = capsys.readouterr().err
@@ -230,8 +223,7 @@ def test_an_endpoint_that_zenoh_cannot_read_is_one_line(opened):
         opened("nowhere")
 
 
-def test_a_board_that_is_unplugged_ends_its_publisher():
-    endpoint = free_endpoint()
+def test_a_board_that_is_unplugged_ends_its_publisher(endpoint):
     with FakeBoard(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
         board.unplug()
         said = publisher.process.communicate(timeout=LONG)[1]

@@ -1,6 +1,7 @@
 """The page of claims: written from tests/claims.toml, about tests that exist, judged by what a run says of them."""
 
 import ast
+import csv
 import subprocess
 import sys
 import tomllib
@@ -16,6 +17,14 @@ NAMED = sorted({test for section in CLAIMS["section"] for claim in section["clai
 
 def test_the_page_is_written_from_the_claims():
     assert verification.PAGE.read_text(encoding="utf-8") == verification.page(CLAIMS)
+    assert verification.CLAIMS.read_text(encoding="utf-8") == verification.listed_claims(CLAIMS)
+
+
+def test_the_list_has_each_claim_with_all_its_tests():
+    rows = list(csv.DictReader(verification.CLAIMS.read_text(encoding="utf-8").splitlines()))
+    claims = [claim for section in CLAIMS["section"] for claim in section["claim"]]
+    assert [(row["claim"], row["tests"].split()) for row in rows] == [(one["claim"], one["tests"]) for one in claims]
+    assert f"[all {len(rows)} claims](tables/verification.csv)" in verification.PAGE.read_text(encoding="utf-8")
 
 
 def test_each_test_that_a_claim_names_exists():

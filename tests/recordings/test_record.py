@@ -5,7 +5,7 @@ import threading
 
 import pytest
 from fake_board import FakeBoard, wait_until
-from recorded_stream import StreamPort, recorded
+from recorded_stream import StreamPort, recorded, replayed
 
 import contactfpga
 from contactfpga import Skin
@@ -17,18 +17,13 @@ SKIN = Skin()
 LONG = 60.0
 
 
-def frames(file, skin=None):
-    with contactfpga.open(f"replay://{file}", skin) as board:
-        return [zones.to_dict() for zones in board]
-
-
 def test_replay_is_exact_to_the_byte(tmp_path):
     port = StreamPort()
     recorded(tmp_path, port)
     data = b"".join(data for _, data in Recording(tmp_path / "touches.mcap").raw_bytes())
     assert data == port.sent
     (tmp_path / "bytes.bin").write_bytes(port.sent)
-    assert frames(tmp_path / "touches.mcap") == frames(tmp_path / "bytes.bin")
+    assert replayed(tmp_path / "touches.mcap") == replayed(tmp_path / "bytes.bin")
     with contactfpga.open(f"replay://{tmp_path / 'touches.mcap'}", record=tmp_path / "again.bin") as board:
         assert len(list(board)) > 600
         assert board.stats.lost == 0
@@ -50,7 +45,7 @@ def test_frames_come_with_their_times(tmp_path):
     recorded(tmp_path)  # a frame every ms
     recording = Recording(tmp_path / "touches.mcap")
     every = list(recording.frames())
-    assert len(every) == len(frames(tmp_path / "touches.mcap")) > 600
+    assert len(every) == len(replayed(tmp_path / "touches.mcap")) > 600
     assert recording.duration_s == pytest.approx(0.6, abs=0.05)
     assert {link for _, link, _ in every} == {"left hand"}
     times = [t_s for t_s, _, _ in every]
@@ -74,7 +69,7 @@ def test_replay_starts_at_the_hello_before_a_time(tmp_path):
     file = tmp_path / "touches.mcap"
     with contactfpga.open(f"replay://{file}?start=0.35") as board:
         found = list(board)
-    everything = frames(file)
+    everything = replayed(file)
     assert 0.3 < found[0].time_us / 1e6 < 0.35
     assert [zones.to_dict() for zones in found[1:]] == everything[1 - len(found) :]  # `motion` needs the one before
     with pytest.raises(contactfpga.ContactFPGAError, match=r"lasts 0\.6\d\d s; it cannot start at 4 s"):
@@ -91,7 +86,7 @@ def test_programs_of_others_read_the_messages(tmp_path):
         found = [(c.topic, t, reader.deserialize(raw, c.msgtype)) for c, t, raw in reader.messages()]
     zones = [message for topic, _, message in found if topic == "/left_hand/zones"]
     assert len(zones) == link.frames
-    told = frames(tmp_path / "touches.mcap")[-len(zones) :]
+    told = replayed(tmp_path / "touches.mcap")[-len(zones) :]
     assert [one.device_time_us for one in zones] == [one["time_us"] for one in told]
     assert [one.zones[0].sum_x for one in zones] == [one["zones"][0]["sum_x"] for one in told]
     assert {one.header.frame_id for one in zones} == {"left hand"}
@@ -110,7 +105,7 @@ def test_programs_of_others_read_the_messages(tmp_path):
 def test_bytes_only_is_smaller_and_plays_the_same(tmp_path):
     both = [recorded(tmp_path, name=f"{bare}.mcap", bytes_only=bare) for bare in (True, False)]
     assert both[0].size < both[1].size / 2
-    assert frames(tmp_path / "True.mcap") == frames(tmp_path / "False.mcap")
+    assert replayed(tmp_path / "True.mcap") == replayed(tmp_path / "False.mcap")
     assert all(session.size == session.files[0].stat().st_size for session in both)
 
 

@@ -39,6 +39,16 @@ def frames(board):
     return [b"".join(made.frame() for _ in range(20)) for _ in range(60)]
 
 
+def limited(limit):
+    """For a child, before it starts: its files may hold this many bytes."""
+
+    def limit_files():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    return limit_files
+
+
 def noise(_board):
     """No packet at all, which nothing can compress: far more bytes than frames would be."""
     return [os.urandom(4096).replace(b"\0", b"\1") for _ in range(80)]
@@ -156,14 +166,9 @@ def test_what_ends_a_program_closes_the_file(tmp_path, number):
 def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
     """A limit on the size of files stands for it."""
     limit = 40_000
-
-    def limited():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
     with FakeBoard(SKIN) as board:
         file = tmp_path / "x.mcap"
-        process = record(file, board.path, preexec_fn=limited, env=UNKEPT)
+        process = record(file, board.path, preexec_fn=limited(limit), env=UNKEPT)
         wait_until(lambda: file.exists() and file.stat().st_size > 0)
         with Sender(board, frames, 0.002):
             _, errors = process.communicate(timeout=LONG)
@@ -341,13 +346,8 @@ def test_messages_outside_of_chunks_are_copied(tmp_path):
 def test_no_room_for_the_new_file_leaves_nothing_of_it(closed):
     """A limit on the size of files stands for a full disk."""
     path, *_ = closed
-
-    def limited():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
-
     command = [sys.executable, "-m", "contactfpga", "record", "--recover", str(path)]
-    done = subprocess.run(command, preexec_fn=limited, capture_output=True, text=True, env=UNKEPT)
+    done = subprocess.run(command, preexec_fn=limited(2000), capture_output=True, text=True, env=UNKEPT)
     assert done.returncode == 1
     new = path.with_name("closed_recovered.mcap")
     assert " ".join(done.stderr.split()) == (

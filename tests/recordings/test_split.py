@@ -1,19 +1,13 @@
 """A recording in several files one after the other, which are read one by one or together."""
 
 import pytest
-from recorded_stream import NAMES, StreamPort, recorded, recorded_both
+from recorded_stream import NAMES, StreamPort, recorded, recorded_both, replayed
 
-import contactfpga
 from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.recorder import Split
 
 SPLIT = {"split": Split(bytes=3_000), "bytes_only": True}
-
-
-def frames(file):
-    with contactfpga.open(f"replay://{file}") as board:
-        return [zones.to_dict() for zones in board]
 
 
 def test_split_files_each_begin_with_a_hello_and_lose_nothing(tmp_path):
@@ -23,9 +17,9 @@ def test_split_files_each_begin_with_a_hello_and_lose_nothing(tmp_path):
     assert [file.name for file in session.files[:2]] == ["touches_0001.mcap", "touches_0002.mcap"]
     pieces = [b"".join(data for _, data in Recording(file).raw_bytes()) for file in session.files]
     assert b"".join(pieces) == port.sent
-    counts = [len(frames(file)) for file in session.files]
+    counts = [len(replayed(file)) for file in session.files]
     (tmp_path / "all.bin").write_bytes(port.sent)
-    assert sum(counts) == len(frames(tmp_path / "all.bin"))
+    assert sum(counts) == len(replayed(tmp_path / "all.bin"))
     assert all(counts)
 
 
@@ -45,12 +39,12 @@ def test_all_files_are_read_by_the_name_that_was_recorded_to(tmp_path):
     session = recorded(tmp_path, port, **SPLIT)
     (tmp_path / "all.bin").write_bytes(port.sent)
     whole = Recording(tmp_path / "touches.mcap")
-    assert frames(tmp_path / "touches.mcap") == frames(tmp_path / "all.bin")
+    assert replayed(tmp_path / "touches.mcap") == replayed(tmp_path / "all.bin")
     assert whole.start_s == Recording(session.files[0]).start_s
     assert whole.skins == Recording(session.files[0]).skins
     assert whole.texts("contactfpga") == Recording(session.files[0]).texts("contactfpga")
     every = [(t_s, zones.to_dict()) for t_s, _, zones in whole.frames()]
-    assert len(every) == len(frames(tmp_path / "all.bin"))
+    assert len(every) == len(replayed(tmp_path / "all.bin"))
     late = Recording(session.files[-1])
     begin_s = late.start_s - whole.start_s
     assert whole.duration_s == pytest.approx(begin_s + late.duration_s)
@@ -102,4 +96,4 @@ def test_the_commands_take_the_name_too(tmp_path, capsys):
         paths = [str(tmp_path / one) if "." in one else one for one in arguments]
         assert cli.main(paths) == 0, capsys.readouterr().err
     rows = (tmp_path / "x.csv").read_text().splitlines()
-    assert len(rows) == 1 + len(frames(tmp_path / "touches.mcap"))
+    assert len(rows) == 1 + len(replayed(tmp_path / "touches.mcap"))

@@ -7,7 +7,7 @@ import time
 import pytest
 import ros_messages
 from net_processes import Streaming
-from recorded_stream import StreamPort, recorded
+from recorded_stream import StreamPort, recorded, replayed
 
 import contactfpga
 from contactfpga.driver.conversation import Conversation
@@ -37,16 +37,15 @@ def test_each_has_a_message_or_is_told(monkeypatch, tmp_path, slow_s, end_s):
     told = sum(int(re.search(r"(\d+) frames came faster", note)[1]) for note in link.notes)
     assert (told > 10) == (end_s < 1)
     assert link.frames > 5
-    times_us = messages(file)
-    assert len(times_us) == link.frames
-    assert frames(file)[: link.frames] == times_us
-    assert len(frames(file)) == link.frames + told
+    told_us = messages(file)
+    assert len(told_us) == link.frames
+    assert times_us(file)[: link.frames] == told_us
+    assert len(times_us(file)) == link.frames + told
 
 
-def frames(file):
+def times_us(file):
     """Device times of the frames in its bytes, as the driver reads them."""
-    with contactfpga.open(f"replay://{file}") as again:
-        return [zones.time_us for zones in again]
+    return [zones["time_us"] for zones in replayed(file)]
 
 
 def messages(file):
@@ -89,20 +88,20 @@ def test_every_frame_has_a_message_whenever_it_ends(monkeypatch, tmp_path, seed)
         time.sleep(rng.random() * 0.3)
     assert session.links[0].notes == []
     assert len(messages(file)) > 1
-    assert messages(file) == frames(file)
+    assert messages(file) == times_us(file)
 
 
 @pytest.mark.parametrize("seconds", [None, 0.1])
 def test_so_has_every_frame_of_a_recording_that_is_recorded_again(tmp_path, seconds):
     first = recorded(tmp_path, StreamPort(frames=300), name="first.mcap")
     assert first.links[0].notes == []
-    assert messages(tmp_path / "first.mcap") == frames(tmp_path / "first.mcap")
+    assert messages(tmp_path / "first.mcap") == times_us(tmp_path / "first.mcap")
     with Session(tmp_path / "second.mcap") as session:
         session.add(f"replay://{tmp_path / 'first.mcap'}")
         session.start(seconds)
         while session.running:
             session.wait(0.05)
-    again = frames(tmp_path / "second.mcap")
+    again = times_us(tmp_path / "second.mcap")
     assert messages(tmp_path / "second.mcap") == again
-    assert again == frames(tmp_path / "first.mcap")[: len(again)]
+    assert again == times_us(tmp_path / "first.mcap")[: len(again)]
     assert len(again) > 100

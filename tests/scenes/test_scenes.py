@@ -1,10 +1,10 @@
 """Scenes and shapes: what touches the sheet."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_frames import RECORDINGS, path_of, recorded
 from sample import sample
 from scipy import ndimage
 
@@ -17,9 +17,6 @@ from contactfpga_sim.model.scenes.families import placements, touches
 from contactfpga_sim.model.scenes.recordings import DEFAULT_HZ, Recording
 from contactfpga_sim.model.scenes.scene import Scene
 from contactfpga_sim.model.scenes.shapes import SHAPES, variants
-
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 
 
 def zones(cells, connectivity=8):
@@ -130,12 +127,8 @@ def test_what_is_no_recording_is_refused(tmp_path):
 @pytest.mark.recordings
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_real_recordings_are_played_frame_by_frame(name, record_property):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
+    path, frames = path_of(name), recorded(name)
     recording = Recording.load(path)
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"]
     skin = Skin(rows=frames.shape[1], columns=frames.shape[2], settle_us=20.0)
     played = scenes.scene(skin, path)
     for number in range(len(frames)):

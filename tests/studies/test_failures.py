@@ -409,15 +409,18 @@ def outcomes(*verdicts):
     return Sweep(tuple(range(len(verdicts))), tuple(made[verdict] for verdict in verdicts))
 
 
+NEVER = "fails at the first value"
+
+
 @pytest.mark.parametrize(
     ("verdicts", "expected"),
     [
-        (("right", "right"), ["1, all there are", "", "", "nothing", ""]),
-        (("silent",), ["nowhere", "**0**", "", "2 zones of 1 contact", "**not noticed**"]),
+        (("right", "right"), ["1, end of range", "", "", "no failure", ""]),
+        (("silent",), [NEVER, "**0**", "", "2 zones of 1 contact", "**not noticed**"]),
         (("right", "told"), ["0", "**1**", "", "2 zones of 1 contact", "`stuck`"]),
         (("right", "warned", "right", "told"), ["2", "**3**", "", "2 zones of 1 contact", "`stuck`, from 1 on"]),
         (("right", "told", "silent"), ["0", "**1**", "", "2 zones of 1 contact", "`stuck`; **not noticed** at 2"]),
-        (("silent", "told"), ["nowhere", "**0**", "", "2 zones of 1 contact", "**not noticed**; `stuck` from 1 on"]),
+        (("silent", "told"), [NEVER, "**0**", "", "2 zones of 1 contact", "**not noticed**; `stuck` from 1 on"]),
     ],
 )
 def test_lines_of_the_table(verdicts, expected):

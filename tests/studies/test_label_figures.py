@@ -17,6 +17,7 @@ from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/performance.md").read_text()
+TABLES = "\n".join(section("performance.md", name) for name in ("labeller", "labeller_recorded"))
 SQUARE = Skin(settle_us=15.0)
 
 
@@ -57,7 +58,7 @@ def test_every_place_is_every_offset_of_the_frame():
 def test_the_gateware_is_as_late_as_the_page_says(places, labeller, connectivity):
     """The worst touch goes through the compiled labeller; the row of the table is that of a new run."""
     skin = SQUARE.replace(labeller=labeller, connectivity=connectivity)
-    assert label_figures.labeller_row(skin, places) in PAGE.splitlines()
+    assert label_figures.labeller_row(skin, places) in TABLES.splitlines()
     rows, _ = places
     clocks = volume.last_record_clocks(rows, connectivity, labeller)
     worst = np.zeros((1, 16, 16), bool)
@@ -67,9 +68,9 @@ def test_the_gateware_is_as_late_as_the_page_says(places, labeller, connectivity
 
 
 def test_no_line_of_the_tables_is_above_its_bound():
-    lines = re.findall(r"\| (\d+) / (\d+) / (\d+) clocks \| (\d+) clocks \| (\d+) \|", PAGE)
+    lines = re.findall(r"\| (\d+) / (\d+) / (\d+) clocks \| (\d+) clocks \| (\d+) \|", TABLES)
     lines += [
-        (*found, found[2], limit) for *found, limit in re.findall(r"\| (\d+) / (\d+) / (\d+), (\d+)(?= \|)", PAGE)
+        (*found, found[2], limit) for *found, limit in re.findall(r"\| (\d+) / (\d+) / (\d+), (\d+)(?= \|)", TABLES)
     ]
     assert len(lines) >= 12 + 10
     for line in lines:
@@ -79,16 +80,11 @@ def test_no_line_of_the_tables_is_above_its_bound():
 
 def test_the_text_says_what_the_tables_say():
     text = " ".join(PAGE.split())
-    (run,) = re.findall(r"\| `run` \| 16x16 \| 8 \| \d+ / (\d+) / (\d+) clocks \| (\d+) clocks \| (\d+) \|", PAGE)
-    (serial,) = re.findall(r"\| `serial` \| 16x16 \| 8 \| \d+ / (\d+) / (\d+) clocks \| (\d+) clocks", PAGE)
-    assert f"its last record at most {run[3]} clocks after the last row;" in text
-    assert f"to break labellers take {run[2]}." in text
-    assert f"at every place, take {run[0]} or fewer in 99 % and {run[1]} at worst." in text
-    assert (
-        f"Touches take {serial[0]} clocks or fewer in 99 % and {serial[1]} at worst, the worst shape {serial[2]}."
-        in text
-    )
-    recorded = re.findall(r"\| 8 \| \d+ / (\d+) / (\d+), \d+ \|", PAGE)
+    (run,) = re.findall(r"\| `run` \| 16x16 \| 8 \| .* clocks \| (\d+) clocks \| \d+ \|", TABLES)
+    (serial,) = re.findall(r"\| `serial` \| 16x16 \| 8 \| .* clocks \| (\d+) clocks", TABLES)
+    assert f"its last record at most {run} clocks after the last row." in text
+    assert f"and needs up to {serial} clocks." in text
+    recorded = re.findall(r"\| 8 \| \d+ / (\d+) / (\d+), \d+ \|", TABLES)
     most, worst = (max(map(int, column)) for column in zip(*recorded))
     assert f"recordings on five sheets take {most} or fewer in 99 % and up to {worst}," in text
 

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_frames import path_of
 from sample import sample
 from study_pages import outdated, section
 
-from contactfpga_sim.lab.performance.scans import RECORDINGS
 from contactfpga_sim.lab.tracking import scenes, scores, tables
 from contactfpga_sim.lab.tracking.scores import Nearest
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs/tracking.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs/tracking.md"
 PITCH_MM = 10.0
 PAGE_RATES = ("100", "1,000", "10,000")
 NAMES = [name for name in scores.TRACKERS if name != "Norfair" or importlib.util.find_spec("norfair")]
@@ -197,10 +196,7 @@ def test_overlap_links_the_frames_of_a_recording(tmp_path):
 @pytest.mark.parametrize("name", sample(["sdh13x6", "feet45x52"], quick=["sdh13x6"]))
 def test_on_recordings_it_is_no_worse_than_the_nearest_zone(name):
     pytest.importorskip("motmetrics")
-    path = ROOT / RECORDINGS / f"{name}.dev.npz"
-    if not path.is_file():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    stretches = [stretch[:200] for stretch in scores.histories(path, 1)[:2]]
+    stretches = [stretch[:200] for stretch in scores.histories(path_of(name), 1)[:2]]
     ours, nearest = (
         scores.score([scores.followed(scores.TRACKERS[name](), one, scores.JUDGED_HZ) for one in stretches])
         for name in ("`Tracker`", "nearest zone")

@@ -4,7 +4,7 @@ import contextlib
 import itertools
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from amaranth.hdl import Cat, Value
@@ -12,6 +12,16 @@ from amaranth.sim import Simulator
 
 NUMBERS = itertools.count(1)
 """Of waveforms."""
+
+
+def split(word: int, widths: Iterable[int]) -> tuple[int, ...]:
+    """The fields of these widths in bits that make up a word, the lowest first."""
+    fields = []
+    for width in widths:
+        fields.append(word & (1 << width) - 1)
+        word >>= width
+    assert word == 0
+    return tuple(fields)
 
 
 class Source:

@@ -16,11 +16,11 @@ from model_board import ModelBoard
 from wire import old_frame, old_hello
 
 
-def wait_until(condition, seconds=60.0):
+def wait_until(condition, seconds=60.0, pause_s=0.002):
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "did not come about"
-        time.sleep(0.002)
+        time.sleep(pause_s)
 
 
 @contextlib.contextmanager

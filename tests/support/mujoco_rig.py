@@ -57,3 +57,14 @@ def compiled(spec, plans, touches, size_m=BALL_M, pose=lambda plan: (np.zeros(3)
     data = mujoco.MjData(model)
     data.ctrl[:] = [force for *_, force in touches]
     return model, data
+
+
+def random_touches(rng, count, link="link", pitch_x_mm=10.0):
+    """Pushes of 2 to 8 N, at least 40 mm apart, a pitch from the edges of a sheet of 16x16 cells 10 mm high."""
+    found = []
+    while len(found) < count:
+        x, y = rng.uniform(10, 140, 2)
+        x *= pitch_x_mm / 10
+        if all(np.hypot(x - other[1], y - other[2]) > 40 for other in found):
+            found.append((link, float(x), float(y), float(rng.uniform(2, 8))))
+    return found

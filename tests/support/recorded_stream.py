@@ -3,6 +3,7 @@
 from fake_board import wait_until
 from model_board import ModelBoard
 
+import contactfpga
 from contactfpga import Skin
 from contactfpga.tools.recordings.session import Session
 
@@ -65,3 +66,9 @@ def recorded_both(file, **options):
         session.start()
         wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
     return ports, session
+
+
+def replayed(file):
+    """The frames of a recording as the driver reads its bytes, each as a dict."""
+    with contactfpga.open(f"replay://{file}") as board:
+        return [zones.to_dict() for zones in board]

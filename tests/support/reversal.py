@@ -4,7 +4,6 @@ import dataclasses
 import itertools
 
 import numpy as np
-from scipy import ndimage
 
 from contactfpga import examples
 from contactfpga.skin import Skin
@@ -32,13 +31,13 @@ def small(**fields) -> Skin:
     return Skin(**{"scan": "reversal", "rows": 3, "columns": 4, **times, **rates, **fields})
 
 
-def checked_soon(monkeypatch) -> None:
-    """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
-    monkeypatch.setattr(reversal, "RETRY_BIT", 8)
-    monkeypatch.setattr(guard, "RETRY_US", 2**8)
+def checked_soon(monkeypatch, check_bit: int = 5, retry_bit: int = 8) -> None:
+    """A sheet at rest is checked every 2^check_bit us, and what is told is renewed every 2^retry_bit us."""
+    monkeypatch.setattr(reversal, "RETRY_BIT", retry_bit)
+    monkeypatch.setattr(guard, "RETRY_US", 2**retry_bit)
     for module in (reversal, reversal_guard):
-        monkeypatch.setattr(module, "CHECK_BIT", 5)
-    monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)
+        monkeypatch.setattr(module, "CHECK_BIT", check_bit)
+    monkeypatch.setattr(golden_guard, "CHECK_US", 2**check_bit)
 
 
 def never_let_go(monkeypatch) -> None:
@@ -180,13 +179,3 @@ def held(skin: Skin, timeline: Timeline, begin: int, end: int) -> np.ndarray:
     for place in skin.mask:
         closed[place] = False
     return closed
-
-
-def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
-    """Sorted (area, sum of x, sum of y), by scipy."""
-    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
-    found = []
-    for number in range(1, count + 1):
-        ys, xs = np.nonzero(labels == number)
-        found.append((len(ys), int(xs.sum()), int(ys.sum())))
-    return sorted(found)

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import termios
 import threading
-import time
 
 
 def environment(**changes):
@@ -68,40 +67,3 @@ def on_terminal(arguments, columns, seconds=120, **variables):
     """Status and output of a contactfpga command on a terminal so wide."""
     terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *map(str, arguments)], columns, **variables)
     return terminal.wait(seconds), terminal.said
-
-
-def descendants(pid):
-    """Every process below this one: {pid: command line}."""
-    parents, lines = {}, {}
-    for name in os.listdir("/proc"):
-        if name.isdigit():
-            with contextlib.suppress(OSError):
-                with open(f"/proc/{name}/stat") as file:
-                    rest = file.read().rpartition(")")[2].split()
-                if rest[0] != "Z":
-                    parents[int(name)] = int(rest[1])
-                    with open(f"/proc/{name}/cmdline", "rb") as file:
-                        lines[int(name)] = file.read().replace(b"\0", b" ").decode(errors="replace")
-    below, found = {pid}, {}
-    while new := {child for child, parent in parents.items() if parent in below and child not in below}:
-        below |= new
-        found |= {child: lines.get(child, "") for child in new}
-    return found
-
-
-def alive(pids):
-    """Those of the processes that still run."""
-    left = []
-    for pid in pids:
-        with contextlib.suppress(OSError):
-            with open(f"/proc/{pid}/stat") as file:
-                if file.read().rpartition(")")[2].split()[0] != "Z":
-                    left.append(pid)
-    return left
-
-
-def wait_for(condition, seconds=60):
-    until = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < until, "did not come about"
-        time.sleep(0.05)

@@ -45,6 +45,12 @@ def undigits(data) -> int:
     return sum((byte - 128) * 128**place for place, byte in enumerate(data))
 
 
+def line(data, bit_clocks) -> list[int]:
+    """The levels that carry the bytes, without gaps: 8 data bits, lowest first, between a start and a stop bit."""
+    bits = [bit for byte in data for bit in (0, *(byte >> place & 1 for place in range(8)), 1)]
+    return [bit for bit in bits for _ in range(bit_clocks)]
+
+
 def taken_in(packets) -> list:
     """(number, whether a hello is asked for, (what, value) of a command or None) of each packet that a board takes."""
     found = []

@@ -1,9 +1,10 @@
-"""Zones by scipy, of closed sheets on many turns of the sheet side by side and of labellers that are not exact."""
+"""Zones by scipy: of sheets, of closed sheets on many turns of the sheet side by side, and of labellers that are not
+exact."""
 
-from pathlib import Path
+import math
+from fractions import Fraction
 
 import numpy as np
-import pytest
 from scipy import ndimage
 
 from contactfpga import Skin
@@ -13,7 +14,37 @@ CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
 RULES = [(connectivity, labeller) for labeller in CLOSED for connectivity in (8, 4)]
 RING, WOUND = -1, -2
 """In place of the sum of the columns."""
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+def cells_of(picture):
+    """(R, C) bool of a line per row, in which # is a pressed cell."""
+    return np.array([[mark == "#" for mark in line] for line in picture.split()])
+
+
+def labeled(frames, connectivity):
+    """Labels of the zones in (N, R, C) frames from 1 on, and the number of zones."""
+    structure = np.zeros((3, 3, 3), bool)
+    structure[1] = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
+    return ndimage.label(frames, structure)
+
+
+def zones_of_frames(frames, connectivity):
+    """Sorted (frame, area, sum x, sum y) of the zones in (N, R, C) frames."""
+    labels, count = labeled(frames, connectivity)
+    frame, y, x = np.nonzero(labels)
+    number = labels[frame, y, x]
+    area, frames_of, sum_x, sum_y = (np.bincount(number, each, count + 1)[1:] for each in (None, frame, x, y))
+    return sorted(zip(*(column.astype(int).tolist() for column in (frames_of / area, area, sum_x, sum_y)), strict=True))
+
+
+def zones_by_scipy(cells, connectivity=8):
+    """Sorted (area, sum x, sum y) of the zones in a frame."""
+    return [zone[1:] for zone in zones_of_frames(cells[None], connectivity)]
+
+
+def nearest(total, area, bits):
+    """The nearest step of 1/2^bits to a zone's sum over its area, half a step upward."""
+    return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
 
 
 def skin_of(rows, columns, connectivity, labeller):
@@ -34,9 +65,7 @@ def zones(frames, connectivity, turns=7):
     """(n, 4) int64, sorted: frame, area, sum of the columns counted on past the seam, sum of the rows, of each zone in
     (N, R, C) frames. Where a zone may not fit on as many turns, its frame is looked at again on twice as many."""
     count, rows, columns = frames.shape
-    structure = np.zeros((3, 3, 3), bool)
-    structure[1] = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
-    labels, pieces = ndimage.label(np.tile(frames, turns), structure)
+    labels, pieces = labeled(np.tile(frames, turns), connectivity)
     frame, y, x = np.nonzero(labels)
     label, turn, x = labels[frame, y, x], x // columns, x % columns
     cell, middle = y * columns + x, turns // 2
@@ -87,21 +116,13 @@ def every_frame(rows, columns, first=0, count=None):
     return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
 
 
-def recorded(name):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        return file["pressed"]
-
-
 def moments(cells):
     y, x = np.nonzero(cells)
     return len(x), int(x.sum()), int(y.sum())
 
 
 def zones_by_image_tools(cells, labeller):
-    """The same zones by scipy's runs: of the row shadow, and of the column shadow of each."""
+    """The zones of a frame by scipy's runs: of the row shadow, and of the column shadow of each."""
     if labeller == "single":
         return [moments(cells)] if cells.any() else []
     bands, count = ndimage.label(cells.any(axis=1))

@@ -8,7 +8,6 @@ from contactfpga import Skin, terminal
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.tools import cli
 from contactfpga.tools.view import opening, replayed
-from contactfpga.tools.view import playback as playing
 from contactfpga.tools.view.playback import Player
 from contactfpga.tools.view.replayed import ByteRecording, Clock
 
@@ -31,10 +30,8 @@ def frames(file):
 
 
 @pytest.fixture
-def player(file, monkeypatch):
-    now = [10.0]
-    monkeypatch.setattr(playing.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
-    return Player(ByteRecording(file), clock=lambda: now[0])
+def player(file, clock):
+    return Player(ByteRecording(file), clock=clock)
 
 
 def test_a_recording_begins_anywhere(file, frames):

@@ -14,7 +14,6 @@ from contactfpga.robot.body import Body, BodyError, packed
 from contactfpga.robot.body.snapshot import on_link
 from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.view import opening, picture
-from contactfpga.tools.view import playback as playing
 from contactfpga.tools.view.bodies import BodyPlayer, pushes
 from contactfpga.tools.view.playback import Player
 
@@ -46,10 +45,8 @@ def file(tmp_path_factory):
 
 
 @pytest.fixture
-def player(file, monkeypatch):
-    now = [10.0]
-    monkeypatch.setattr(playing.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
-    player = BodyPlayer(Recording(file), clock=lambda: now[0])
+def player(file, clock):
+    player = BodyPlayer(Recording(file), clock=clock)
     yield player
     player.close()
 

@@ -3,27 +3,16 @@
 import functools
 import itertools
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_frames import RECORDINGS, recorded
 from sample import sample
-from scipy import ndimage
+from zone_oracles import zones_by_scipy
 
 from contactfpga.tools import cli
 from contactfpga_sim.model.board import replay
 from contactfpga_sim.model.scenes.shapes import variants
-
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
-
-
-def scipy_zones(cells, connectivity):
-    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
-    y, x = np.nonzero(labels)
-    number = labels[y, x]
-    sums = [np.bincount(number, weights, count + 1)[1:] for weights in (None, x, y)]
-    return sorted(zip(*(np.asarray(column, int).tolist() for column in sums)))
 
 
 def assert_zones_are_scipys(frames, connectivity):
@@ -33,7 +22,7 @@ def assert_zones_are_scipys(frames, connectivity):
     assert skin.zone_capacity >= replay.zones_bound(frames, connectivity)
     count = 0
     for cells, result in zip(frames, replay.replay(frames, skin), strict=True):
-        assert sorted(map(tuple, result.frame.moments.tolist())) == scipy_zones(cells, connectivity)
+        assert sorted(map(tuple, result.frame.moments.tolist())) == zones_by_scipy(cells, connectivity)
         assert result.frame.flags == frozenset()
         count += 1
     assert count == len(frames)
@@ -68,11 +57,7 @@ def test_shapes_that_break_labellers(record_property):
     sample([("dtmf16x16", 3000), *((name, None) for name in RECORDINGS)], quick=[("dtmf16x16", 3000)]),
 )
 def test_recordings_have_scipys_zones(record_property, name, most):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        frames = file["pressed"][:most]
+    frames = recorded(name)[:most]
     assert_zones_are_scipys(frames, 8)
     record_property("cases", len(frames))
 
@@ -82,7 +67,7 @@ def test_the_bound_is_never_below_the_zones():
     for density in (0.02, 0.2, 0.4, 0.6):
         frames = rng.random((50, 9, 11)) < density
         for connectivity in (8, 4):
-            zones = max(len(scipy_zones(cells, connectivity)) for cells in frames)
+            zones = max(len(zones_by_scipy(cells, connectivity)) for cells in frames)
             assert zones <= replay.zones_bound(frames, connectivity) <= 60
     assert replay.zones_bound(np.zeros((3, 4, 4), bool), 8) == 0
 

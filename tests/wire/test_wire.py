@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 from sample import sample
-from wire import Wire, crc16, request, taken_in
+from wire import Wire, crc16, line, request, taken_in
 
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
@@ -292,10 +292,6 @@ def test_no_burst_makes_a_request_that_was_not_sent(packet, record_property):
 # ---- the line itself, with start and stop bits
 
 
-def line_bits(data):
-    return [bit for byte in data for bit in (0, *(byte >> place & 1 for place in range(8)), 1)] + [1] * 12
-
-
 def uart(bits, keep_broken):
     """Bytes a receiver makes of the line; one without a stop bit is kept or dropped."""
     out, at = bytearray(), 0
@@ -314,7 +310,7 @@ def uart(bits, keep_broken):
 def test_no_flip_and_no_burst_of_line_bits(name, packet, behind, keep_broken, record_property):
     """Every single flip, start and stop bits among them, and a sample of bursts up to 16 line bits."""
     rng = random.Random(repr(packet))
-    bits = line_bits(packet + behind)
+    bits = line(packet + behind, 1) + [1] * 12
     sent = accepted(name, packet + behind)
     singles = [(bit, 1) for bit in range(10 * len(packet))]
     bursts = [(rng.randrange(10 * len(packet)), rng.randrange(1, 1 << 16, 2)) for _ in range(300)]

@@ -9,6 +9,7 @@ import pytest
 from sample import sample
 from scipy import ndimage
 from wire import Wire
+from zone_oracles import moments
 
 from contactfpga import Skin
 from contactfpga.boards import BOARDS
@@ -44,11 +45,6 @@ def received(skin, *frames, **options):
 def zones_of(cells):
     labels, count = ndimage.label(cells)
     return [labels == label for label in range(1, count + 1)]
-
-
-def moments(zone):
-    y, x = np.nonzero(zone)
-    return len(x), int(x.sum()), int(y.sum())
 
 
 def every_static_frame(rows, columns):

@@ -1,1 +1,1 @@
-"""The way from a Skin to a bitstream on a board (contactfpga.boards)."""
+"""From a Skin to a bitstream on a board (contactfpga.boards)."""

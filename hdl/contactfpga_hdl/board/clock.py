@@ -1,4 +1,4 @@
-"""A clock of another frequency than the board's crystal, from the FPGA's PLL."""
+"""A clock whose frequency differs from the board's crystal, from the FPGA's PLL."""
 
 from amaranth.hdl import (
     ClockDomain,
@@ -19,13 +19,13 @@ from contactfpga.boards import pll
 from contactfpga.boards.spec import BoardSpec
 
 RESET_US = 15
-"""Reset after the PLL has locked. The block RAMs of an iCE40 cannot be read in the first 3 us; as in Amaranth's reset
-for a crystal, five times that."""
+"""Reset after the PLL's lock. The block RAMs of an iCE40 are unreadable in the first 3 us; this is five times that, as
+in Amaranth's reset for a crystal."""
 
 
 class HeldReset(wiring.Component):
-    """Reset at power-up and until ``locked``, which is asynchronous, has been high for ``clocks`` and two for it to
-    come through. A lock that is lost begins it again."""
+    """Reset at power-up and until the asynchronous ``locked`` has been high for ``clocks``, plus two of synchronizer. A
+    lost lock restarts it."""
 
     def __init__(self, clocks: int):
         self.clocks = clocks

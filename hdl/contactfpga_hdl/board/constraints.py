@@ -5,19 +5,15 @@
 
 import itertools
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from contactfpga.boards import BOARDS
-from contactfpga.boards.spec import NAME, UNIT_PORTS, BoardSpec, column_wires, row_wires
-from contactfpga.skin import Skin
+from contactfpga.boards.spec import NAME, UNIT_PORTS, BoardSpec
 from contactfpga_hdl.board.build import plan_for
-from contactfpga_hdl.board.sites import connector_sites
 
 PAGE = Path("docs/boards.md")
 FOLDER = Path("constraints")
-CHAINS = 8
-"""The tables list the data pins of this many chains: with them one chip per chain is enough for 64 lines."""
 
 
 def constraints(board: BoardSpec) -> str:
@@ -32,35 +28,27 @@ def constraints(board: BoardSpec) -> str:
 
 
 def pin_tables(board: BoardSpec) -> str:
-    """Which wire goes where, as Markdown: one pin per line, and shift registers."""
-    units = dict(zip(board.converter, UNIT_PORTS, strict=True))
-    rows = [(f"{row} or `{units[pin]}`" if pin in units else str(row), pin) for row, pin in enumerate(board.row_side)]
-    columns = [
-        (f"{column} or `alive`" if pin == board.alive else str(column), pin)
-        for column, pin in enumerate(board.column_side)
-    ]
-    direct = _table(board, {"row": rows, "column": [*columns, ("`contact`", board.contact)]})
-    most = Skin(row_drive="74hc595", column_read="74hc165", row_chains=CHAINS, column_chains=CHAINS)
-    registers = {"74HC595": row_wires(most), "74HC165": column_wires(most)}
-    pins = board.pins(most)
-    wires = {chip: [wire for name in ports for wire in _named(name, pins[name])] for chip, ports in registers.items()}
-    return f"{direct}\n\n{_table(board, wires)}"
+    """Which lines are on which pins, as Markdown. Wires to shift registers use the same pins in the same order."""
+    rows, columns = board.row_side, board.column_side
+    sides = {
+        f"rows 0 to {len(rows) - 1}": rows,
+        f"columns 0 to {len(columns) - 1}": columns,
+        "`contact`": [board.contact],
+        f"`alive`, in place of column {columns.index(board.alive)}": [board.alive],
+        f"{_named(UNIT_PORTS)}, in place of rows {rows.index(board.converter[0])} to {len(rows) - 1}": board.converter,
+    }
+    lines = [f"| {lines} | {_listed([board.label(pin) for pin in pins])} |" for lines, pins in sides.items()]
+    return "\n".join(["| lines, in order | pins |", "|---|---|", *lines])
 
 
-def _named(port: str, pins: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Each wire of a port with its pin."""
-    names = [f"`{port}`"] if len(pins) == 1 else [f"`{port}[{bit}]`" for bit in range(len(pins))]
-    return list(zip(names, pins, strict=True))
+def _named(ports: Iterable[str]) -> str:
+    return ", ".join(f"`{port}`" for port in ports)
 
 
-def _table(board: BoardSpec, sides: Mapping[str, list[tuple[str, str]]]) -> str:
-    """Wires side by side under the titles of their sides."""
-    sites = connector_sites(board)
-    lines = ["| " + " | ".join(f"{title} | pin | FPGA" for title in sides) + " |", "|---" * 3 * len(sides) + "|"]
-    for wires in itertools.zip_longest(*sides.values()):
-        cells = [[wire[0], board.label(wire[1]), sites[wire[1]]] if wire else ["", "", ""] for wire in wires]
-        lines.append("| " + " | ".join(itertools.chain(*cells)) + " |")
-    return "\n".join(lines)
+def _listed(labels: Sequence[str]) -> str:
+    """Each connector once, and the numbers of its pins."""
+    groups = itertools.groupby((label.rpartition(" ")[::2] for label in labels), key=lambda found: found[0])
+    return "; ".join(f"{connector} {', '.join(number for _, number in group)}" for connector, group in groups)
 
 
 def page_with_tables(page: str) -> str:

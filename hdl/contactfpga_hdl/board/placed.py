@@ -1,4 +1,4 @@
-"""What place and route says of a design."""
+"""Results of place and route."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import re
 from pathlib import Path
 
 FILE = "report.json"
-"""What ``nextpnr --report`` writes."""
+"""Output of ``nextpnr --report``."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """What a design takes of the FPGA, and how fast it could be clocked."""
+    """FPGA resources and maximum clock of a design."""
 
     luts: tuple[int, int]
-    """4-input look-up tables used and there."""
+    """4-input look-up tables, used and available."""
     flip_flops: int
     block_rams: tuple[int, int]
     logic_cells: tuple[int, int] | None
-    """iCE40 only: cells of one LUT and one flip-flop, used and there; this is what fills up."""
+    """iCE40 only: cells of one LUT and one flip-flop, used and available; the limiting resource."""
     fmax_mhz: float
     needed_mhz: float
 
@@ -39,7 +39,7 @@ class Report:
 
 
 def read(folder: Path, log: str) -> Report:
-    """What nextpnr left in ``folder``: its report, and for an iCE40 its log of that name."""
+    """The results of nextpnr in ``folder``: its report, and for an iCE40 its log of that name."""
     figures = json.loads((folder / FILE).read_text(encoding="utf-8"))
     cells = {name: (cell["used"], cell["available"]) for name, cell in figures["utilization"].items()}
     clock = min(figures["fmax"].values(), key=lambda clock: clock["achieved"] / clock["constraint"])
@@ -62,5 +62,5 @@ def read(folder: Path, log: str) -> Report:
 
 
 def _packed(log: str, kind: str) -> int:
-    """LUTs or flip-flops from the lines that tell how nextpnr packed them into logic cells."""
+    """LUTs or flip-flops, from nextpnr's lines on packing into logic cells."""
     return sum(int(count) for count, kinds in re.findall(r"(\d+) LCs used as (.*)", log) if kind in kinds)

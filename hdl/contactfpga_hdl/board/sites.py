@@ -1,4 +1,4 @@
-"""Which pin of the FPGA each wire is on, as amaranth-boards has it."""
+"""The FPGA pin of each wire, by amaranth-boards."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contactfpga_hdl.board.board_top import platform_for
 
 
 def connector_sites(board: BoardSpec) -> dict[str, str]:
-    """FPGA pin of every connector pin that the platform knows."""
+    """FPGA pin of every connector pin of the platform."""
     platform = platform_for(board)
     return {name: pin for connector in platform.connectors.values() for name, pin in connector}
 
@@ -22,7 +22,7 @@ def wire_sites(board: BoardSpec, wires: list[Wire]) -> list[str]:
 
 
 def own_sites(board: BoardSpec) -> dict[str, str]:
-    """FPGA pin of what the board wires by itself, by the port of the wire."""
+    """FPGA pins that the board itself connects, by port of the wire."""
     platform = platform_for(board)
     (clock,) = platform.resources[platform.default_clk, 0].ios
     found = {"clock": clock.names[0]}

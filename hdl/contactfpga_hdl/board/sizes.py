@@ -1,4 +1,4 @@
-"""Size and speed of gateware by itself, on no board: synthesized, placed and routed with pins wherever they fall."""
+"""Size and speed of gateware without a board: synthesized, placed and routed with free pin placement."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from contactfpga_hdl.board.tools import BitstreamFailed, tool
 
 @dataclasses.dataclass(frozen=True)
 class Device:
-    """An FPGA, and the command that places and routes for it."""
+    """An FPGA, and its command for place and route."""
 
     title: str
     fpga: str
     place: tuple[str, ...]
     counts: tuple[str, str, str]
-    """Where its log gives LUT4, flip-flops and block RAMs, once packed."""
+    """Log entries with LUT4, flip-flops and block RAMs after packing."""
 
 
 UP5K = Device(
@@ -50,8 +50,8 @@ ECP5 = Device(
 DEVICES = (UP5K, ECP5)
 SEEDS = 5
 LIMIT_S = 200
-"""For some seeds the router goes on forever: they are passed over. Runs that end take up to a minute of the
-processor's time, which is what counts where the system can limit it: a busy machine passes over the same seeds."""
+"""CPU time limit, independent of load where the system supports it: for some seeds the router never ends, and they are
+skipped. Successful runs need up to a minute."""
 
 
 class _NoEnd(BitstreamFailed):
@@ -61,7 +61,7 @@ class _NoEnd(BitstreamFailed):
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """Fmax is the median over the first seeds of place and route that end, the rest does not depend on them."""
+    """Fmax is the median over the first seeds whose place and route ends; the rest does not depend on them."""
 
     luts: int
     flip_flops: int
@@ -71,7 +71,7 @@ class Size:
 
 @dataclasses.dataclass(frozen=True)
 class Netlists:
-    """A design as RTLIL, with the top module ``top``: what is counted, and what is placed and routed for its clock."""
+    """A design as RTLIL with the top module ``top``: one to count, one to place and route for its clock."""
 
     bare: str
     registered: str
@@ -82,16 +82,16 @@ class Netlists:
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
-    """Synthesize what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
+    """Synthesize ``component``, and place and route it once a seed; needs seconds to minutes."""
     return measure_netlists(Netlists.of(component), device, seeds)
 
 
 def measure_netlists(
     netlists: Netlists, device: Device, seeds: int = SEEDS, before: tuple[str, ...] | None = None
 ) -> Size:
-    """The same for a design that need not come from Amaranth.
+    """:func:`measure` for a design that need not come from Amaranth.
 
-    ``before``: what Yosys is told first, instead of what the FPGA's family has there.
+    ``before``: first Yosys commands, instead of the FPGA family's.
     """
     luts, flip_flops, block_rams = _packed(netlists.bare, device, before)
     with _folder() as folder:
@@ -108,7 +108,7 @@ def measure_netlists(
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """LUT4 as :func:`measure` gives them, in seconds: synthesized and packed, but neither placed nor routed."""
+    """LUT4 of :func:`measure`, in seconds: synthesized and packed, but not placed or routed."""
     return _packed(_rtlil(component()), device)[0]
 
 
@@ -165,7 +165,7 @@ def _limited() -> dict[str, Any]:
 
 
 class Registered(wiring.Component):
-    """A component between registers, with two pins: a wide one has more ports than an FPGA has pins."""
+    """A component between registers, with two pins, as a wide one has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):
         self.inner = inner

@@ -1,12 +1,12 @@
-"""What yosys and nextpnr do: the same for bitstreams, for simulated netlists and for the figures."""
+"""Commands of yosys and nextpnr, common to bitstreams, simulated netlists and figures."""
 
 import dataclasses
 
 NO_COLLISIONS = "setparam -set COLLISION_X_MASK 1'1 t:$memrd_v2"
-"""No word is read in the clock in which it is written, or it is not used: what such a read gives may be anything.
+"""Option for memories whose words are never used from a clock in which they are written.
 
-Amaranth promises the word before the write, and an FPGA's memory does not: keeping that promise costs a comparison
-of the addresses and two registers per bit.
+Amaranth promises the word before the write, an FPGA's memory does not: the promise would need an address comparison and
+two registers per bit.
 """
 
 _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'
@@ -14,12 +14,12 @@ _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'
 
 @dataclasses.dataclass(frozen=True)
 class Family:
-    """How designs for the FPGAs of a family are made."""
+    """Commands for the FPGAs of a family."""
 
     command: str
     options: str
     before: tuple[str, ...]
-    """Commands of yosys that come before it."""
+    """Yosys commands that precede it."""
     route: str = ""
     """Options of nextpnr."""
 
@@ -35,11 +35,11 @@ FAMILIES = {
     # The products have a few bits each; the way to a multiplier and back takes longer than they do.
     "LFE5U": Family("synth_ecp5", "-nodsp", (NO_COLLISIONS,)),
 }
-"""By the beginning of the FPGA's name."""
+"""Families by the beginning of the FPGA's name."""
 
 
 def overrides(fpga: str) -> dict[str, str]:
-    """The same for Amaranth's platforms."""
+    """The commands as overrides of Amaranth's platforms."""
     family = _family(fpga)
     return {
         "synth_opts": family.options,
@@ -49,7 +49,7 @@ def overrides(fpga: str) -> dict[str, str]:
 
 
 def script(fpga: str, top: str, before: tuple[str, ...] | None = None) -> str:
-    """Yosys commands that synthesize what was read as RTLIL; ``before`` instead of the family's."""
+    """Yosys commands that synthesize RTLIL; ``before`` replaces the family's."""
     family = _family(fpga)
     first = family.before if before is None else before
     return "; ".join((*first, f"{family.command} {family.options} -top {top}"))

@@ -5,11 +5,11 @@ import sysconfig
 
 
 class BitstreamFailed(Exception):
-    """No bitstream came out; the message says why."""
+    """No bitstream was made; the message gives the reason."""
 
 
 def tool(name: str) -> str:
-    """Path of a program that comes with the extra ``boards``."""
+    """Path of a program of the extra ``boards``."""
     # Beside this Python first: an environment need not be on the PATH.
     found = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
     if found is None:

@@ -1,1 +1,1 @@
-"""Contact bounce, kept from the later stages."""
+"""Debounce: keeps contact bounce from the later stages."""

@@ -1,4 +1,4 @@
-"""Contact bounce, kept from the later stages; methods and names as in QMK."""
+"""Debounce by samples; methods and names as in QMK."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import memory, stream, wiring
@@ -9,7 +9,7 @@ from contactfpga_hdl.payloads import row_layout
 
 
 class Switch:
-    """One switch on its way through the walk: a bit that was sampled, its word, and what becomes of both."""
+    """One switch in the walk: its sampled bit, its word, and the new values of both."""
 
     def __init__(self, word_bits: int):
         self.raw = Signal()
@@ -19,7 +19,7 @@ class Switch:
 
 
 class Phase:
-    """Where the walk over a row is."""
+    """Position of the walk over a row."""
 
     def __init__(self) -> None:
         self.busy = Signal()  # a word is read
@@ -29,13 +29,13 @@ class Phase:
 
 
 class Debounce(wiring.Component):
-    """Raw rows in, debounced rows out; C columns take C + 3 clocks, one column per clock.
+    """Raw rows in, debounced rows out; C columns need C + 3 clocks, one column per clock.
 
     Each switch has one word in a memory: with ``sym_defer_pk`` its state and for how many samples the raw one has
     differed, with ``asym_eager_defer_pk`` the samples until it counts as released, 0 when it does.
 
     raw (in): a frame's rows in ascending order; taken when the one before has left.
-    rows (out): the same rows without bounce.
+    rows (out): the rows without bounce.
     """
 
     def __init__(self, skin: Skin):
@@ -91,10 +91,9 @@ def walk_columns(
     switch: Switch,
     phase: Phase,
 ) -> Value:
-    """Take each switch of a raw row through ``switch``, its word from a memory and back; hand on the row that comes of
-    it.
+    """Pass each switch of a raw row through ``switch``, with its word from a memory and back; offer the resulting row.
 
-    Returns whether the row is a frame's last one. ``row`` is its number, until ``phase.finish``.
+    Returns whether the row is a frame's last. ``row`` is its number, until ``phase.finish``.
     """
     columns = skin.columns
     column_bits, row_bits = (columns - 1).bit_length(), (skin.rows - 1).bit_length()

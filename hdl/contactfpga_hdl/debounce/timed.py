@@ -1,4 +1,4 @@
-"""Contact bounce where rows are not sampled at even times: delays are counted in row times."""
+"""Debounce for rows that are not sampled at even times: delays are counted in row times."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
@@ -10,14 +10,14 @@ from contactfpga_hdl.payloads import row_layout
 
 
 class TimedDebounce(wiring.Component):
-    """Raw rows in, debounced rows out; a row that was driven alone takes C + 3 clocks, others none.
+    """Raw rows in, debounced rows out; a row that was driven alone needs C + 3 clocks, others none.
 
     Others are quiet: no cell reads pressed, and no switch counts as pressed or has a time running.
 
     raw (in): a frame's rows in ascending order.
-    alone (in): the row on offer was driven alone.
-    now (in): the row time in which it was sampled; must hold for C + 4 clocks, but where the scan waits.
-    rows (out): the same rows without bounce.
+    alone (in): the offered row was driven alone.
+    now (in): the row time of its sample; must hold for C + 4 clocks, unless the scan waits.
+    rows (out): the rows without bounce.
     busy (out): a bit per row that was not quiet after its last sample, as soon as it is offered.
     """
 
@@ -68,7 +68,7 @@ class TimedDebounce(wiring.Component):
 
 
 class _TimedSwitch(Switch):
-    """A switch's word: two bits of state, and the row time since when it is in it; all zero while it is quiet."""
+    """A switch's word: two bits of state, and the row time of its beginning; all zero while quiet."""
 
     def __init__(self, m: Module, now: Value):
         bits = len(now)
@@ -84,7 +84,7 @@ class _TimedSwitch(Switch):
 
 
 class _TimedWalk(wiring.Component):
-    """As :class:`~contactfpga_hdl.debounce.even.Debounce`, for a ``row`` that was sampled ``now``."""
+    """:class:`~contactfpga_hdl.debounce.even.Debounce` for a ``row`` that was sampled ``now``."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -119,7 +119,7 @@ class _TimedWalk(wiring.Component):
 
 
 def _defer_both(m: Module, switch: _TimedSwitch, press: int, release: int) -> None:
-    """State: whether it counts as pressed, and whether it has differed since."""
+    """State: whether it counts as pressed, and whether its reading has differed since."""
     pressed, differed = switch.state
     differs = switch.raw ^ pressed
     time = Mux(pressed, release, press)
@@ -132,7 +132,7 @@ def _defer_both(m: Module, switch: _TimedSwitch, press: int, release: int) -> No
 
 
 def _eager_press(m: Module, switch: _TimedSwitch, press: int, release: int) -> None:
-    """States: released; pressed and whatever it reads is ignored; pressed; reads released since."""
+    """States: released; pressed with readings ignored; pressed; reads released since."""
     with m.Switch(switch.state):
         with m.Case(0):
             m.d.comb += [switch.starts.eq(1), switch.next_state.eq(Mux(switch.raw, 1 if press else 2, 0))]

@@ -1,12 +1,12 @@
-"""Where a sheet's ends meet: on which turn of the cylinder clusters, runs and cells lie.
+"""Turns of clusters, runs and cells around a cylinder, for sheets whose ends meet.
 
-Columns count on past the seam, over two adjacent turns. A zone's runs, from left to right, lie on one turn, or from
-some run on they lie a turn back, because their way to the first one leads over the seam: one bit says which. Clusters
-of a group likewise. Where two ways disagree by a turn they go round the cylinder, as a ring.
+Columns count on past the seam, over two adjacent turns. A zone's runs, from left to right, are on one turn, or from
+some run on a turn back, because their path to the first one crosses the seam: one bit tells which. The same holds for
+clusters of a group. If two paths disagree by a turn, the zone goes round the cylinder, as a ring.
 
-A group's cells lie on the turn of its first cluster and on one of the turns beside it, the next one or the one *back*;
-``turned`` counts those on the upper one of the two. When groups become one, what lay on a turn of its own is counted
-with the turn where it lies now. A group that needs a third turn is ``wound``.
+A group's cells are on the turn of its first cluster and on an adjacent one, the next or the one *back*; ``turned``
+counts those on the upper one of the two. When groups merge, their counts move to the turn where they are now. A group
+that needs a third turn is ``wound``.
 """
 
 from typing import Protocol
@@ -19,10 +19,10 @@ from contactfpga_hdl.label.steps import kept_layout, nesting, over_the_seam, tur
 
 
 class Turns:
-    """The turn of the cluster that is walked.
+    """The turn of the walked cluster.
 
-    It is known from the zone of a run of the row before that has an earlier one, and at the seam: the first cluster is
-    the neighbor of the last one, which therefore lies a turn back.
+    It follows from the zone of a previous row's run that has an earlier one, and at the seam: the first cluster is the
+    neighbor of the last, which therefore is a turn back.
     """
 
     def __init__(self, derived: Derived):
@@ -33,9 +33,14 @@ class Turns:
         self._zones = Signal(nesting(derived), name="zone_turns")  # of zones with runs passed and to come, inner first
 
     def find(self, m: Module, turn: Value, goes_on: Value, pop: Value, apart: Value, linked: Value) -> None:
-        """``turn``: as known so far. ``goes_on``: a run of the row before has an earlier one of its zone, and lies a
-        turn further back than that if ``linked``. ``pop``: what it or the seam joins waited. ``apart``: the run does
-        not touch the cluster before it, though the group goes on."""
+        """Determine the turn.
+
+        turn: as known so far.
+        goes_on: a previous row's run has an earlier one of its zone, and is a turn further back than that if
+            ``linked``.
+        pop: what it or the seam joins was waiting.
+        apart: the run does not touch the cluster before it, though the group continues.
+        """
         m.d.comb += [
             self.turn.eq(turn),
             self.ring.eq(~pop & ~apart & (self.turn != turn)),
@@ -47,21 +52,21 @@ class Turns:
             m.d.comb += self.turn.eq(self._zones[0] | linked)
 
     def keep(self, m: Module, passes: Value, earlier: Value, later: Value) -> None:
-        """Remember it for the zone of a run of the row before that ``passes``."""
+        """Store the turn for the zone of a previous row's run that ``passes``."""
         with m.If(passes):
             kept = Mux(earlier, self._zones >> 1, self._zones)
             m.d.sync += self._zones.eq(Mux(later, Cat(self.turn, kept), kept))
 
 
 class Unwrap(Elaboratable):
-    """The turns of a group that cells, and what was found for it, are added to.
+    """The turns of a group while cells and found groups are added.
 
-    kept, down (in): the group so far, and whether all of it is now known to lie a turn back.
-    found, joins, zone (in): what joins it, if anything does: a zone of the row before, or a group that waited, which
-    gives the group its first cluster; all zeros if nothing does.
-    turn, cells (in): of the cluster that is walked, and how many of its cells are new.
+    kept, down (in): the group so far, and whether all of it is now known to be a turn back.
+    found, joins, zone (in): what joins it, if anything: a zone of the row before, or a waiting group, which gives the
+        group its first cluster; all zeros for none.
+    turn, cells (in): turn of the walked cluster, and number of its new cells.
     ring (in): this makes the group a ring.
-    group (out): the group then.
+    group (out): the resulting group.
     """
 
     def __init__(self, derived: Derived):
@@ -97,15 +102,14 @@ class Unwrap(Elaboratable):
 
 
 def stored_turns() -> dict[str, int]:
-    """Kept with a group that waits: the turns of its first and its last run."""
+    """Fields of a waiting group: the turns of its first and its last run."""
     return {"first_turn": 1, "last_turn": 1}
 
 
 def unwrapped(
     m: Module, derived: Derived, join: data.View, kept: data.View, found: Value, group: data.View
 ) -> data.View:
-    """Add to a ``group`` of the labeller ``run`` what is known of turns, from what was ``kept`` and ``found``; returns
-    what the table keeps of it."""
+    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``; returns the table's new value."""
     m.submodules.unwrap = unwrap = Unwrap(derived)
     m.d.comb += [
         unwrap.kept.eq(kept),
@@ -122,7 +126,7 @@ def unwrapped(
 
 
 class Acts(Protocol):
-    """What the labeller does in a clock."""
+    """Actions of the labeller in a clock."""
 
     enable: Signal
     joins: Signal
@@ -130,10 +134,10 @@ class Acts(Protocol):
 
 
 class SerialTurns:
-    """What the labeller ``serial`` does besides: registers and memory for the turns of the group that is walked.
+    """Turns of the labeller ``serial``: registers and memory for the walked group.
 
-    The seam is one more zone of the row before: it begins before the first column, as the outermost of its group, and
-    ends after the last column, in two clocks as every run of the row before. Turns are known as in ``run``.
+    The seam is one more zone of the row before: it begins before the first column, outermost in its group, and ends
+    after the last column, in two clocks like every run of the row before. Turns are determined as in ``run``.
     """
 
     def __init__(self, derived: Derived):
@@ -148,7 +152,7 @@ class SerialTurns:
         self.linked_runs = memory.Memory(shape=1, depth=derived.open_zones, init=[])
 
     def walk(self, m: Module, handed: Value, row: Value, before: Value, last_column: Value, advance: Value) -> None:
-        """The seam's clocks come after those of the last column."""
+        """Walk the seam in the clocks after the last column."""
         m.d.comb += self.begins.eq(handed & over_the_seam(self.derived, row, before))
         with m.If(handed):
             m.d.sync += self.meets.eq(self.begins)
@@ -156,14 +160,14 @@ class SerialTurns:
             m.d.sync += self.at_seam.eq(last_column & self.meets & ~self.at_seam)
 
     def find(self, m: Module, acts: Acts, earlier: Value, later: Value, whole: Value, linked: Value) -> None:
-        """The turn of the cluster where a run of the row before, or the seam, joins its group."""
+        """Determine the cluster's turn when a run of the row before, or the seam, joins its group."""
         joins = acts.joins
         m.d.comb += self.turns.seam.eq(joins & self.at_seam)
         self.turns.find(m, self.turn, joins & earlier, joins & earlier & whole, acts.apart, linked)
         self.turns.keep(m, acts.enable & joins & ~self.at_seam, earlier, later)
 
     def keep(self, m: Module, starts: Value, has_run: Value, found: data.View, over: Value) -> None:
-        """In a clock in which a run ``starts``, or what was ``found`` joins, and in which the group may be ``over``."""
+        """Update in a clock in which a run ``starts``, or ``found`` joins, and in which the group may be ``over``."""
         turn, down = self.turns.turn, self.turns.down
         m.d.sync += [
             self.turn.eq(turn),
@@ -176,8 +180,8 @@ class SerialTurns:
             m.d.sync += [self.turn.eq(0), self.first_turn.eq(0), self.last_turn.eq(0)]
 
     def link(self, has_run: Value, starts: Value, found: data.View) -> Value:
-        """Whether the run that gets an earlier one lies a turn further back than that: the one that ``starts``, or the
-        group's first one as ``found`` joins it."""
+        """Whether a run is a turn further back than its earlier one: the run that ``starts``, or the group's first as
+        ``found`` joins it."""
         onto = has_run & self.turn & ~self.last_turn
         return Mux(starts, onto, (self.first_turn | self.turns.down) & ~found.last_turn)
 

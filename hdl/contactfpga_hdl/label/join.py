@@ -1,4 +1,4 @@
-"""Steps to zones: which runs belong together, known from brackets and a stack."""
+"""Steps to zones: runs of one zone, found by brackets and a stack."""
 
 import math
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class _Brackets:
-    """Which runs of the new row come after or before another one of the same zone, bit i for the i-th."""
+    """New-row runs with a later or earlier run of the same zone, bit i for the i-th."""
 
     def __init__(self, runs: int):
         self.after = Signal(runs)  # as known so far
@@ -29,7 +29,7 @@ class _Brackets:
 
 
 class Join(wiring.Component):
-    """Which runs of the new row are of one zone, and what each step adds to which zone.
+    """Assigns the new row's runs to zones, and each step's moments to a zone.
 
     enable (in): nothing changes without it.
     valid, step (in): from the walk.
@@ -108,10 +108,10 @@ class Join(wiring.Component):
         return m
 
     def _brackets(self, m: Module, works: Value, known: _Brackets) -> tuple[Value, Value, Value]:
-        """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before? And does
-        it lie a turn further back than the earlier one?
+        """Whether the step's run of the row before has an earlier, or later, run of its zone in its row, and whether it
+        is a turn further back than the earlier one.
 
-        Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
+        Bit i belongs to the row's i-th run; those of the row before shift down as its runs are passed.
         """
         old_after = Signal(self._runs)  # runs after one of the same zone
         old_before = Signal(self._runs)  # runs before one of the same zone
@@ -144,7 +144,7 @@ class Join(wiring.Component):
     def _take_in(
         self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: "Turns | None"
     ) -> data.View:
-        """The current group, with the group that waited on the stack if the run before continues it."""
+        """The current group, merged with the one on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
         with m.If(pop):
@@ -190,7 +190,7 @@ class Join(wiring.Component):
         joined: data.View,
         turns: "Turns | None",
     ) -> None:
-        """Set the brackets of runs of the new row that are now known to be of one zone."""
+        """Set the brackets of new-row runs now known to be of one zone."""
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
         onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
 
@@ -226,7 +226,7 @@ class Join(wiring.Component):
         return decided
 
     def _run_moments(self, m: Module, run: data.View) -> list:
-        """Moments of the new run; the columns' sum is a difference of triangular numbers."""
+        """Moments of the new run; the column sum is a difference of triangular numbers."""
         start, stop = self.step.start, self.step.stop
         columns = self.derived.skin.columns
         up_to = Array(math.comb(column + 1, 2) for column in range(columns))

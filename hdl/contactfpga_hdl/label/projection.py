@@ -1,9 +1,8 @@
 """Zones from their shadows on the two axes: small, and wrong where shadows cross.
 
-The rows with a pressed cell fall into *bands* of adjacent rows. Within a band the columns that have a pressed cell, its
-shadow, fall into runs; the cells above one run are taken as one zone. So two contacts in one band whose shadows
-touch come out as one, and a ring comes out with what lies inside it. A contact whose cells are connected is never
-split, and the moments of what is taken as a zone are exact.
+Rows with a pressed cell form *bands* of adjacent rows. Within a band the columns with a pressed cell, its shadow, form
+runs; the cells above one run are one zone. So two contacts in one band whose shadows touch are merged, and a ring
+includes its interior. A connected contact is never split, and the moments of a zone so defined are exact.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -14,16 +13,15 @@ from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
 def _step_layout() -> data.StructLayout:
-    """A column of a row, or after a frame's last row the end mark."""
+    """A column of a row, or the end mark after a frame's last row."""
     return data.StructLayout({"valid": 1, "cell": 1, "shadow": 1, "stop": 1, "closes": 1, "end": 1})
 
 
 class ProjectionLabeller(wiring.Component):
     """Rows in, zone records out; one column per clock.
 
-    A row of C columns takes C + 1 clocks, an empty one outside a band one. A band closes with the empty row after it
-    or with the frame's last row, handed over in clock h; the zone whose shadow ends in column x leaves in clock
-    h + x + 3.
+    A row of C columns needs C + 1 clocks, an empty one outside a band one. A band closes with the empty row after it or
+    with the frame's last row, handed over in clock h; the zone whose shadow ends in column x leaves in clock h + x + 3.
 
     rows (in): a frame's rows in ascending order.
     records (out): its zones, then an end mark.
@@ -43,7 +41,7 @@ class ProjectionLabeller(wiring.Component):
         return m
 
     def _walk_columns(self, m: Module, enable: Value) -> tuple[data.View, Value, Value]:
-        """Steps through the columns of a row; returns the step, its column and its row."""
+        """Step through the columns of a row; returns the step, its column and its row."""
         step = Signal(_step_layout())
         column = Signal(range(max(2, self.derived.skin.columns)))
         y = Signal(range(max(2, self.derived.skin.rows)))
@@ -90,7 +88,7 @@ class ProjectionLabeller(wiring.Component):
     def _add_cells(
         self, m: Module, enable: Value, step: data.View, column: Value, y: Value
     ) -> tuple[data.View, data.View]:
-        """Each column's moments in the band so far, with the cell of this row; one clock after the walk."""
+        """Each column's moments in the band, including this row's cell; one clock after the walk."""
         layout = moments_layout(self.derived)
         m.submodules.sums = sums = memory.Memory(shape=layout, depth=self.derived.skin.columns, init=[])
         read, write = sums.read_port(), sums.write_port()
@@ -111,7 +109,7 @@ class ProjectionLabeller(wiring.Component):
         return added, total
 
     def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
-        """In a band that closes the columns of a run are added up; one clock after their own sums."""
+        """In a closing band, add up the columns of a run, one clock after their own sums."""
         kept, zone = Signal.like(total), Signal.like(total)
         closes = step.valid & step.closes
         leaves = closes & (step.cell | step.shadow) & step.stop

@@ -1,14 +1,14 @@
 """Contact zones and their moments, in one pass over the rows as they arrive.
 
-Two adjacent rows are looked at together. The connected pieces of these two rows alone, *clusters*, are walked from
-left to right, one run of each row per clock. What the zones of the row before look like further up is known from two
-bits per run: whether a run of the same zone comes before it in its row, and whether one comes after. Zones never
-cross in the plane, so these bits nest like brackets, and a stack replaces equivalence tables: a zone that has more
-runs to the right waits on the stack, and the innermost one is always the next that is needed.
+Two adjacent rows are combined. The connected pieces of these rows alone, *clusters*, are walked from left to right, one
+run of each row per clock. The connections of the row before further up are in two bits per run: whether a run of the
+same zone precedes it in its row, and whether one follows. Zones never cross in the plane, so these bits nest like
+brackets, and a stack replaces equivalence tables: a zone with more runs to the right waits on the stack, and the
+innermost one is always needed next.
 
-A zone's moments lie in a table at the start column of its first run in the row (halved with 8-connectivity). Two
-runs of different zones in the same row, or in two adjacent rows, never share such a place, so the table
-cannot overflow and needs no allocation.
+A zone's moments are in a table at the start column of its first run in the row (halved with 8-connectivity). Two runs
+of different zones in the same or adjacent rows never share such a place, so the table cannot overflow and needs no
+allocation.
 """
 
 from amaranth.hdl import Module, Mux, Signal
@@ -26,9 +26,9 @@ from contactfpga_hdl.util.stack import Stack
 class RunLabeller(wiring.Component):
     """Rows in, zone records out; work follows the runs of pressed cells.
 
-    A row with n steps takes n + 1 clocks; a zone leaves two clocks after the last step in which it has a cell
-    (docs/timing.md). With C columns a row takes at most ceil(C/2) steps with
-    8-connectivity and C with 4. Each step passes walk, join and sum in three clocks.
+    A row with n steps needs n + 1 clocks; a zone leaves two clocks after the last step with one of its cells
+    (docs/timing.md). With C columns a row needs at most ceil(C/2) steps with 8-connectivity and C with 4. Each step
+    passes walk, join and sum in three clocks.
 
     rows (in): a frame's rows in ascending order.
     records (out): its zones, then an end mark.
@@ -61,7 +61,7 @@ class Sum(wiring.Component):
     """Adds up the moments of each zone.
 
     enable (in): nothing changes without it.
-    valid, join (in): what a step adds to its zone, and what becomes of it.
+    valid, join (in): a step's addition to its zone, and the zone's fate.
     lookup (in): one clock ahead of ``join``, the start of its run of the row before.
     records (out): in the clock of the step that closes the zone.
     """

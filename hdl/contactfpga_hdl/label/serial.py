@@ -1,9 +1,9 @@
 """Contact zones and their moments, one cell per clock, in little more than an adder and three memories.
 
-Rows, clusters and brackets are those of ``docs/labelling.md``, walked a column at a time. A column takes one clock,
-in which its cell is added to the group of the cluster being walked. Where a run of the row before begins, a second one
-adds the moments that its zone brings in: from the table, or from a group that waits. Groups that wait lie in the table,
-too, each at a place in its cluster and with the place of the one that began to wait before it.
+Rows, clusters and brackets are those of ``docs/labelling.md``, walked a column at a time. A column needs one clock, in
+which its cell is added to the walked cluster's group. At the beginning of a run of the row before, a second clock adds
+its zone's moments: from the table, or from a waiting group. Waiting groups are in the table, too, each at a place in
+its cluster, linked to the one that began to wait before it.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -17,7 +17,7 @@ from contactfpga_hdl.payloads import labeller_ports
 
 
 class _Columns:
-    """The new row and the one before move past, a column at a time; between two rows an empty column is walked."""
+    """Shifts the new row and the one before, a column at a time; between two rows an empty column is walked."""
 
     def __init__(self, derived: Derived):
         columns = derived.skin.columns
@@ -44,7 +44,7 @@ class _Columns:
 
 
 class _Step:
-    """What is done in this clock."""
+    """Actions of this clock."""
 
     def __init__(self) -> None:
         self.enable = Signal()  # anything at all: no record waits
@@ -58,7 +58,7 @@ class _Step:
 
 
 class _Group:
-    """The group of the cluster that is walked."""
+    """The group of the walked cluster."""
 
     def __init__(self, derived: Derived, place_bits: int):
         self.whole = Signal(init=1)  # none of its zones has runs of the row before to come
@@ -70,7 +70,7 @@ class _Group:
 
 
 def _stored_layout(derived: Derived, place_bits: int) -> data.StructLayout:
-    """A group that waits, or a zone of the row before; ``below`` is the place of the group that waits next."""
+    """A waiting group, or a zone of the row before; ``below`` is the place of the next waiting group."""
     places = {"first": place_bits, "end": place_bits, "below": place_bits}
     turns = stored_turns() if derived.skin.closed else {}
     return data.StructLayout({"moments": kept_layout(derived), "has_run": 1, **places, **turns})
@@ -79,9 +79,9 @@ def _stored_layout(derived: Derived, place_bits: int) -> data.StructLayout:
 class SerialLabeller(wiring.Component):
     """Rows in, zone records out; one cell per clock.
 
-    A row of C columns takes C + e + 2 clocks, and a zone leaves a clock after the last column of its last cluster
-    (docs/timing.md). e is the number of runs in the row before, so at most ceil(C/2), with 8-connectivity; with 4 it
-    is at most C. Where the ends of the sheet meet, a row takes two clocks more if it is joined over the seam.
+    A row of C columns needs C + e + 2 clocks, and a zone leaves a clock after the last column of its last cluster
+    (docs/timing.md). e is the number of runs in the row before, at most ceil(C/2) with 8-connectivity, C with 4. If the
+    ends of the sheet meet, a row joined over the seam needs two clocks more.
 
     rows (in): a frame's rows in ascending order.
     records (out): its zones, then an end mark.
@@ -170,7 +170,7 @@ class SerialLabeller(wiring.Component):
                 m.d.sync += [walk.last.eq(row.last), walk.y.eq(row.y if self.derived.skips else counted)]
 
     def _cut(self, m: Module, walk: _Columns, acts: _Step, waits: Value, around: SerialTurns | None) -> None:
-        """Where a cluster ends: with 8-connectivity at an empty column, otherwise where neither row goes on.
+        """Whether a cluster ends: with 8-connectivity at an empty column, otherwise where neither row continues.
 
         ``waits``: the group waits for the run of the row before if one begins.
         """
@@ -221,8 +221,8 @@ class SerialLabeller(wiring.Component):
         earlier_runs: memory.Memory,
         later_runs: memory.Memory,
     ) -> memory.WritePort:
-        """A run has later ones until its zone is known to have none; it has earlier ones if its group has. Returns the
-        port that says the latter."""
+        """Write the brackets: a run has later ones until its zone is known to have none; it has earlier ones if its
+        group has. Returns the port of the latter."""
         write_earlier = earlier_runs.write_port()
         write_later = later_runs.write_port()
         m.d.comb += [
@@ -275,7 +275,7 @@ class SerialLabeller(wiring.Component):
         earlier: Value,
         around: SerialTurns,
     ) -> None:
-        """Turns of the group, its runs and its cells."""
+        """Update the turns of the group, its runs and its cells."""
         over = acts.closes | ~walk.active
         joins, zone = acts.joins & (~earlier | group.whole), acts.joins & ~earlier
         unwrapped = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)
@@ -286,7 +286,7 @@ class SerialLabeller(wiring.Component):
     def _read_group(
         self, m: Module, walk: _Columns, acts: _Step, group: _Group, groups: memory.Memory, earlier: Value
     ) -> data.View:
-        """The zone or group that joins this one, wanted in the clock before; 0 if there is none."""
+        """The zone or group that joins this one, requested in the clock before; 0 without one."""
         read = groups.read_port()
         wanted = Signal()
         m.d.comb += [

@@ -1,4 +1,4 @@
-"""All pressed cells are one zone: the smallest labeller, enough where there is never more than one contact."""
+"""All pressed cells as one zone: the smallest labeller, enough for a single contact."""
 
 from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
@@ -10,11 +10,11 @@ from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 class SingleLabeller(wiring.Component):
     """Rows in, at most one zone record per frame out; one column per clock.
 
-    A row of C columns takes C + 2 clocks, an empty one takes one, unless it is the last row of a frame with a pressed
+    A row of C columns needs C + 2 clocks, an empty one needs one, unless it is the last row of a frame with a pressed
     cell. If that is handed over in clock h, the zone leaves in clock h + C + 2.
 
     rows (in): a frame's rows in ascending order.
-    records (out): its zone, if it has one, then an end mark.
+    records (out): its zone, if any, then an end mark.
     """
 
     def __init__(self, skin: Skin):

@@ -1,4 +1,4 @@
-"""Two adjacent rows, cut into steps; what these hand on, and sizes that follow from the columns."""
+"""Two adjacent rows cut into steps; their layouts, and sizes that follow from the columns."""
 
 import math
 
@@ -11,9 +11,9 @@ from contactfpga_hdl.payloads import moments_layout, row_layout, row_number
 
 
 def step_layout(derived: Derived) -> data.StructLayout:
-    """One step of the walk: at most one run of the row before and one of the new row, of one cluster.
+    """One step of the walk: at most one run of the row before and one of the new row, in one cluster.
 
-    A step without any run is the seam's: the last cluster goes on in the first.
+    A step without a run is the seam's: the last cluster continues in the first.
     """
     column = max(1, (derived.skin.columns - 1).bit_length())
     return data.StructLayout(
@@ -35,7 +35,7 @@ def step_layout(derived: Derived) -> data.StructLayout:
 
 
 def join_layout(derived: Derived) -> data.StructLayout:
-    """What a step adds to its zone, and what becomes of it."""
+    """A step's addition to its zone, and the zone's fate."""
     turns = {"down": 1, "turn": 1, "ring": 1, "first_turn": 1}  # docs/labelling.md#around-a-cylinder
     return data.StructLayout(
         {
@@ -59,7 +59,8 @@ def nesting(derived: Derived) -> int:
 
 
 def waiting(derived: Derived) -> int:
-    """The most groups that wait: each for such a zone, or where the ends meet one of them for the last cluster."""
+    """The most waiting groups: one for each such zone, or for a sheet whose ends meet one of them for the last
+    cluster."""
     if not derived.skin.closed:
         return nesting(derived)
     columns = derived.skin.columns
@@ -67,19 +68,19 @@ def waiting(derived: Derived) -> int:
 
 
 def place_of(derived: Derived, column: Value) -> Value:
-    """Where a run that starts at ``column`` keeps its zone's moments."""
+    """Place of the moments of a zone whose run starts at ``column``."""
     return column >> 1 if derived.skin.connectivity == 8 else column
 
 
 def _split(m: Module, bits: Value) -> tuple[Value, Value]:
-    """The lowest bit that is set, alone, and the others."""
+    """The lowest set bit alone, and the others."""
     lowest, others = Signal.like(bits), Signal.like(bits)
     m.d.comb += [others.eq(bits & (bits - 1)), lowest.eq(bits & ~others)]
     return lowest, others
 
 
 def _index(one_hot: Value, width: int) -> Value:
-    """Number of the bit that is set."""
+    """Number of the set bit."""
     return Cat(
         Cat(one_hot[i] for i in range(len(one_hot)) if i >> bit & 1).any() if len(one_hot) > 1 else Const(0, 1)
         for bit in range(width)
@@ -87,7 +88,7 @@ def _index(one_hot: Value, width: int) -> Value:
 
 
 def kept_layout(derived: Derived) -> data.StructLayout:
-    """What a labeller keeps of a group of cells: moments, and where a sheet's ends meet their turns."""
+    """Stored data of a group of cells: moments, and for a sheet whose ends meet their turns."""
     turned = turned_layout(derived) if derived.skin.closed else {}
     return data.StructLayout(moments_layout(derived).members | turned)
 
@@ -102,7 +103,7 @@ def zone_of(derived: Derived, group: data.View) -> Value:
 
 
 def turned_layout(derived: Derived) -> dict[str, int]:
-    """What is known of a group's cells besides their moments."""
+    """Data of a group's cells besides their moments."""
     return {
         "turned": derived.area_bits,  # cells on the upper of two turns
         "two": 1,  # there are cells on two turns
@@ -113,14 +114,14 @@ def turned_layout(derived: Derived) -> dict[str, int]:
 
 
 def over_the_seam(derived: Derived, row: Value, before: Value) -> Value:
-    """Whether a cell in the last column of two rows is joined with one in the first."""
+    """Whether cells in the last and first columns of two rows are joined."""
     if derived.skin.connectivity == 8:
         return (row | before)[-1] & (row | before)[0]
     return row[-1] & row[0] | before[-1] & before[0]
 
 
 class _Left:
-    """What of two rows is still to be walked."""
+    """The part of two rows still to be walked."""
 
     def __init__(self, derived: Derived):
         columns = derived.skin.columns
@@ -233,7 +234,7 @@ class Walk(wiring.Component):
             self._next_cluster(m, left, row_ends)
 
     def _next_cluster(self, m: Module, left: _Left, ends: Value) -> None:
-        """The first of the clusters that end there is next."""
+        """The first of the clusters that end here is next."""
         upto, others = Signal.like(left.ends), Signal.like(left.ends)
         m.d.comb += [others.eq(ends & (ends - 1)), upto.eq(Mux(ends.any(), ends ^ (ends - 1), 0))]
         m.d.sync += [left.ends.eq(others), left.inside.eq(upto)]

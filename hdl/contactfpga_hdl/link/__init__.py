@@ -1,1 +1,1 @@
-"""Frames to bytes to the wire, and requests from it."""
+"""Frames to bytes on the wire, and requests from it."""

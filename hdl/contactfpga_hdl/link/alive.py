@@ -1,4 +1,4 @@
-"""A pin that a watchdog or a safety relay watches: it toggles as long as whole frames without a fault come."""
+"""A pin for a watchdog or a safety relay: it toggles as long as whole, fault-free frames come."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,10 +8,10 @@ TICK_US = 1000
 
 
 class Alive(wiring.Component):
-    """Toggles every :data:`TICK_US` if the sheet was well since it could toggle last.
+    """Toggles every :data:`TICK_US` if the sheet was well since the last chance to toggle.
 
-    well (in): high for a clock when a whole frame is packed, or an untouched sheet was looked at.
-    fault (in): high while a fault is told. What was well before it no longer counts.
+    well (in): high for a clock when a whole frame is packed, or an untouched sheet was checked.
+    fault (in): high while a fault is reported, which cancels an earlier ``well``.
     pin (out): from a register.
     """
 

@@ -1,7 +1,7 @@
-"""What a link sends between frames for some Skins: reports of faults, and readings of units (docs/protocol.md).
+"""Packets of some Skins between frames: fault reports, and readings of units (docs/protocol.md).
 
-A hello goes first, then a report, then a frame; but a frame that waits is next after a report, so that it waits for one
-at most, and one more per hello. Readings go when nothing else waits, and at the latest after
+A hello goes first, then a report, then a frame; but a waiting frame is next after a report, so that it waits for at
+most one, and one more per hello. Readings go when nothing else waits, and at the latest after
 :data:`FRAMES_BEFORE_UNITS` frames, so that frames that fill the line do not hold them back.
 """
 
@@ -18,7 +18,7 @@ FRAMES_BEFORE_UNITS = 4
 
 
 class Wire(Protocol):
-    """The packet on the wire, and the choice of the next one, as the link has them."""
+    """The link's packet on the wire, and its choice of the next one."""
 
     idle: Signal
     take_hello: Signal
@@ -30,10 +30,10 @@ class Wire(Protocol):
 
 
 class Reports:
-    """Reports of faults, and slots of a self-test, among a link's packets.
+    """Fault reports, and slots of a self-test, among a link's packets.
 
     sent: the last packet taken is one of these.
-    byte: the byte of it that is on offer.
+    byte: its offered byte.
     """
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
@@ -53,14 +53,14 @@ class Reports:
             wiring.connect(m, wiring.flipped(link.slots), reporter.slots)
 
     def choose(self, m: Module, hello_due: Value, frame_waits: Value) -> Value:
-        """While the wire is idle: whether a report is next."""
+        """Whether a report is next, while the wire is idle."""
         taken = self._wire.take_report
         m.d.comb += taken.eq(self._reporter.due & ~hello_due & ~(self.sent & frame_waits))
         m.d.sync += self.sent.eq(taken)
         return taken
 
     def begin(self, end: Signal) -> list:
-        """Assigned when one is taken; ``end`` is the offset after its last byte."""
+        """Assignments when one is taken; ``end`` is the offset after its last byte."""
         return [end.eq(self._reporter.length)]
 
 
@@ -68,7 +68,7 @@ class Readings:
     """Readings of units among a link's packets, one for each sweep.
 
     sent: the last packet taken is one of these.
-    byte: the byte of it that is on offer.
+    byte: its offered byte.
     """
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
@@ -80,7 +80,7 @@ class Readings:
         m.d.comb += [link.units.taken.eq(wire.take_units), link.units.place.eq(wire.offset)]
 
     def choose(self, m: Module, hello_due: Value, frame_waits: Value) -> Value:
-        """While the wire is idle: whether readings are next."""
+        """Whether readings are next, while the wire is idle."""
         taken = self._wire.take_units
         units_next = self._frames == FRAMES_BEFORE_UNITS
         others = hello_due | self._wire.take_report | frame_waits & ~units_next
@@ -91,5 +91,5 @@ class Readings:
         return taken
 
     def begin(self, end: Signal) -> list:
-        """Assigned when one is taken; ``end`` is the offset after its last byte."""
+        """Assignments when one is taken; ``end`` is the offset after its last byte."""
         return [self._frames.eq(0), end.eq(self._length)]

@@ -1,4 +1,4 @@
-"""What the board tells of its lines, byte by byte: reports of faults, and slots of its self-test (docs/protocol.md)."""
+"""Packets about the lines, byte by byte: fault reports, and slots of the self-test (docs/protocol.md)."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import memory, stream, wiring
@@ -11,21 +11,21 @@ from contactfpga_hdl.payloads import faults_layout, slots_layout
 
 
 class Reporter(wiring.Component):
-    """The packets of kind 9 without their check. A report is due after each hello, and when it would not say what was
-    sent last: a byte of it is compared in each clock in which none is on the wire.
+    """The packets of kind 9 without their check. A report is due after each hello, and when it would differ from the
+    last one sent: while none is on the wire, a byte is compared in each clock.
 
-    Each digit is taken in the clock before its byte is offered, so a report may mix what was before and after a
-    change; then it differs from what would be sent, and another one follows.
+    Each digit is read in the clock before its byte is offered, so a report may mix the word before and after a change;
+    then it differs from the current word, and another follows.
 
-    word (in): what the scan knows of its lines, as :func:`~contactfpga_hdl.payloads.faults_layout` has it.
+    word (in): the scan's fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`.
     slots (in): with ``self_test``, slots to be sent; ``ready`` in the clock after the last byte of one was taken.
-    greeted (in): high for a clock when a hello goes out.
-    taken (in): high for a clock when the packet that is ``due`` goes out.
-    sends (in): from the next clock on until the wire is idle again.
-    place (in), fetches (in): of the byte that is offered from the next clock on; at its end ``place`` is ``length``.
+    greeted (in): high for a clock when a hello is sent.
+    taken (in): high for a clock when the packet that is ``due`` is sent.
+    sends (in): high from the next clock on until the wire is idle again.
+    place (in), fetches (in): of the byte offered from the next clock on; at its end ``place`` is ``length``.
     due (out): a packet waits.
-    length (out): of the packet that is due.
-    byte (out): the byte on offer.
+    length (out): length of the packet that is due.
+    byte (out): the offered byte.
     """
 
     def __init__(self, skin: Skin):
@@ -69,7 +69,7 @@ class Reporter(wiring.Component):
         return m
 
     def _compare(self, m: Module, at: Value, is_slot: Value) -> Value:
-        """Whether a byte of a report would not be the one sent last; those are kept."""
+        """Whether a byte of a report would differ from the stored one sent last."""
         init = [*self._report, *[0] * ((1 << len(at)) - len(self._report))]
         m.submodules.sent = sent = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = sent.read_port(), sent.write_port()
@@ -80,7 +80,7 @@ class Reporter(wiring.Component):
         return watched & ~self.sends & (read.data != self.byte)
 
     def _put_slots(self, m: Module, is_slot: Value, report_due: Value, report: Value) -> Value:
-        """Slots go out while no report is due; the byte at the place of either."""
+        """Send slots while no report is due; returns the byte at the place of either."""
         slot = self.slots.payload
         m.d.comb += self.due.eq(report_due | self.slots.valid)
         with m.If(~report_due):
@@ -93,7 +93,7 @@ class Reporter(wiring.Component):
 
 
 def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value:
-    """The byte at a place of a packet that is not ``empty`` but holds these digits."""
+    """The byte at a place of a packet, from ``empty`` with these digits inserted."""
     found = Signal(8)
     with m.Switch(place):
         for index, value in enumerate([Const(empty[0], 8), *digits, Const(empty[-1], 8)]):
@@ -103,7 +103,7 @@ def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value
 
 
 def _digits(word: Value) -> list[Value]:
-    """Its bits, seven in each byte, lowest first."""
+    """Bits of the word, seven in each byte, lowest first."""
     cut = [word[start : start + DIGIT_BITS] for start in range(0, len(word), DIGIT_BITS)]
     return [Cat(bits, Const(0, DIGIT_BITS - len(bits)), Const(1, 1)) for bits in cut]
 
@@ -114,5 +114,5 @@ def report_of(bits: int, word: int) -> bytes:
 
 
 def empty_slot(skin: Skin) -> bytes:
-    """A slot of the self-test in which nothing was read, stuffed."""
+    """A stuffed slot of the self-test without readings."""
     return cobs_encode(faults.encode_slot(0, 0, skin.rows + skin.columns))

@@ -1,4 +1,4 @@
-"""Counters that go on for years, in the digits in which a hello gives them."""
+"""Counters for years, in the digits of a hello."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import memory, wiring
@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS, STATE_DIGITS
 
 LIVE_DIGITS = 2
-"""Low digits of the count of sent frames, which the link keeps itself: more than a frame's sequence number has."""
+"""Low digits of the count of sent frames, kept by the link: more than a frame's sequence number has."""
 
 _EPOCH = SENT_DIGITS
 _LAST = (_EPOCH - 1, _EPOCH + EPOCH_DIGITS - 1)
@@ -16,14 +16,13 @@ _LAST = (_EPOCH - 1, _EPOCH + EPOCH_DIGITS - 1)
 class Odometer(wiring.Component):
     """The high digits of the frames sent, and all of the epoch, at their places in a hello's state.
 
-    Each carry takes two clocks per digit that changes.
+    Each carry needs two clocks per changing digit. At first all digits are set to 0, a clock each, as memory cannot be
+    reset.
 
-    sent, epoch (in): high for a clock for one more. One carry of each kind may wait.
+    sent, epoch (in): high for a clock to count one more. One carry of each kind may wait.
     hold (in): no carry begins.
-    place (in), digit (out): the digit of the place of the clock before, when no carry is under way; 0 at places of
-    other counters.
-
-    First it sets all digits to 0, a clock each: it may be reset, and memory is not.
+    place (in), digit (out): the digit of the previous clock's place, when no carry is under way; 0 at places of other
+        counters.
     """
 
     def __init__(self):

@@ -1,4 +1,4 @@
-"""Items to the bytes of a frame: items and trailer, stuffed with COBS as they are written."""
+"""Items to the bytes of a frame: items and trailer, COBS-stuffed while written."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
@@ -10,22 +10,22 @@ from contactfpga.wire import protocol
 from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 
 FULL_BLOCK = 255
-"""Length of a COBS block that holds all the bytes it can."""
+"""Length of a full COBS block."""
 
 
 def verdict_layout(derived: Derived) -> data.StructLayout:
-    """What the link decides about a frame whose end mark is packed: ``send`` at once, the rest one clock later."""
+    """The link's decision on a frame whose end mark is packed: ``send`` at once, the rest one clock later."""
     return data.StructLayout({"send": 1, "sequence": SEQUENCE_BITS, "overwritten": derived.overwritten_bits})
 
 
 def frames_signature(derived: Derived, offset_bits: int) -> wiring.Signature:
-    """Frames on their way from the packer, which is the initiator, to the link.
+    """Frames from the packer, the initiator, to the link.
 
     write: a byte and its offset in the region of this frame.
     decide: high for the clock in which an end mark is taken.
-    verdict (in): in that clock, and its numbers until the ``commit``, what the link decides about this frame.
+    verdict (in): in that clock, and its numbers until ``commit``, the link's decision on this frame.
     commit: high for the clock in which the frame's last byte is written.
-    end: in that clock the offset after its last byte. What is written from the next clock on belongs to another frame.
+    end: in that clock the offset after its last byte. Later writes belong to another frame.
     """
     return wiring.Signature(
         {
@@ -59,15 +59,13 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
 class Packer(wiring.Component):
     """Writes each frame, stuffed, into a region of a memory, from offset 0 on; one byte per clock.
 
-    An item is taken with its last byte.
+    An item is taken with its last byte. COBS writes a block's length in front of it. Every zero byte is the place of
+    the next length, so a byte needs one write: itself, or, for a zero, the length of the block that it ends. Only a
+    block of 254 bytes without a zero needs one more.
 
     items (in): a frame's items and its end mark.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
     frames (out): see :func:`frames_signature`.
-
-    COBS writes a block's length in front of it. Every zero byte is the place of the next length, so a byte takes one
-    write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero takes
-    one more.
     """
 
     def __init__(self, skin: Skin, offset_bits: int):
@@ -91,7 +89,7 @@ class Packer(wiring.Component):
         return m
 
     def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
-        """Items as they come, each taken with its last byte, then the trailer."""
+        """Sequence items as they come, each taken with its last byte, then the trailer."""
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
         decide, send = self.frames.decide, self.frames.verdict.send
         index = Signal(range(max(item_bytes, trailer_bytes + 1)))
@@ -144,7 +142,7 @@ class Packer(wiring.Component):
         return trailer.as_value()
 
     def _stuff(self, m: Module, plain: stream.Interface, restart: Value) -> None:
-        """COBS: ``code`` is the place of the open block's length, ``length`` that length so far."""
+        """COBS: ``code`` is the place of the open block's length, ``length`` its value so far."""
         write, commit = self.frames.write, self.frames.commit
         code = Signal.like(write.offset)
         place = Signal.like(write.offset, init=1)

@@ -1,4 +1,4 @@
-"""Bits that each come as a low pulse, for a line whose own bits are too short to be sampled (docs/protocol.md)."""
+"""Bits as low pulses, for a line whose own bits are too short to be sampled (docs/protocol.md)."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,15 +8,16 @@ from amaranth.lib.wiring import In, Out
 from contactfpga_hdl.link.uart import LINE_BITS
 
 LONGEST_ONE, LONGEST_MARK = 3, 7
-"""In bits of the line; the host sends 1 for a one, 5 for a mark, 9 for a zero."""
+"""Longest pulses in bits of the line; the host sends 1 for a one, 5 for a mark, 9 for a zero."""
 
 
 class PulseReceiver(wiring.Component):
-    """Line level in, bits out: each as the clock in which the line is high again after a pulse.
+    """Line level in, bits out, each in the clock in which the line is high again after a pulse.
+
+    A mark is a byte of no bits, which is ``good``; within a byte it first makes that one ``bad``, a clock earlier.
 
     pin (in): the line; it passes two synchronizer stages.
-    bits (out): see :data:`~contactfpga_hdl.link.uart.LINE_BITS`. ``good`` comes in the clock after a byte's last bit. A
-    mark is a byte of no bits, which is ``good``; within a byte it first makes that one ``bad``, a clock earlier.
+    bits (out): see :data:`~contactfpga_hdl.link.uart.LINE_BITS`. ``good`` comes in the clock after a byte's last bit.
     """
 
     def __init__(self, bit_clocks: int):

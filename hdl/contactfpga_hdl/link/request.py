@@ -1,4 +1,4 @@
-"""What the host asks for: requests and commands among the bytes at the receive pin (docs/protocol.md)."""
+"""Requests and commands of the host among the bytes at the receive pin (docs/protocol.md)."""
 
 from typing import Any
 
@@ -12,23 +12,22 @@ from contactfpga.wire.command import KIND_COMMAND, VALUE_DIGITS, WHAT_DIGITS
 from contactfpga_hdl.link.uart import LINE_BITS
 
 _NUMBER, _WHAT = 1, 1 + protocol.HEARD_DIGITS
-"""Places in a packet, counted from the stuffing's code on: the number's first digit, and in a command what it is."""
+"""Places in a packet, counted from the COBS code on: the number's first digit, and a command's kind."""
 _VALUE = _WHAT + WHAT_DIGITS
 _ARGUMENTS = WHAT_DIGITS + VALUE_DIGITS
 _LONG_BIT = 3
-"""Of the code, which is 5 for a request and 9 for a command."""
+"""Bit that distinguishes the code of a command, 9, from that of a request, 5."""
 
 
 class RequestReader(wiring.Component):
-    """Finds requests bit by bit; nothing but the number and what the check needs is kept. With ``commands`` it finds
-    these as well, in which what to do and a value come after the number; in requests their places are left out. With
-    ``sheet`` it finds only those that say this number of a sheet.
+    """Finds requests bit by bit, storing only the number and the check's state. With ``commands`` it finds these as
+    well, with kind and value after the number; requests lack these places. With ``sheet`` it accepts only those for
+    this sheet number.
 
-    ``received`` is high with ``good`` of a request's closing delimiter, which has no bits where it comes as a pulse;
-    ``hello`` then says if the request asks for one. From the next clock on ``heard`` holds the lowest bits of its
-    number, and ``number`` all of it.
-    ``number`` is 0 again from the clock after the first digit's first bit of any later packet. Where it was a command
-    ``command`` is high with ``received``, and ``what`` and ``value`` are its own until the next packet's come.
+    ``received`` is high with ``good`` of a request's closing delimiter, which as a pulse has no bits; ``hello`` then
+    tells whether it requests one. From the next clock on ``heard`` holds the lowest bits of its number, and ``number``
+    all of it. ``number`` is 0 again from the clock after the first digit's first bit of any later packet. For a command
+    ``command`` is high with ``received``, and ``what`` and ``value`` are its own until the next packet's.
     """
 
     def __init__(self, commands: bool = False, sheet: int | None = None):
@@ -93,7 +92,7 @@ class RequestReader(wiring.Component):
                 m.d.sync += place.eq(self._kind)
 
     def _check(self, m: Module, place: Value, bit: Value, restart: Value) -> Value:
-        """CRC-16/MCRF4XX of all before the check bytes, then of its own bits in these, which leaves all zeros."""
+        """CRC-16/MCRF4XX over everything before the check bytes, then over their own bits, which leaves all zeros."""
         crc = Signal(16, init=0xFFFF)
         first = self._first_check
         own = (place == first) | (place == first + 1)
@@ -130,6 +129,6 @@ class RequestReader(wiring.Component):
         m.d.comb += self.number.eq(number & whole.replicate(len(number)))
 
     def _keep(self, m: Module, kept: Value, first: int, end: int, place: Value, bit: Value, *also: Any) -> None:
-        """Shift the bits of digits at these places into a register."""
+        """Shift the digits' bits at these places into a register."""
         with m.If(self.bits.bit & (place >= first) & (place < end) & (bit != 7)):
             m.d.sync += [kept.eq(kept >> 1), kept[-1].eq(self.bits.level), *also]

@@ -1,1 +1,1 @@
-"""What a frame reports: its summary checked against its cells, and barycenters divided on the board."""
+"""A frame's content: its summary checked against its cells, and barycenters divided on the board."""

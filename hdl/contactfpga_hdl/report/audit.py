@@ -1,4 +1,4 @@
-"""What a frame holds: its items for the packer, and a summary that was checked against its cells."""
+"""A frame's items for the packer, and a summary checked against its cells."""
 
 import math
 
@@ -19,18 +19,18 @@ from contactfpga_hdl.payloads import (
 from contactfpga_hdl.util.bits import popcount
 
 GROUPS = 4
-"""The most groups of a row. Each of a row's steps may hold up the counting, and the next row comes six clocks later."""
+"""The most groups of a row. Each of a row's steps may delay the counting, and the next row comes six clocks later."""
 
 
 class Audit(wiring.Component):
-    """Counts a frame before and after the labeller; lets as many zones through as the frame can carry.
+    """Counts a frame before and after the labeller; passes as many zones as the frame can carry.
 
     taken, row (in): a row, in the clock in which the labeller takes it.
     free (out): that row can be counted.
     records (in): from the labeller.
-    items (out): the same without delay, but no more than the frame can carry.
-    summary (out): until the next frame's. ``zones``, ``overflow`` and ``changed`` are there one clock after the end
-    mark, ``cells`` and ``mismatch`` at most seven, which is before the packer can come to them.
+    items (out): the records without delay, but no more than the frame can carry.
+    summary (out): valid until the next frame's. ``zones``, ``overflow`` and ``changed`` are valid one clock after the
+        end mark, ``cells`` and ``mismatch`` after at most seven, before the packer can reach them.
     """
 
     def __init__(self, skin: Skin):
@@ -147,7 +147,7 @@ class Tally(wiring.Component):
 
 
 def _count_offsets(bits: Value) -> Value:
-    """The numbers of the bits that are set, summed: for each bit of the numbers, how many have it."""
+    """The sum of the numbers of the set bits: for each bit of the numbers, how many have it."""
     return sum(
         popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place
         for place in range((len(bits) - 1).bit_length())
@@ -155,12 +155,11 @@ def _count_offsets(bits: Value) -> Value:
 
 
 class Counts(wiring.Component):
-    """What a frame's rows say of it, and whether its zones explain all of its cells.
+    """Content of a frame's rows, and whether its zones explain all of its cells.
 
-    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to.
-    ``ends`` is the clock of the end mark.
-    ``changed`` is captured in it, ``cells`` and ``mismatch`` as soon as the last row is counted as well; all hold until
-    the next frame's.
+    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to. ``ends`` is
+    the clock of the end mark. ``changed`` is captured in it, ``cells`` and ``mismatch`` once the last row is counted as
+    well; all hold until the next frame's.
     """
 
     def __init__(self, skin: Skin):
@@ -196,7 +195,7 @@ class Counts(wiring.Component):
         return m
 
     def _explain(self, m: Module, tally: Tally) -> None:
-        """Cells are added as they are counted, zones subtracted as they pass; for these the counting holds."""
+        """Add cells as they are counted, subtract zones as they pass, which pauses the counting."""
         cells = Signal.like(self.cells)
         unexplained = Signal(moments_layout(self.derived))
         m.d.comb += tally.hold.eq(self.zone_valid)

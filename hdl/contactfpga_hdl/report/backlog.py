@@ -1,4 +1,4 @@
-"""Where a frame's zones or bitmap rows wait for the stage after."""
+"""Queues of a frame's zones or bitmap rows before the next stage."""
 
 from amaranth.hdl import Module, Signal
 from amaranth.lib import memory, stream, wiring
@@ -9,13 +9,13 @@ from contactfpga_hdl.payloads import passed_layout
 
 
 class Queue(wiring.Component):
-    """Holds ``depth`` items, a power of two, and hands them on in order.
+    """Holds ``depth`` items, a power of two, and passes them on in order.
 
-    It is empty when the two places, of the next item to come and of the next to go, are the same. Nothing else says how
-    full it is, so after a flip of one of them items are lost or come again, and then the places meet.
+    It is empty when the places of the next item in and the next out are equal. There is no other fill count, so after a
+    flip in one of them items are lost or repeated, and then the places meet.
 
-    items (in): taken unless all places are. What comes in one clock is offered two clocks later at the earliest.
-    waiting (out): the same, in the same order.
+    items (in): taken unless all places are. An item is offered two clocks later at the earliest.
+    waiting (out): the items in order.
     """
 
     def __init__(self, width: int, depth: int):
@@ -48,13 +48,13 @@ class Queue(wiring.Component):
 
 
 class Backlog(wiring.Component):
-    """A queue for what comes faster than it is divided or packed.
+    """A queue for data faster than the division or packing.
 
-    Its places, ``Derived.backlog`` or more, are enough for any frame, so ``passed`` is always ready. What comes in one
-    clock is offered two clocks later at the earliest.
+    Its places, ``Derived.backlog`` or more, suffice for any frame, so ``passed`` is always ready. An item is offered
+    two clocks later at the earliest.
 
-    passed (in): zones, or items where nothing is divided, and end marks.
-    waiting (out): the same, in the same order.
+    passed (in): zones, or items if nothing is divided, and end marks.
+    waiting (out): the same in order.
     """
 
     def __init__(self, skin: Skin):

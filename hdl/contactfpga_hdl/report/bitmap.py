@@ -1,4 +1,4 @@
-"""Rows that go into a frame as they are."""
+"""Rows that enter a frame unchanged."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import stream, wiring
@@ -10,12 +10,12 @@ from contactfpga_hdl.report.audit import Counts
 
 
 class Bitmap(wiring.Component):
-    """With ``report = "cells"`` in the place of labeller and audit: rows go into the frame as they are.
+    """With ``report = "cells"`` the replacement of labeller and audit: rows enter the frame unchanged.
 
     rows (in): a frame's rows in ascending order.
-    free (out): the row on offer can be counted.
-    items (out): the same without delay; the end mark follows the last one three clocks later, when that is counted.
-    summary (out): as of :class:`Audit`, where it has no zones.
+    free (out): the offered row can be counted.
+    items (out): the rows without delay; the end mark follows the last one three clocks later, when that is counted.
+    summary (out): as of :class:`Audit`, without zones.
     """
 
     def __init__(self, skin: Skin):

@@ -11,8 +11,8 @@ from contactfpga_hdl.payloads import row_layout
 class Change(wiring.Component):
     """Whether the rows since ``clear`` differ from those of a frame before; one clock after ``taken``.
 
-    Where the scan skips rows, rows without a pressed cell make no difference: the others are compared with their
-    numbers, and how many there were is compared with the last one.
+    If the scan skips rows, only rows with a pressed cell count: they are compared with their numbers, and their count
+    is compared at the last one.
     """
 
     def __init__(self, skin: Skin):

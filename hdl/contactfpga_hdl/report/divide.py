@@ -1,12 +1,12 @@
 """Barycenters: each zone's sums divided by its area, while later rows arrive and bytes are sent.
 
 x = floor(sum_x 2^k / area + 1/2), k being the Skin's ``barycenter_bits``, and y likewise: the nearest step of 1/2^k of
-a cell. One bit more than that is worked out by restoring division (the school method: shift, subtract where it fits), x
-and y side by side; rounding is then adding that bit. A barycenter lies on the sheet, so that all bits of a sum but as
-many as a row or column number has are less than the area, and the division can begin with them as its remainder.
+a cell. Restoring division (shift, subtract if possible) computes one bit more, x and y in parallel; adding that bit
+rounds. A barycenter is on the sheet, so all bits of a sum beyond those of a row or column number are less than the
+area, and are the division's initial remainder.
 
-One divider for x and y in turn takes 18 LUT4 less on an iCE40UP5K with 16x16 cells and 4 fraction bits (71, not 89),
-22 with 64x64 (91, not 113), and twice the clocks, in which a dense frame's zones would not be done before the next.
+One divider for x and y in turn would save 18 LUT4 on an iCE40UP5K with 16x16 cells and 4 fraction bits (71, not 89), 22
+with 64x64 (91, not 113), but need twice the clocks, too many for a dense frame's zones.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -19,8 +19,8 @@ from contactfpga_hdl.payloads import item_layout, record_layout
 
 
 def barycenter_layout(derived: Derived) -> data.StructLayout:
-    """Area, without the bits above what all areas of the sheet differ in, and barycenter; the bits of a record on the
-    wire with ``report = "barycenter"``."""
+    """Area, without the bits that all areas of the sheet share, and barycenter; the bits of a record on the wire with
+    ``report = "barycenter"``."""
     return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits, strict=True)))
 
 
@@ -32,7 +32,7 @@ class Divider(wiring.Component):
     without delay when no item is before it.
 
     records (in): zones and end marks.
-    items (out): area and barycenter of each, in the same order.
+    items (out): area and barycenter of each, in order.
     """
 
     def __init__(self, skin: Skin):
@@ -78,7 +78,7 @@ class Divider(wiring.Component):
         return m
 
     def _divide(self, m: Module, name: str, total: Value, area: Value, begins: Value, steps: Value) -> Value:
-        """Registers of one axis; returns the quotient's bits, the last of them worked out in this clock."""
+        """Registers of one axis; returns the quotient's bits, the last computed in this clock."""
         whole = self.derived.cell_bits
         # Kept inverted, so that adding the area subtracts it and no carry is left where it fits.
         remainder = Signal(self.derived.area_bits, name=f"{name}_remainder")

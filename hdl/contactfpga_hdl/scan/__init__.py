@@ -1,1 +1,1 @@
-"""Which rows are driven when, and their samples: raster and adaptive scans, pins or shift registers."""
+"""Driven rows and their samples: raster and adaptive scans, pins or shift registers."""

@@ -1,4 +1,4 @@
-"""Drives rows together where nothing is touched, one by one where something is."""
+"""Drives rows together while nothing is touched, one by one where something is."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -14,7 +14,7 @@ from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
 
 
 class _Reading:
-    """The columns in this clock, and what that clock is."""
+    """The columns in this clock, and the clock's meaning."""
 
     def __init__(self, derived: Derived):
         self.read = Signal(derived.skin.columns)  # columns that read pressed
@@ -24,22 +24,22 @@ class _Reading:
 
 
 class AdaptiveScanner(wiring.Component):
-    """Adaptive scan: a diode at each switch makes the columns the OR of the rows that are driven.
+    """Adaptive scan: a diode at each switch makes the columns the OR of the driven rows.
 
-    Rows are offered in ascending order, each as soon as it and those before it are known: one that was driven alone
-    three clocks after its sample, those that a probe found empty in the clocks after that, one per clock. Untouched,
-    all rows are driven without a pause and the columns looked at in each clock; the slots after a touch find it.
+    Rows are offered in ascending order, each once it and those before it are known: one driven alone three clocks after
+    its sample, those that a probe found empty in the clocks after that, one per clock. Untouched, all rows are driven
+    continuously and the columns read in each clock; the slots after a touch find it.
 
     pins: those of the row driver and of the column reader.
     rows (out): rows in ascending order.
     tag (out): of the frame whose last strobe was; complete three clocks after that, until the next frame's.
     request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
-    heard (in): taken over into that tag.
-    epoch (out): high for a clock when another 2^22 us are over.
+    heard (in): copied into that tag.
+    epoch (out): high for a clock every 2^22 us.
     contact (out): rises three clocks after a touch, and falls two clocks after the last strobe of a frame in which no
-    row had a pressed switch.
-    alone (out): the row on offer was driven alone.
-    sampled (out): in which slot, counted from power-up on.
+        row had a pressed switch.
+    alone (out): the offered row was driven alone.
+    sampled (out): its slot, counted from power-up on.
     busy (in): a bit per row, with debounce; keeps that row on the list.
     """
 
@@ -92,8 +92,8 @@ class AdaptiveScanner(wiring.Component):
                 m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
     def _time_slots(self, m: Module, driver: DirectRows | RowChain, seek: Seek, sample: _Reading) -> None:
-        """As in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait at once: it is the
-        slot's strobe, and the release begins after it."""
+        """Slots as in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait at once: it
+        is the slot's strobe, and the release begins after it."""
         derived = self.derived
         slot, settled, shifting = derived.row_clocks, derived.settle_clocks, derived.row_shift_clocks
         clock = Signal(range(slot), init=(slot - shifting) % slot)
@@ -132,7 +132,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += [clock.eq(settled), row_due.eq(0)]
 
     def _offer_rows(self, m: Module, seek: Seek, sample: _Reading) -> None:
-        """Rows that are known, in order; at most one that was driven alone waits."""
+        """Offer known rows in order; at most one that was driven alone waits."""
         rows = self.rows
         place = Signal(self.skin.rows, init=1)  # of the next row to go, one-hot
         alone = Signal(self.skin.rows)  # of the row that waits
@@ -154,7 +154,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += [alone.eq(seek.pattern), cells.eq(sample.pressed), self.sampled.eq(slot)]
 
     def _keep_listed(self, m: Module, seek: Seek) -> None:
-        """A row stays on the list if it was pressed, or a switch in it counted so, after its sample before."""
+        """Keep a row on the list if it, or the state of a switch in it, was pressed after its previous sample."""
         if self.skin.debounce != "none":
             m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
             return
@@ -164,7 +164,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += before.eq(before & ~seek.pattern | Mux(seek.hit, seek.pattern, 0))
 
     def _watch_contact(self, m: Module, seek: Seek, sample: _Reading) -> None:
-        """In a probe a column counts if none of its switches is masked."""
+        """Drive the contact pin; in a probe a column counts if none of its switches is masked."""
         clean = sum(1 << column for column in range(self.skin.columns) if all(column != c for _, c in self.skin.mask))
         row, seen = Signal(), Signal()
         looks = seek.strobe & ~seek.alone | sample.watches
@@ -176,7 +176,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += self.contact.eq(0)
 
     def _tag_frame(self, m: Module, seek: Seek, driver: wiring.Component) -> None:
-        """A frame begins with its first strobe; the tag also says how many slots there were up to the last."""
+        """Tag a frame, which begins with its first strobe; the tag includes the number of slots up to the last."""
         m.submodules.frame_clock = clock = FrameClock(self.skin)
         slots = Signal.like(self.tag.slots)
         m.d.comb += [

@@ -1,4 +1,4 @@
-"""Device time in microseconds, and what of it and of requests belongs to a frame."""
+"""Device time in microseconds, and a frame's share of it and of requests."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -9,14 +9,15 @@ from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS
 from contactfpga_hdl.util.upset import upset_count
 
 RETRY_BIT = 16
-"""Bit of the time: each time it toggles, stuck columns are tried again."""
+"""Bit of the time whose toggles retry stuck columns."""
 
 
 class FrameClock(wiring.Component):
-    """Counts microseconds, and keeps what was known as the last frame began.
+    """Counts microseconds, and stores the values at the beginning of the last frame.
 
-    runs (in): the time goes on. It is ``ahead`` clocks above 0 at power-up, or below.
-    request (in): high for a clock when one is received; ``heard`` (in): lowest bits of the number of the last one.
+    runs (in): the time advances. At power-up it is ``ahead`` clocks above 0, or below.
+    request (in): high for a clock when one is received.
+    heard (in): lowest bits of the number of the last request.
     frame_begins (in): high for a clock.
     time (out): in us.
     epoch (out): high in the first clock of each further 2^``EPOCH_BITS`` us.
@@ -69,7 +70,7 @@ class FrameClock(wiring.Component):
 
 
 def watch_epoch(m: Module, time: Signal, epoch: Signal, late: bool = False) -> None:
-    """``epoch`` is high in the first clock of each further 2^``EPOCH_BITS`` us; ``late``: the time begins below 0."""
+    """Set ``epoch`` high in the first clock of each further 2^``EPOCH_BITS`` us; ``late``: the time begins below 0."""
     highest = time[EPOCH_BITS - 1]
     counts = Signal(init=not late)  # not when 0 is first reached
     before = Signal(name="before_epoch")

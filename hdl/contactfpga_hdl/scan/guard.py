@@ -1,6 +1,6 @@
-"""Which lines are told as faulty: what the checks of the guard lines and the released columns found, kept for a while.
+"""Lines reported as faulty, from the checks of the guard lines and the released columns, held for a while.
 
-Guard switches are closed for good. So a row that is whole reaches the guard column, and a column the guard row.
+Guard switches are permanently closed. So a whole row reaches the guard column, and a whole column the guard row.
 """
 
 from amaranth.hdl import Module, Mux, Signal
@@ -13,21 +13,20 @@ from contactfpga_hdl.scan.stuck import anywhere, present, watched
 
 
 def checked_rows(skin: Skin) -> int:
-    """Rows, as bits, that are not masked whole."""
+    """Rows, as bits, that are not fully masked."""
     return sum(1 << row for row in range(skin.rows) if present(skin, row))
 
 
 class LineFaults(wiring.Component):
-    """A line that is found faulty is told from the next clock on. It is told no more once a check in a *renewing* round
-    finds it well; that is the first whole round of checks after ``retry`` toggles, so faults that come and go change
-    what is told twice per toggle at most. Lines that are masked whole are not told.
+    """A faulty line is reported from the next clock until a check in a *renewing* round finds it good; that is the
+    first whole round of checks after ``retry`` toggles, so intermittent faults change the report at most twice per
+    toggle. Fully masked lines are not reported.
 
     rows, columns, stuck (in): lines that a check of this clock finds faulty.
-    checks_rows, checks_columns, checks_stuck (in): of which lines there is a check in this clock; of columns it is of
-    all or none.
-    round (in): high for a clock in which a round of checks ends, with its last check or after it.
+    checks_rows, checks_columns, checks_stuck (in): lines that are checked in this clock; of columns all or none.
+    round (in): high for a clock in which a round of checks ends, with its last check or later.
     retry (in): bit ``RETRY_BIT`` of a clock in us.
-    faults (out): what is told.
+    faults (out): the reported lines.
     """
 
     def __init__(self, skin: Skin):

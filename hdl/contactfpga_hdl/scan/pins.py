@@ -1,8 +1,8 @@
-"""Between scanner and sheet: which pins there are, and the drivers for one pin per row and per column.
+"""Pins between scanner and sheet, and the drivers for one pin per row and per column.
 
 A scanner counts rows and columns as the sheet does, the guard lines last. Its direct pins are in that order too;
-:func:`~contactfpga_hdl.scan.lines.connect_lines` puts them on the lines that they are soldered to. Pins of shift
-registers are in the order of the lines already.
+:func:`~contactfpga_hdl.scan.lines.connect_lines` maps them to the soldered lines. Pins of shift registers are already
+in line order.
 """
 
 from amaranth.hdl import Module, Signal
@@ -56,7 +56,7 @@ def _read_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def connect_pins(m: Module, inner: wiring.PureInterface, outer: wiring.PureInterface) -> None:
-    """Connect the pins of ``inner`` to the ones of the same names further out."""
+    """Connect the pins of ``inner`` to those of the same names in ``outer``."""
     for name, member in inner.signature.members.items():
         inside, outside = getattr(inner, name), getattr(outer, name)
         m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
@@ -68,17 +68,17 @@ def first_row(skin: Skin) -> int:
 
 
 def row_driver(skin: Skin) -> wiring.Signature:
-    """What drives the rows, as the scanner sees it.
+    """The row driver's interface to the scanner.
+
+    Direct rows drive row 0 after power-up, or the guard row; in an adaptive scan all rows.
 
     pins (out): those at the sheet.
     pattern (in): the rows of the next slot as ones. It must be stable from ``shift`` until ``drive``.
     shift (in): high for a clock, ``Derived.row_shift_clocks`` before the slot; direct rows need none. A pattern that is
-    driven already may be shifted again.
+        already driven may be shifted again.
     drive (in): high in the last clock before the slot; the rows are driven from the next clock on.
     release (in): high in the last clock in which they are driven.
     upset (out): see :func:`~contactfpga_hdl.scan.pins.scan_ports`.
-
-    Direct rows drive row 0 after power-up, or the guard row; in an adaptive scan all rows.
     """
     return wiring.Signature(
         {
@@ -93,7 +93,7 @@ def row_driver(skin: Skin) -> wiring.Signature:
 
 
 def column_reader(skin: Skin) -> wiring.Signature:
-    """What reads the columns, as the scanner sees it.
+    """The column reader's interface to the scanner.
 
     pins (out): those at the sheet.
     begin (in): high for a clock; the columns are sampled ``Derived.column_load_clocks`` later.
@@ -116,8 +116,8 @@ def released_levels(skin: Skin, lines: int) -> int:
 
 
 class DirectRows(wiring.Component):
-    """The pins come from registers, so that no row is selected by a glitch; they follow ``drive`` and ``release`` by a
-    clock. Nothing needs to be shifted."""
+    """Row pins from registers, so that no glitch selects a row; they follow ``drive`` and ``release`` by a clock.
+    Nothing is shifted."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -139,7 +139,7 @@ class DirectRows(wiring.Component):
 
 
 class DirectColumns(wiring.Component):
-    """Two synchronizer stages: levels are there two clocks after the pins had them."""
+    """Two synchronizer stages: levels are delayed by two clocks from the pins."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -155,18 +155,18 @@ class DirectColumns(wiring.Component):
 
 
 def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Between the sheet, the stages that take its rows, and the link.
+    """Ports between the sheet, the stages that take its rows, and the link.
 
     pins: those of the row driver and of the column reader.
     rows (out): rows in ascending order.
-    tag (out): of the frame whose last row's strobe was; when it is complete is the scan's rule.
+    tag (out): of the frame whose last row's strobe was; the scan's rule tells when it is complete.
     request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
-    heard (in): taken over into that tag.
-    epoch (out): high for a clock when another 2^22 us are over.
-    faults (out): with ``guard`` or ``self_test``, what it knows of faulty lines.
+    heard (in): copied into that tag.
+    epoch (out): high for a clock every 2^22 us.
+    faults (out): with ``guard`` or ``self_test``, the fault word.
     upset (out): high for a clock when a register was found to have flipped by itself, see
-    :func:`~contactfpga_hdl.util.upset.upset`; never with ``dual``, which finds more.
-    contact (out): high while any switch reads pressed; when it rises and falls is the scan's rule.
+        :func:`~contactfpga_hdl.util.upset.upset`; never with ``dual``, which finds more.
+    contact (out): high while any switch reads pressed; the scan's rule tells when it rises and falls.
     """
     skin = derived.skin
     faults = faults_layout(derived)

@@ -1,4 +1,4 @@
-"""Drives the columns to the released level, but for those that something else holds."""
+"""Drives the columns to the released level, except those held by something else."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,29 +8,30 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.stuck import watched
 
 LOOKS = 4
-"""Samples of a column that lie apart. It is stuck only if it reads pressed in all of them."""
+"""Separated samples of a column. It is stuck only if it reads pressed in all of them."""
 LEAST_BITS = 4
-"""Two of these samples are at least 2 to this power clocks apart, so that a disturbance of a few clocks spoils one."""
+"""Two of these samples are at least 2 to this power clocks apart, so that a disturbance of a few clocks spoils only
+one."""
 
 
 class Precharge(wiring.Component):
     """Columns that are masked in every row are never driven. A column is *stuck*, and not driven, if it reads pressed
-    in a whole window, which lasts for :data:`LOOKS` samples that lie apart, and counts all samples between them. Two of
-    the :data:`LOOKS` are ``2 ** apart_bits`` clocks apart: longer than it takes to drive a column to its level, and
-    longer than a projection.
+    in a whole window, which lasts for :data:`LOOKS` separated samples, and counts all samples between them. Two of the
+    :data:`LOOKS` are ``2 ** apart_bits`` clocks apart: longer than driving a column to its level, and longer than a
+    projection.
 
-    A stuck column is *tried* in the first window that begins after ``retry`` toggles: it is driven, and is still stuck
-    after that, or well, by the same rule.
+    A stuck column is *tried* in the first window that begins after ``retry`` toggles: it is driven, and then judged by
+    the same rule.
 
     drive (in): in the next clock the columns are driven.
     columns (in): those that read pressed.
     looks (in): high for a clock in which these are a sample, taken when all that are not stuck had been driven.
     retry (in): bit ``RETRY_BIT`` of a clock in us.
-    guard_pressed (in): of a scan that reads the rows: high for a clock in which the guard column is stuck; it is until
-    ``retry`` toggles. The other scans take it for a column like all others.
-    others (in): with a self-test, columns that are driven in the next clock whatever they read.
-    held (out): columns that are stuck, from the clock after a window on.
-    pins (out): columns that are driven, from registers.
+    guard_pressed (in): of a scan that reads the rows: high for a clock in which the guard column is stuck, which it is
+        until ``retry`` toggles. Other scans treat it like other columns.
+    others (in): with a self-test, columns driven in the next clock whatever they read.
+    held (out): stuck columns, from the clock after a window on.
+    pins (out): driven columns, from registers.
     """
 
     def __init__(self, skin: Skin):

@@ -12,8 +12,7 @@ from contactfpga_hdl.util.upset import upset
 
 
 class _Slots:
-    """Which slot it is: rows follow each other, a guard row before row 0; and before the first slot there is the time
-    to shift its row."""
+    """The current slot: rows follow each other, a guard row before row 0; before the first slot its row is shifted."""
 
     def __init__(self, derived: Derived):
         slot, shifting, lines = derived.row_clocks, derived.row_shift_clocks, derived.skin.row_lines
@@ -29,12 +28,12 @@ class _Slots:
 
     @property
     def begins_rows(self) -> Value:
-        """In the first clock of row 0."""
+        """High in the first clock of row 0."""
         return self.following[1 % len(self.following)] & (self.clock == 0)
 
 
 class _Sample:
-    """The columns as they were sampled, and of which row."""
+    """The sampled columns, and their row."""
 
     def __init__(self, derived: Derived):
         self.begins = Signal()  # the next one, of a row
@@ -55,22 +54,22 @@ class Scanner(wiring.Component):
     """Raster scan: each row for the settle time, then no row for the release time.
 
     A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchronizer
-    stages and the row register), and later by what its columns take on shift registers. With ``guard`` a frame begins
-    with the guard row, which is not offered.
+    stages and the row register), plus the shift time of columns on shift registers. With ``guard`` a frame begins with
+    the guard row, which is not offered.
 
-    On the command "sample at" rows are sampled earlier, and all else happens when it always does. The guard row is not,
-    and the others then say nothing of the guard column.
+    The command "sample at" moves the samples of rows earlier, and nothing else. The guard row's is not moved, and the
+    others then do not check the guard column.
 
     pins: those of the row driver and of the column reader.
     rows (out): rows in ascending order.
     tag (out): of the frame whose last row was offered; complete one clock after that, until the next frame's last row.
     request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
-    heard (in): taken over into that tag.
-    epoch (out): high for a clock when another 2^22 us are over.
-    faults (out): with ``guard``; a row's bit one clock after its sample is there, those of all columns one clock after
-    the guard row's, and of stuck columns one clock after the last row's.
-    contact (out): rises with the offer of the first row that holds a pressed switch, and falls with the last row of a
-    scan without one.
+    heard (in): copied into that tag.
+    epoch (out): high for a clock every 2^22 us.
+    faults (out): with ``guard``; a row's bit one clock after its sample is available, those of all columns one clock
+        after the guard row's, and of stuck columns one clock after the last row's.
+    contact (out): rises with the offer of the first row with a pressed switch, and falls with the last row of a scan
+        without one.
     """
 
     def __init__(self, skin: Skin):
@@ -140,8 +139,8 @@ class Scanner(wiring.Component):
         ]
 
     def _sample_columns(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """A slot has two samples: in the last clock its row is driven, and in the last one that no row is. Returns the
-        levels of what was sampled."""
+        """A slot has two samples: in the last clock its row is driven, and in the last one without a row. Returns the
+        sampled levels."""
         derived = self.derived
         lead = derived.column_load_clocks + 1
         begins_released = Signal()
@@ -166,7 +165,7 @@ class Scanner(wiring.Component):
         return reader.levels
 
     def _sample_clock(self, m: Module, slots: _Slots, sample: _Sample) -> Value | int:
-        """Of the next row, counted from 1."""
+        """Sample clock of the next row, counted from 1."""
         if not moves_sample(self.derived):
             return self.derived.settle_clocks
         from contactfpga_hdl.scan.sample_at import SampleAt
@@ -176,7 +175,7 @@ class Scanner(wiring.Component):
         return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
 
     def _keep_sample(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """What was sampled early counts when it always does."""
+        """Hold an early sample until its usual time."""
         derived = self.derived
         counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks
         due, kept = Signal(name="sample_due"), Signal.like(reader.levels)
@@ -187,7 +186,7 @@ class Scanner(wiring.Component):
         return Mux(reader.done, reader.levels, kept)
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
-        """While no row is driven, but for a clock after the last one and a clock before the next one."""
+        """Drive columns while no row is driven, except for a clock after the last one and a clock before the next."""
         from contactfpga_hdl.scan.precharge import Precharge
 
         m.submodules.precharge = precharge = Precharge(self.skin)
@@ -202,8 +201,8 @@ class Scanner(wiring.Component):
         ]
 
     def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
-        """A row that is whole reads the guard column, the guard row all columns. Returns whether a fault was told as
-        the frame ended; it is there with the number of stuck columns."""
+        """Check lines: a whole row reads the guard column, the guard row all columns. Returns whether a fault was
+        reported as the frame ended, valid with the number of stuck columns."""
         from contactfpga_hdl.scan.guard import LineFaults
 
         skin = self.skin
@@ -256,7 +255,7 @@ class Scanner(wiring.Component):
             ]
 
     def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> FrameClock:
-        """The clock. The tag takes over what it knows of the frame, and its time, with the last row's strobe."""
+        """The frame clock. The tag takes its data of the frame, and its time, with the last row's strobe."""
         late = self.derived.column_shift_clocks
         # The time starts with the first slot of the last row, so that at this row's strobe it gives the time of row
         # 0's sample: no register has to keep that.

@@ -1,4 +1,4 @@
-"""Drives all columns and reads the rows; then drives only the rows that are touched, one by one."""
+"""Drives all columns and reads the rows; then drives only the touched rows, one by one."""
 
 from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
@@ -18,28 +18,28 @@ from contactfpga_hdl.scan.stuck import count_columns, present
 
 
 class ReversalScanner(wiring.Component):
-    """Line reversal: the board *listens*, columns driven and rows let go, and then drives the rows that read touched.
+    """Line reversal: the board *listens*, with columns driven and rows released, and then drives the rows that read
+    touched.
 
-    With ``guard`` a frame with a driven row ends with a check of guard lines, and a sheet at rest is checked now and
-    then. The guard column is driven to the selecting level in between, the guard row to the released one.
+    With ``guard`` a frame with a driven row ends with a check of guard lines, and a resting sheet is checked now and
+    then. Otherwise the guard column is driven to the selecting level, the guard row to the released one.
 
-    Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock in
-    which it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is
-    not driven before this one is taken, and the next frame does not begin before this one is packed.
+    Untouched rows are read in each clock, and no level changes. A row's columns are sampled in the last clock in which
+    it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is not
+    driven before this one is taken, and the next frame does not begin before this one is packed.
 
-    rows (out): the rows that were driven, in ascending order, and an empty row after one whose neighbor was not; an
-    untouched sheet has one empty row. With ``report = "cells"`` all rows.
-    tag (out): of the frame that is under way; ``fault`` and the number of stuck columns from three clocks after it
-    began.
-    faults (out): with ``guard``; a check's from the clock after its sample is there.
-    watched (out): high for a clock when the rows of a sheet at rest were watched for another 256 us; with ``guard``
-    when it was checked.
-    packed (in): high for a clock when it is packed.
+    rows (out): the driven rows in ascending order, and an empty row after one whose neighbor was not driven; an
+        untouched sheet has one empty row. With ``report = "cells"`` all rows.
+    tag (out): of the current frame; ``fault`` and the number of stuck columns from three clocks after it began.
+    faults (out): with ``guard``; a check's from the clock after its sample is available.
+    watched (out): high for a clock when the rows of a resting sheet were watched for another 256 us; with ``guard``
+        when it was checked.
+    packed (in): high for a clock when the frame is packed.
     time (out): in us.
     due (in): a frame is wanted, though nothing is touched.
     contact (out): rises three clocks after a touch of an untouched sheet; falls with a frame without a pressed switch.
-    alone (out): the row on offer was driven.
-    sampled (out): at which time.
+    alone (out): the offered row was driven.
+    sampled (out): the time of its sample.
     busy (in): with debounce, a bit per row; that row is driven in the next frame, touched or not.
     """
 
@@ -89,7 +89,7 @@ class ReversalScanner(wiring.Component):
         return m
 
     def _read_sheet(self, m: Module, pressed: Signal) -> Value:
-        """Returns rows that read touched, with those that are masked whole."""
+        """Returns rows that read touched, including fully masked ones."""
         skin = self.skin
         rows = Signal(skin.rows)
         at_pins = self.pins.rows_read[: skin.rows]
@@ -102,7 +102,7 @@ class ReversalScanner(wiring.Component):
         return rows if skin.selects_low else ~rows
 
     def _hand_on(self, m: Module, cycle: ReversalCycle, wakes: Value, read: Value, pressed: Value) -> None:
-        """Rows that were driven, the contact pin, and what moved."""
+        """Connect driven rows, the contact pin, and motion."""
         skin = self.skin
         m.submodules.offer = offer = DrivenRows(skin) if self.derived.skips else AllRows(skin)
         m.submodules.contact = contact = Contact()
@@ -136,7 +136,7 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _mask(self, m: Module, cycle: ReversalCycle, pressed: Value) -> Value:
-        """Columns that read pressed and are not masked in the row."""
+        """Columns that read pressed and are unmasked in the row."""
         masked = Signal(self.skin.columns)
         m.d.comb += masked.eq(pressed)
         with m.Switch(cycle.y):
@@ -146,9 +146,9 @@ class ReversalScanner(wiring.Component):
         return masked
 
     def _tag_frame(self, m: Module, cycle: ReversalCycle, clock: FrameClock) -> Value:
-        """A frame's tag is what there is when it begins; of faults what is told when its stuck columns are counted.
+        """A frame's tag, taken at its beginning; its faults are those reported when its stuck columns are counted.
 
-        Returns what is high for a clock when bit ``CHECK_BIT`` of the time has toggled.
+        Returns a level that is high for a clock when bit ``CHECK_BIT`` of the time has toggled.
         """
         before, toggles = Signal(), Signal()
         m.d.sync += before.eq(clock.time[CHECK_BIT])
@@ -177,7 +177,7 @@ class ReversalScanner(wiring.Component):
     def _drive_sheet(
         self, m: Module, cycle: ReversalCycle, precharge: Precharge, pressed: Value, test: SelfTest | None
     ) -> None:
-        """All pins come from registers; at power-up none is driven."""
+        """Drive all pins from registers; at power-up none is driven."""
         skin = self.skin
         begun = Signal()
         m.d.sync += begun.eq(cycle.begins)
@@ -198,7 +198,7 @@ class ReversalScanner(wiring.Component):
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
 
     def _let_go(self, m: Module, cycle: ReversalCycle, precharge: Precharge, test: SelfTest | None) -> None:
-        """Which rows are driven: all or none, and a guard row but in a self-test; this drives single lines."""
+        """Driven rows: all or none, and a guard row except in a self-test, which drives single lines."""
         skin = self.skin
         if test is None:
             drives_rows = Signal()
@@ -232,7 +232,7 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _test_lines(self, m: Module, cycle: ReversalCycle, test: SelfTest, read: Value, pressed: Value) -> None:
-        """The scan lets go of the sheet for each slot, and a frame that is wanted waits for it."""
+        """Connect the self-test: the scan releases the sheet for each slot, and a wanted frame waits."""
         m.submodules.test = test
         wiring.connect(m, test.slots, wiring.flipped(self.slots))
         m.d.comb += [

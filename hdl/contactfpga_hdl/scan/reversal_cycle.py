@@ -1,4 +1,4 @@
-"""Line reversal: who has the sheet when. What a state does to the sheet is seen at the pins a clock later."""
+"""Line reversal: the states that share the sheet. A state's effect is visible at the pins a clock later."""
 
 from amaranth.hdl import Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -11,32 +11,36 @@ from contactfpga_hdl.scan.sample_at import SampleAt
 from contactfpga_hdl.util.bits import lowest
 
 SYNCHRONIZED = 3
-"""Clocks that a touch has been there when its row reads touched in a synchronizer's output, that clock included."""
+"""Clocks from a touch until its row reads touched in a synchronizer's output, inclusive."""
 
 
 class ReversalCycle(wiring.Component):
     """Listens; then charge, gap and select per row; with ``guard`` also answer, with ``self_test`` test.
 
     touched (in): rows to drive: they read touched, or have a debounce time running.
-    wanted (in): a frame is, though nothing is touched.
+    wanted (in): a frame is wanted, though nothing is touched.
     packed (in): high for a clock when the frame that began last is packed.
     offers (in): a row is on offer.
-    begins (out): high for a clock: a frame does, of the rows that read touched in it.
-    rests (out): none did, and rows are watched since; settled (out): they have been let go for long enough.
+    begins (out): high for a clock in which a frame begins, of the rows that read touched in it.
+    rests (out): none began, and rows are watched since.
+    settled (out): rows have been released for long enough.
     todo (out): rows still to be driven in this frame.
-    y (out): number of the row that is driven, or was last; following (out): of the next one.
-    strobe (out): high for a clock: the columns of that row are there.
-    charges, listens (out): in the next clock columns are driven, rows are let go.
-    selected (out): rows that are driven to the selecting level.
+    y (out): number of the driven, or last driven, row; following (out): of the next one.
+    strobe (out): high for a clock when the columns of that row are available.
+    charges, listens (out): in the next clock columns are driven, rows are released.
+    selected (out): rows driven to the selecting level.
 
     With ``guard``, see :class:`~contactfpga_hdl.scan.reversal_guard.Checks`:
-    check_asked (in): a sheet at rest is to be checked; of_rows (in): the next check is one of the rows.
-    check_starts, checked (out): high for a clock when one starts, and when its sample is there.
+
+    check_asked (in): a resting sheet is to be checked.
+    of_rows (in): the next check is of the rows.
+    check_starts, checked (out): high for a clock when a check starts, and when its sample is available.
     guard (out): the guard row is driven to the selecting level.
-    inverts (out): in the next clock the guard column has the released level, the other columns do not.
+    inverts (out): in the next clock the guard column has the released level, the other columns the selecting one.
 
     With ``self_test``, see :class:`~contactfpga_hdl.scan.self_test.SelfTest`:
-    test_asked (in): a slot is; tested (in): high for a clock, its last one.
+
+    test_asked (in): a slot is wanted; tested (in): high for a clock, its last one.
     discharges (in): in the next clock all rows are driven to the selecting level.
     lets_go (out): high for a clock when a slot begins; tests (out): it is under way.
     """
@@ -163,11 +167,11 @@ class ReversalCycle(wiring.Component):
 
     @property
     def _check_clocks(self) -> int:
-        """Clocks that a check of the rows after a frame takes."""
+        """Clocks of a check of the rows after a frame."""
         return max(self.derived.project_clocks, self._settle)
 
     def _check(self, m: Module, columns_from: str) -> None:
-        """The next check begins; one of columns in a state of its choice."""
+        """Begin the next check; one of columns begins in the given state."""
         m.d.comb += self.check_starts.eq(1)
         m.d.sync += self._selects.eq(~self.of_rows)
         with m.If(self.of_rows):

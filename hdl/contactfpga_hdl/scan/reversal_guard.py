@@ -1,7 +1,7 @@
-"""Line reversal with guard lines: the checks of rows and columns, one per frame and at rest one every 256 us.
+"""Line reversal with guard lines: checks of rows and columns in turn, one per frame and at rest one every 256 us.
 
-Rows: the guard column alone is driven to the released level, all others to the selecting one, and each row that is
-whole reads touched. Columns: the guard row alone is selected, and each column that is whole reads pressed.
+Rows: the guard column alone is driven to the released level, all others to the selecting one, and each whole row reads
+touched. Columns: the guard row alone is selected, and each whole column reads pressed.
 """
 
 from amaranth.hdl import Cat, Const, Module
@@ -13,17 +13,18 @@ from contactfpga_hdl.payloads import faults_layout
 from contactfpga_hdl.scan.guard import LineFaults
 
 CHECK_BIT = 8
-"""Bit of the clock in us: each time it toggles, a sheet at rest is checked."""
+"""Bit of the us clock whose toggles start a check of a resting sheet."""
 
 
 class Checks(wiring.Component):
-    """Which check is made next, and what checks tell. A guard column that is stuck says nothing about rows.
+    """The next check, and the checks' results. A stuck guard column prevents conclusions about rows.
 
-    due (in): high for a clock: a sheet at rest is to be checked. asked (out): it is, until a check starts.
-    starts, checked (in): high for a clock when a check does, and when its sample is there.
-    of_rows (out): the next check is one of the rows.
-    of_guard (out): high for a clock: the sample of the rows is there, and of the guard column.
-    rows, columns (in): rows that read touched, columns that read pressed; held (in): columns that are stuck.
+    due (in): high for a clock when a resting sheet is to be checked.
+    asked (out): such a check is wanted, until a check starts.
+    starts, checked (in): high for a clock when a check starts, and when its sample is available.
+    of_rows (out): the next check is of the rows.
+    of_guard (out): high for a clock when the sample of the rows, and of the guard column, is available.
+    rows, columns (in): rows that read touched, columns that read pressed; held (in): stuck columns.
     retry (in): bit ``RETRY_BIT`` of the clock in us.
     faults (out): see :class:`~contactfpga_hdl.scan.guard.LineFaults`.
     """

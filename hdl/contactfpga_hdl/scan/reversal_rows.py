@@ -1,4 +1,4 @@
-"""Line reversal: which rows are handed on, the contact pin, and what moved within a frame."""
+"""Line reversal: the rows passed on, the contact pin, and motion within a frame."""
 
 from amaranth.hdl import Const, Module, Mux, Signal
 from amaranth.lib import stream, wiring
@@ -11,11 +11,11 @@ from contactfpga_hdl.scan.stuck import present
 
 
 def offer_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """The ports of what hands rows on.
+    """Ports of the stage that passes rows on.
 
-    untouched (in): high for a clock: a frame begins in which no row is driven.
+    untouched (in): high for a clock when a frame without a driven row begins.
     strobe (in): high for a clock: ``pressed`` (in) are the columns that read pressed in row ``y`` (in), the frame's
-    ``last`` (in) one, or row ``following`` (in) is the next.
+        ``last`` (in), or row ``following`` (in) is the next.
     rows (out), alone (out): see :class:`~contactfpga_hdl.scan.reversal.ReversalScanner`.
     """
     number = row_bits(derived)
@@ -32,7 +32,7 @@ def offer_ports(derived: Derived) -> dict[str, wiring.Member]:
 
 
 class DrivenRows(wiring.Component):
-    """Hands on the rows that were driven, and an empty one after a row whose neighbor was not."""
+    """Passes on the driven rows, and an empty one after a row whose neighbor was not driven."""
 
     def __init__(self, skin: Skin):
         super().__init__(offer_ports(skin.derived))
@@ -53,7 +53,7 @@ class DrivenRows(wiring.Component):
 
 
 class AllRows(wiring.Component):
-    """Hands on all rows, those that were not driven as empty."""
+    """Passes on all rows, undriven ones as empty."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -88,9 +88,10 @@ class AllRows(wiring.Component):
 class Contact(wiring.Component):
     """The contact pin.
 
-    begins, untouched (in): high for a clock when a frame does, and when no row is driven in it.
-    wakes (in): a row without a masked switch of a sheet at rest reads touched.
-    strobe, pressed, last (in): high for a clock: a row's columns are there; a switch is pressed; the row is the last.
+    begins, untouched (in): high for a clock when a frame begins, and when no row is driven in it.
+    wakes (in): a row without a masked switch of a resting sheet reads touched.
+    strobe, pressed, last (in): high for a clock: a row's columns are available; a switch is pressed; the row is the
+        last.
     contact (out): rises with ``wakes`` or ``pressed``, and falls with a frame without a pressed switch.
     """
 
@@ -117,10 +118,10 @@ class Contact(wiring.Component):
 
 
 class Motion(wiring.Component):
-    """Whether a row without a masked switch read touched as the frame began, and empty when it was driven.
+    """Whether a row without a masked switch read touched as the frame began, and empty when driven.
 
     begins (in): high for a clock; ``read`` (in): rows that then read touched.
-    strobe, pressed, y (in): high for a clock: a row's columns are there; a switch is pressed; the row's number.
+    strobe, pressed, y (in): high for a clock: a row's columns are available; a switch is pressed; the row's number.
     motion (out): since the frame began.
     """
 

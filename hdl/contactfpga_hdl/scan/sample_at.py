@@ -1,4 +1,4 @@
-"""The command "sample at": a row's columns are sampled before its settle time is over (docs/protocol.md)."""
+"""The command "sample at": samples a row's columns before its settle time is over (docs/protocol.md)."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 
@@ -6,11 +6,10 @@ from contactfpga.skin.derived import Derived
 
 
 class SampleAt:
-    """The clock of a row in which its columns are sampled, from 1 to the settle time; a frame keeps the one that it
-    begins with."""
+    """Sample clock of a row, from 1 to the settle time, constant within a frame."""
 
     def __init__(self, m: Module, derived: Derived, moves: Value, clocks: Value, begins: Value):
-        """``begins``: a frame does in the next clock."""
+        """``begins``: a frame begins in the next clock."""
         self.settle = settle = derived.settle_clocks
         asked = Signal(range(settle + 1), init=settle, name="next_sample_clock")
         self.clock = Signal(range(settle + 1), init=settle, name="sample_clock")

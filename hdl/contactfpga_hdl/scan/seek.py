@@ -1,4 +1,4 @@
-"""Which rows an adaptive scan drives next."""
+"""Selection of the rows that an adaptive scan drives next."""
 
 from amaranth.hdl import Array, Const, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,11 +8,11 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 
 HITS = 2
-"""Probes of a frame that may be followed by a search; where one more hits, the rest is scanned row by row."""
+"""Probes of a frame that may be followed by a search; after one more hit, the rest is scanned row by row."""
 
 
 class _Plan:
-    """What a frame has still to do."""
+    """Remaining work of a frame."""
 
     def __init__(self, derived: Derived):
         rows, levels = derived.skin.rows, derived.row_levels
@@ -32,14 +32,14 @@ class Seek(wiring.Component):
     """Chooses row patterns from whether the last one hit.
 
     A slot drives one row alone, or it *probes* several. A frame begins with a probe of all rows that are not on the
-    list; where that hits, a search halves them (docs/timing.md). Rows are driven alone in ascending order. A row stays
-    on the list while it hits, and while ``busy`` says at its strobe that it has to.
+    list; if that hits, a search halves them (docs/timing.md). Rows are driven alone in ascending order. A row stays on
+    the list while it hits, and while ``busy`` at its strobe requires it.
 
-    The outputs but ``known`` and ``ends`` are there ``Derived.choice_clocks`` after the strobe, until the next one.
+    All outputs except ``known`` and ``ends`` are valid ``Derived.choice_clocks`` after the strobe, until the next one.
 
     strobe (in): high for a clock at the end of a slot.
     hit (in): in that clock, whether any column read pressed.
-    busy (in): in that clock, whether the row that is driven alone has to stay on the list.
+    busy (in): in that clock, whether the row that is driven alone must stay on the list.
     clear (in): forgets ``known``; must come before the next frame's first strobe.
     pattern (out): rows of the next slot.
     alone (out): it is one row, not a probe.
@@ -90,7 +90,7 @@ class Seek(wiring.Component):
         return m
 
     def _keep_list(self, m: Module, plan: _Plan) -> None:
-        """Rows to be driven alone in the next frame, and how many."""
+        """The rows to drive alone in the next frame, and their number."""
         with m.If(self.strobe & self.alone):
             was = (plan.on_list & self.pattern).any()
             stays = self.hit | self.busy
@@ -140,10 +140,10 @@ class Seek(wiring.Component):
             m.next = "PICK"
 
     def _search(self, m: Module, plan: _Plan) -> None:
-        """Halve the suspects by a bit of their number. Rows that differ in the lowest alone are driven alone.
+        """Halve the suspects by a bit of their number. Rows that differ only in the lowest are driven alone.
 
-        When no probe is left, all open rows are. The suspects are the first of them, so nothing is lost by not
-        searching on.
+        When no probe is left, all open rows are. The suspects are the first of them, so ending the search loses
+        nothing.
         """
         rows, levels = self.skin.rows, self.derived.row_levels
         lower = Array(Const(sum(1 << row for row in range(rows) if not row >> bit & 1), rows) for bit in range(levels))

@@ -1,8 +1,8 @@
-"""The self-test of a scan by line reversal: each line alone is driven, and what follows it is found.
+"""The self-test of a scan by line reversal: each line alone is driven, and the lines that follow it are found.
 
-A slot begins with all lines at the selecting level. Then all are let go, and one of them, or none in the first slot, is
-driven to the released level: no pin can work against another one for longer than that. Current may flow from a column
-through its pressed switches to rows, the way of their diodes; nothing else may follow.
+A slot begins with all lines at the selecting level. Then all are released, and one of them, or none in the first slot,
+is driven to the released level: pins can oppose each other no longer than that. Current may flow from a column through
+its pressed switches to rows, the way of their diodes; nothing else may follow.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
@@ -16,24 +16,26 @@ from contactfpga_hdl.scan.guard import checked_rows
 from contactfpga_hdl.scan.stuck import anywhere
 
 SEEN = 2
-"""Clocks after which a level is at a synchronizer's output."""
+"""Clocks from a level to a synchronizer's output."""
 
 
 class SelfTest(wiring.Component):
     """Slot 0 with no line driven, one per row, one per column; all of them once after power-up and after each command.
 
-    command (in): high for a clock; slots go out from then on, and a test under way starts again after its slot.
+    A column that rises in slot 0 is ignored in the others; a row that does without a column is joined with the supply.
+    Fully masked lines are not driven.
+
+    command (in): high for a clock; slots are sent from then on, and a test under way starts again after its slot.
     asks (out): a slot is wanted.
-    begin (in): high for a clock in which one is; the scan drives nothing from the next clock but one on.
+    begin (in): high for a clock in which one begins; the scan drives nothing from the next clock but one on.
     ends (out): high for a clock, its last one.
-    rows, columns (in): lines that read released, from synchronizers; rows that are masked whole never do.
-    discharges (out): in the next clock all lines are driven to the selecting level; so they are from the third clock
-    after ``begin`` on for the projection time.
-    alone (out): rows, then columns, that in the next clock are driven to the released level; so one is after a gap of a
-    clock for the settle time. Lines that are masked whole are not driven.
-    slots (out): after a command, what was read in each slot.
-    joined (out): a slot found a line that follows another one; until a whole test finds none. A column that rises in
-    slot 0 says nothing in the others; a row that does without a column is joined with the supply.
+    rows, columns (in): lines that read released, from synchronizers; fully masked rows never do.
+    discharges (out): in the next clock all lines are driven to the selecting level, from the third clock after
+        ``begin`` on for the projection time.
+    alone (out): rows, then columns, driven to the released level in the next clock: one line, after a gap of a clock,
+        for the settle time.
+    slots (out): after a command, the readings of each slot.
+    joined (out): a slot found a line that follows another; until a whole test finds none.
     """
 
     def __init__(self, skin: Skin):
@@ -66,7 +68,7 @@ class SelfTest(wiring.Component):
         return m
 
     def _drive(self, m: Module, line: Value) -> Value:
-        """Returns what is high when the levels of a slot are there."""
+        """Drive a line; returns a level that is high when the levels of a slot are available."""
         project, settle = self.derived.project_clocks, self.derived.settle_clocks
         clock = Signal(range(max(project, settle, SEEN + 1)))
         drives = Signal()
@@ -102,7 +104,7 @@ class SelfTest(wiring.Component):
         return judges
 
     def _count(self, m: Module, judges: Value, number: Signal, last: int) -> None:
-        """Which slot is next. One that goes out is kept until then."""
+        """Number of the next slot. A slot to be sent is kept until then."""
         waits = self.slots.valid
         wanted = Signal()
         tells = Signal()  # slots go out
@@ -142,8 +144,7 @@ class SelfTest(wiring.Component):
                 m.d.sync += rises.eq(Cat(rows, columns))
 
     def drives(self) -> tuple[Value, Value]:
-        """Rows and columns that are driven in the next clock. A guard row is discharged, a guard column is by its
-        switches."""
+        """Rows and columns driven in the next clock. A guard row is discharged, a guard column is by its switches."""
         rows, columns = self.skin.rows, self.skin.columns
         guard = 1 << rows if self.skin.guard else 0
         discharged = self.discharges.replicate(rows + 1) & (checked_rows(self.skin) | guard)
@@ -154,5 +155,5 @@ class SelfTest(wiring.Component):
 
 
 def test_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Of a scan with a self-test, as :class:`SelfTest` has them."""
+    """Ports of a scan with a self-test, see :class:`SelfTest`."""
     return {"command": In(1), "slots": Out(stream.Signature(slots_layout(derived)))}

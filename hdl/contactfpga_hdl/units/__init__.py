@@ -1,1 +1,1 @@
-"""Pressure units: their converter, thresholds on what they read, and its packets."""
+"""Pressure units: their converter, thresholds on readings, and packets."""

@@ -1,4 +1,4 @@
-"""ADS131M08: 24 bits, eight channels at once, at the pace of a clock that it is given (Texas Instruments SBAS950B)."""
+"""ADS131M08: 24 bits, eight channels at once, paced by a given clock (Texas Instruments SBAS950B)."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -8,26 +8,24 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.units.ports import converter_ports
 
 BITS, WORDS = 24, 10
-"""Of a word, and words of a frame: its status, eight channels, a check. It has these sizes at power-up, and all of a
-frame must be read."""
+"""Bits of a word, and words of a frame: its status, eight channels, a check. These are the sizes at power-up, and a
+frame must be read whole."""
 CLOCKS = BITS * WORDS
 LEVELS = 2 * CLOCKS + 2
-"""High and low levels that a frame takes; in the last one the converter is not selected."""
+"""Levels (half periods) of a frame; in the last one the converter is not selected."""
 SKIPPED = 3
-"""Frames after power-up that are left out."""
+"""Omitted frames after power-up."""
 
 
 class Ads131m08(wiring.Component):
-    """Reads a frame each time a conversion is ready, SPI mode 0,1; see
-    :func:`~contactfpga_hdl.units.ports.converter_ports`.
+    """Reads a frame for each conversion, SPI mode 0,1; see :func:`~contactfpga_hdl.units.ports.converter_ports`.
 
-    The converter stays as it is at power-up: 1024 samples of its modulator for each result, all channels enabled, gain
-    1. Zeros are sent, which asks for nothing. It keeps two results that were not read (8.5.1.9.1), and its first two
-    results after power-up come from a filter with another delay (8.3.7.1.1). So two frames are read one after the other
-    and left out, and one more.
+    The converter keeps its power-up settings: 1024 modulator samples per result, all channels enabled, gain 1. Zeros
+    are sent, which request nothing. It keeps two unread results (8.5.1.9.1), and its first two results after power-up
+    come from a filter with another delay (8.3.7.1.1). So two frames are read in sequence and omitted, and one more.
 
-    The converter gives a bit at a rising edge and it is taken at the next falling one. A channel is there three clocks
-    after that of its last bit.
+    The converter gives a bit at a rising edge, read at the next falling one. A channel is available three clocks after
+    that of its last bit.
     """
 
     def __init__(self, skin: Skin):
@@ -74,7 +72,7 @@ class Ads131m08(wiring.Component):
         m.d.sync += [count.eq(Mux(toggles, 0, count + 1)), self.pins.spi_pace.eq(self.pins.spi_pace ^ toggles)]
 
     def _take(self, m: Module, falls: Value, counts: Value) -> None:
-        """The pin's level in the clock in which ``falls`` is high has passed the synchronizer two clocks later."""
+        """Read the pin: its level in the clock in which ``falls`` is high passes the synchronizer two clocks later."""
         bit = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, bit)
         place = Signal(range(BITS))

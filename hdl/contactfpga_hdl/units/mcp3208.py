@@ -1,4 +1,4 @@
-"""MCP3208: 12 bits, eight channels, one conversion after the other (Microchip DS21298E, chapter 5 and table 1-1)."""
+"""MCP3208: 12 bits, eight channels, converted in turn (Microchip DS21298E, chapter 5 and table 1-1)."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -8,19 +8,19 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.units.ports import converter_ports
 
 CLOCKS = 19
-"""Of the SPI clock in a conversion: start, single-ended, three bits of the channel, one for the sample, a null bit and
-twelve bits, the highest first."""
+"""SPI clocks of a conversion: start, single-ended, three bits of the channel, one for the sample, a null bit and twelve
+bits, the highest first."""
 SAMPLE_CLOCK = 6
-"""The input is held at the falling edge of this one, counted from 1."""
+"""SPI clock, counted from 1, whose falling edge holds the input."""
 LEVELS = 40
-"""High and low levels that a conversion takes; in the last two the converter is not selected, and so at power-up."""
+"""Levels (half periods) of a conversion; in the last two, and at power-up, the converter is not selected."""
 
 
 class Mcp3208(wiring.Component):
     """Sweeps the units without a pause, SPI mode 0,0; see :func:`~contactfpga_hdl.units.ports.converter_ports`.
 
-    The converter gives a bit at a falling edge and it is taken at the next rising one. A reading is there three clocks
-    after that.
+    The converter gives a bit at a falling edge, read at the next rising one. A reading is available three clocks after
+    that.
     """
 
     def __init__(self, skin: Skin):
@@ -52,7 +52,7 @@ class Mcp3208(wiring.Component):
         return m
 
     def _take(self, m: Module, rises: Value, last_bit: Value, unit: Value, last_unit: Value) -> None:
-        """The pin's level in the clock in which ``rises`` is high has passed the synchronizer two clocks later."""
+        """Read the pin: its level in the clock in which ``rises`` is high passes the synchronizer two clocks later."""
         level = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, level)
         takes = Signal(2)

@@ -16,23 +16,23 @@ PLACE_BITS = 6
 
 
 def packet_signature() -> wiring.Signature:
-    """The packets without their check, as the link takes them.
+    """Unit packets without their check, for the link.
 
     due (out): one waits.
-    taken (in): high for a clock when it goes out.
-    place (in): of the byte that is offered from the next clock on.
+    taken (in): high for a clock when it is sent.
+    place (in): of the byte offered from the next clock on.
     byte (out): that byte.
     """
     return wiring.Signature({"due": Out(1), "taken": In(1), "place": In(PLACE_BITS), "byte": Out(8)})
 
 
 class UnitPacker(wiring.Component):
-    """Writes a packet's digits, one a clock: those of a reading after it has come, the rest after the last one.
+    """Writes a packet's digits, one a clock: those of a reading after it, the rest after the last one.
 
-    Three regions of a memory change places: the sweep that is written, the one that waits, the one on the wire.
+    Three regions of a memory rotate: the sweep being written, the waiting one, the one on the wire.
 
     sampled, done, reading (in): of the converter.
-    over, armed (in): the packet's flags, taken nine clocks after the last reading of two digits.
+    over, armed (in): the packet's flags, read nine clocks after the last reading of two digits.
     packet (out): see :func:`packet_signature`.
     """
 
@@ -68,7 +68,7 @@ class UnitPacker(wiring.Component):
         return m
 
     def _write(self, m: Module, write: wiring.PureInterface, filling: Signal) -> Signal:
-        """Writes digits; returns the signal that is high in the clock in which a sweep is complete."""
+        """Write digits; returns a signal that is high in the clock in which a sweep is complete."""
         m.submodules.frame_clock = clock = FrameClock(self.skin)
         begun = Signal(TIME_BITS)
         sequence = Signal(SEQUENCE_BITS)

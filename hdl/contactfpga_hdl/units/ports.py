@@ -1,4 +1,4 @@
-"""The pins of an SPI converter, and what every converter hands over."""
+"""The pins of an SPI converter, and the common output of converters."""
 
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
@@ -8,8 +8,7 @@ from contactfpga.skin.units import INDEX_BITS
 
 
 def unit_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins at the converter; none without units. With a pace of its own: when a conversion is ready, and the clock
-    that it is given."""
+    """The pins at the converter; none without units. With its own pace: its ready signal, and the clock it is given."""
     if not skin.units:
         return {}
     pins = {"spi_clock": Out(1), "spi_select_n": Out(1, init=1), "spi_mosi": Out(1), "spi_miso": In(1)}
@@ -19,7 +18,7 @@ def unit_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def reading_layout(skin: Skin) -> data.StructLayout:
-    """A reading, of which unit, and whether that is the sweep's last one."""
+    """A reading, its unit, and whether that is the sweep's last."""
     return data.StructLayout({"value": skin.derived.units.converter.bits, "unit": INDEX_BITS, "last": 1})
 
 
@@ -28,7 +27,7 @@ def converter_ports(skin: Skin) -> dict[str, wiring.Member]:
 
     pins: those at the converter, from registers.
     sampled (out): high in the clock in which a sweep's first unit is sampled.
-    done (out): high for a clock when a reading is there; units come in ascending order, at least 14 clocks apart.
+    done (out): high for a clock when a reading is available; units come in ascending order, at least 14 clocks apart.
     reading (out): valid with ``done``.
     """
     return {

@@ -1,4 +1,4 @@
-"""Pressure units between their converter's pins, the commands, the contact pin and the link; wiring only."""
+"""Pressure units between their converter's pins, the commands, the contact pin and the link: wiring only."""
 
 from amaranth.hdl import Module
 from amaranth.lib import wiring
@@ -13,7 +13,7 @@ from contactfpga_hdl.units.watch import Watch
 
 class Units(wiring.Component):
     """Sweeps of the converter, a packet for each; ``over`` follows a unit's reading by two clocks, the last sum's by up
-    to seven, the packet's ``due`` as docs/timing.md says.
+    to seven, the packet's ``due`` as in docs/timing.md.
 
     pins: those at the converter.
     command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.

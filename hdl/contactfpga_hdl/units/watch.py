@@ -11,12 +11,12 @@ from contactfpga_hdl.units.ports import reading_layout
 
 
 class Watch(wiring.Component):
-    """Each unit is compared with each of its readings, each sum once a sweep.
+    """Compares each unit at each of its readings, each sum once a sweep.
 
     done, reading (in): of the converter.
     command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.
     over (out): a threshold is reached. A unit's counts two clocks after ``done``, sum k's four + k clocks after that of
-    the sweep's last unit, and stands until the next comparison.
+        the sweep's last unit, until the next comparison.
     armed (out): there is a threshold.
     """
 
@@ -72,12 +72,12 @@ class Watch(wiring.Component):
 
 
 class Settings(wiring.Component):
-    """Registers, so that a restart of two copies clears them.
+    """Zeros and thresholds in registers, so that a restart of two copies clears them.
 
-    command (in): high for a clock; ``what`` and ``value`` are then a command's. Those of units and sums that are not
-    there do nothing.
-    unit (in): whose ``zero`` and ``threshold`` are looked at; ``watched``: it has a threshold.
-    sum (in), with sums: likewise.
+    command (in): high for a clock; ``what`` and ``value`` are then a command's. Those of absent units and sums are
+        ignored.
+    unit (in): selects ``zero`` and ``threshold``; ``watched``: it has a threshold.
+    sum (in), with sums: likewise for a sum.
     armed (out): there is a threshold.
     """
 
@@ -119,7 +119,7 @@ class Settings(wiring.Component):
         return m
 
     def _registers(self, m: Module, name: str, what: int, count: int, bits: int) -> tuple[Array, Array]:
-        """What commands set, and whether it is not 0."""
+        """Values set by commands, and whether each is not 0."""
         values = [Signal(bits, name=f"{name}_{index}") for index in range(count)]
         given = [Signal(name=f"{name}_{index}_given") for index in range(count)]
         index, number = self.value[:INDEX_BITS], self.value[INDEX_BITS:]
@@ -132,11 +132,11 @@ class Settings(wiring.Component):
 
 
 class Sums(wiring.Component):
-    """One multiplier takes the sums in turn, a clock each, while their totals go round.
+    """One multiplier computes the sums in turn, a clock each, while their totals rotate.
 
-    taken (in): high for a clock; then ``deviation`` is that of ``unit``, and stays for as many clocks as there are
-    sums. ``last``: of the sweep's last unit.
-    sum (out): whose ``threshold`` and ``watched`` (in) are wanted in this clock.
+    taken (in): high for a clock; then ``deviation`` is that of ``unit``, stable for as many clocks as there are sums.
+    last (in): of the sweep's last unit.
+    sum (out): whose ``threshold`` and ``watched`` (in) are needed in this clock.
     over (out): a bit for each sum, three clocks after its product in the last unit's.
     """
 

@@ -1,1 +1,1 @@
-"""Parts that several stages use."""
+"""Parts for several stages."""

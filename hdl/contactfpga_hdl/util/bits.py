@@ -15,7 +15,7 @@ def popcount(bits: Iterable[Value]) -> Value | int:
 
 
 def lowest(bits: Value) -> Value:
-    """By halves; of no bit the highest number."""
+    """Index of the lowest set bit by binary split; the highest index if none is set."""
     if len(bits) <= 2:
         return ~bits[0]
     half = 1 << (len(bits) - 1).bit_length() - 1

@@ -1,17 +1,17 @@
-"""A stack whose top is always at hand."""
+"""A stack whose top is always available."""
 
 from amaranth.hdl import Elaboratable, Module, Mux, Signal, Value
 from amaranth.lib import data, memory
 
 SHALLOW = 4
-"""Up to this depth registers alone are smaller than a memory with a register on top."""
+"""Depth up to which registers alone are smaller than a memory with a register on top."""
 
 
 class Stack(Elaboratable):
-    """Stack of ``depth`` entries whose top is a register; the others lie in registers or, if many, in a memory.
+    """Stack of ``depth`` entries whose top is a register; the others are in registers or, if many, in a memory.
 
-    In one cycle it takes ``pop``, then ``push``; with ``enable`` low it does nothing. Depth 0 keeps nothing.
-    Popping an empty stack and pushing onto a full one are the caller's errors.
+    In one cycle it performs ``pop``, then ``push``; with ``enable`` low nothing. Depth 0 keeps nothing. Popping an
+    empty stack and pushing onto a full one are the caller's errors.
     """
 
     def __init__(self, layout: data.StructLayout, depth: int):
@@ -45,7 +45,7 @@ class Stack(Elaboratable):
         return m
 
     def _shift(self, m: Module, deeper: Value, shallower: Value) -> Value:
-        """Entries below the top in registers, the next one first; returns that."""
+        """Keep the entries below the top in registers, the next one first; returns that."""
         entries = [self.top, *(Signal(self.entry.shape(), name=f"below_{i}") for i in range(1, self.depth))]
         for index in range(1, self.depth):
             with m.If(deeper):
@@ -56,10 +56,10 @@ class Stack(Elaboratable):
         return entries[1] if self.depth > 1 else self.top
 
     def _spill(self, m: Module, deeper: Value, shallower: Value) -> Value:
-        """Entries below the top in a memory, entry i at address i; returns the one next to the top.
+        """Keep the entries below the top in a memory, entry i at address i; returns the one next to the top.
 
-        That one is read ahead, or, when it was just written, kept in a register: no address is read and written in
-        the same clock.
+        That one is read ahead, or, if just written, kept in a register: no address is read and written in the same
+        clock.
         """
         m.submodules.below = below = memory.Memory(shape=self.entry.shape(), depth=self.depth - 1, init=[])
         write = below.write_port()

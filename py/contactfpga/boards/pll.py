@@ -1,7 +1,7 @@
-"""Dividers that make a clock from a board's crystal in the PLL of its FPGA. Loads no Amaranth.
+"""PLL dividers from a board's crystal to a clock. Loads no Amaranth.
 
-iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by
-``2 ** DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
+iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by ``2
+** DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
 ``CLKOP_DIV`` times that.
 """
 
@@ -23,7 +23,7 @@ ICE40_COMPARED = 10 * MHZ, 133 * MHZ
 ICE40_OSCILLATOR = 533 * MHZ, 1066 * MHZ
 ICE40_OUTPUT = 16 * MHZ, 275 * MHZ
 ICE40_FILTERS = ((17, 1), (26, 2), (44, 3), (66, 4), (101, 5), (134, 6))
-"""FILTER_RANGE by the MHz below which the frequency at the phase comparator lies."""
+"""FILTER_RANGE by the upper limit in MHz of the phase comparator's frequency."""
 
 ECP5_COMPARED = 3_125_000, 400 * MHZ
 ECP5_OSCILLATOR = 400 * MHZ, 800 * MHZ
@@ -31,10 +31,10 @@ ECP5_OUTPUT = 10 * MHZ, 400 * MHZ
 
 
 def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
-    """The dividers for a clock, exactly.
+    """The dividers for exactly this clock.
 
-    Of several the one that compares at the highest frequency, then that with the oscillator nearest to the middle of
-    its range. Raises SkinError that names the nearest clocks of whole MHz when there is none.
+    Of several the one with the highest comparison frequency, then the oscillator nearest to the middle of its range.
+    Raises SkinError with the nearest clocks of whole MHz if there is none.
     """
     clocks = _clocks(cell, crystal_hz)
     if clock_hz in clocks:
@@ -50,7 +50,7 @@ def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
 
 @functools.cache
 def _clocks(cell: str, crystal_hz: int) -> dict[int, Dividers]:
-    """Dividers by every clock of whole MHz, which is what a Skin can ask for."""
+    """Dividers by every clock of whole MHz, those that a Skin can request."""
     clocks: dict[int, Dividers] = {}
     for made, found in _SETTINGS[cell](crystal_hz):
         if made % MHZ == 0:
@@ -75,7 +75,7 @@ def ice40(crystal_hz: int) -> Iterator[tuple[Fraction, Dividers]]:
 
 
 def ecp5(crystal_hz: int) -> Iterator[tuple[Fraction, Dividers]]:
-    """(Hz, dividers) of every output of an ECP5's PLL, with the one CLKOP_DIV that suits it best."""
+    """(Hz, dividers) of every output of an ECP5's PLL, with the most suitable CLKOP_DIV."""
     middle = sum(ECP5_OSCILLATOR) // 2
     for clki in range(1, 129):
         compared = Fraction(crystal_hz, clki)

@@ -1,8 +1,8 @@
-"""What describes a board: clock, pins, bridge, programmer. Loads no Amaranth.
+"""Description of a board: clock, pins, bridge, programmer. Loads no Amaranth.
 
-Sheet lines sit on two rows of header pins. Rows take the first one from its start, columns the second one, and
-whichever runs out goes on at the far end of the other: row k and column k are on the same pin in every sheet. Where a
-Skin has shift registers, their few wires take the place of the rows or the columns.
+Sheet lines are on two rows of header pins. Rows use the first from its start, columns the second, and whichever
+overflows continues at the far end of the other: row k and column k are on the same pin in every sheet. With shift
+registers, their few wires replace the rows or the columns.
 """
 
 from __future__ import annotations
@@ -18,49 +18,49 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several
 
 NAME = "contactfpga"
-"""Of the files that a build leaves."""
+"""Base name of a build's files."""
 
 UNIT_PORTS = ("spi_ready_n", "spi_pace", "spi_clock", "spi_select_n", "spi_mosi", "spi_miso")
-"""At the converter of the pressure units; one without a pace of its own leaves out the first two."""
+"""Ports of the pressure units' converter; one without its own pace lacks the first two."""
 
 
 def unit_ports(skin: Skin) -> tuple[str, ...]:
-    """Those of a Skin's converter; none without units."""
+    """Ports of a Skin's converter; none without units."""
     if not skin.units:
         return ()
     return UNIT_PORTS if skin.derived.units.converter.pace is not None else UNIT_PORTS[2:]
 
 
 MAX_BRIDGE_ERROR = 0.03
-"""FTDI's limit for the difference between its rate and that of the other end."""
+"""FTDI's limit for the difference between the rates of both ends."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Bridge:
-    """The USB chip that carries the UART; it divides ``max_baud`` by 1, 1.5, or 2 and more in eighths."""
+    """The USB chip of the UART; it divides ``max_baud`` by 1, 1.5, or 2 and more in eighths."""
 
     chip: str
     usb: tuple[int, int]
-    """Vendor and product."""
+    """Vendor and product ID."""
     interface: int | None
-    """That carries the UART where the chip has several; None: it has one."""
+    """Interface of the UART in a chip with several; None: it has one."""
     max_baud: int
     high_speed: bool = False
     """Whether it is a high-speed device, 480 Mbit/s; else a full-speed one, 12 Mbit/s."""
 
     @property
     def frame_us(self) -> int:
-        """From one start of USB's schedule to the next, in us: a microframe, or a frame (USB 2.0, 5.3.3)."""
+        """Interval of USB's schedule in us: a microframe, or a frame (USB 2.0, 5.3.3)."""
         return 125 if self.high_speed else 1000
 
     @property
     def payload_bytes(self) -> int:
-        """Bytes of the UART in a full packet: the largest of a bulk endpoint (USB 2.0, 5.8.3), less the two bytes of
-        status that begin each packet of an FTDI chip (AN232B-04)."""
+        """UART bytes in a full packet: the largest of a bulk endpoint (USB 2.0, 5.8.3), less the two status bytes of an
+        FTDI chip's packet (AN232B-04)."""
         return (512 if self.high_speed else 64) - 2
 
     def nearest(self, baud: int) -> float:
-        """The rate the chip makes when asked for ``baud``."""
+        """The chip's actual rate for ``baud``."""
         eighths = max(16, round(8 * self.max_baud / baud))
         rates = [self.max_baud, self.max_baud / 1.5, 8 * self.max_baud / eighths]
         return min(rates, key=lambda rate: abs(rate - baud))
@@ -74,12 +74,12 @@ class Programmer:
     options: tuple[str, ...]
     install: str
     wheel: str = ""
-    """Command of a wheel that holds the same program; "" for none. It starts only where the system has libusb."""
+    """Command of a wheel with the same program, which needs the system's libusb; "" for none."""
 
 
 @dataclasses.dataclass(frozen=True)
 class BoardSpec:
-    """A board; pins are named as the platform names them, ``connector:pin``."""
+    """A board; pins have the platform's names, ``connector:pin``."""
 
     name: str
     title: str
@@ -87,51 +87,51 @@ class BoardSpec:
     platform: str
     """``module:class`` in amaranth_boards."""
     clock_hz: int
-    """Its crystal. An on-chip oscillator is never used: it is off by too much for a UART."""
+    """Frequency of its crystal. An on-chip oscillator is too imprecise for a UART."""
     pll: str
-    """The cell that makes other clocks from it; which one depends on the crystal's pin."""
+    """The PLL cell for other clocks, which depends on the crystal's pin."""
     connectors: Mapping[str, str]
-    """What is printed beside each connector."""
+    """Print beside each connector."""
     row_side: tuple[str, ...]
     column_side: tuple[str, ...]
     contact: str
     standard: Mapping[str, str]
     """Attributes of every pin."""
     pulls: Mapping[str, Mapping[str, object]]
-    """Attributes of a column by the Skin's ``diodes``; none where the FPGA has no such resistor."""
+    """Attributes of a column by the Skin's ``diodes``; none if the FPGA lacks such a resistor."""
     bridge: Bridge
     programmer: Programmer
     bitstream: str
-    """Ending of the bitstream's file."""
+    """File ending of the bitstream."""
     constraints: str
     """File in constraints/; boards with the same pins share it."""
     skin: Skin
-    """A sheet that fits, built unless another one is given."""
+    """The default sheet."""
     circuit: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """What that sheet is made of: the values of its table ``[circuit]``."""
+    """Values of that sheet's table ``[circuit]``."""
     uart: tuple[str, str] | None = None
-    """Connector pins of an external bridge, where the board receives and where it sends; None: it has one on board."""
+    """Connector pins of an external bridge for receiving and sending; None: the bridge is on board."""
     held_high: tuple[str, ...] = ()
-    """FPGA pins that other chips on the board want high."""
+    """FPGA pins that other chips on the board need high."""
 
     @property
     def lines(self) -> int:
-        """How many wires to the sheet can be on pins."""
+        """Number of wires to the sheet that fit on pins."""
         return len(self.row_side) + len(self.column_side)
 
     @property
     def alive(self) -> str:
-        """The pin of ``alive``, for a Skin that has it; for others it is one of the sheet's."""
+        """The pin of ``alive`` for a Skin that has it; otherwise one of the sheet's."""
         return self.column_side[-1]
 
     @property
     def converter(self) -> tuple[str, ...]:
-        """The pins of :data:`UNIT_PORTS`, as far as a Skin's converter has them; else they are the sheet's."""
+        """The pins of :data:`UNIT_PORTS` that a Skin's converter has; otherwise they are the sheet's."""
         return self.row_side[-len(UNIT_PORTS) :]
 
     def pins(self, skin: Skin | Several) -> dict[str, tuple[str, ...]]:
-        """Pins of each port that the gateware has at the sheet and at the units' converter, lowest bit first, and of
-        ``alive``; of several sheets those of each port with the sheet's number after its name."""
+        """Pins of each gateware port at the sheet and at the units' converter, lowest bit first, and of ``alive``; of
+        several sheets with the sheet's number after the port's name."""
         if isinstance(skin, Several):
             rows_first, columns_first = self.row_side + self.column_side[::-1], self.column_side + self.row_side[::-1]
             sheets = self._dealt(_of_sheets(skin, row_wires), rows_first)
@@ -151,34 +151,34 @@ class BoardSpec:
         return {name: tuple(itertools.islice(pins, count)) for name, count in wires.items()}
 
     def load(self, path: str | Path) -> Skin:
-        """A Skin's file; one that states no ``clock_hz`` or ``baud`` takes those of the board's own Skin."""
+        """A Skin's file; ``clock_hz`` and ``baud`` default to those of the board's own Skin."""
         return Skin.load(path, usual={"clock_hz": self.skin.clock_hz, "baud": self.skin.baud})
 
     def label(self, pin: str) -> str:
-        """What is printed on the board beside a pin."""
+        """The print on the board beside a pin."""
         connector, _, number = pin.partition(":")
         return f"{self.connectors[connector]} {number}"
 
     def check(self, skin: Skin | Several) -> None:
-        """Raise SkinError where ``skin``, or several sheets, cannot be built for this board."""
+        """Raise SkinError if ``skin``, or several sheets, cannot be built for this board."""
         self.check_clock(skin)
         self.check_pins(skin)
         self.check_baud(skin)
 
     def check_clock(self, skin: Skin | Several) -> None:
-        """Raise SkinError for a clock that neither the crystal nor the PLL makes."""
+        """Raise SkinError for a clock that neither crystal nor PLL gives."""
         if skin.clock_hz != self.clock_hz:
             pll.dividers(self.pll, self.clock_hz, skin.clock_hz)
 
     def check_pins(self, skin: Skin | Several) -> None:
-        """Raise SkinError for more wires than there are pins."""
+        """Raise SkinError for more wires than pins."""
         if isinstance(skin, Several):
             self._check_sheets(skin)
         else:
             self._check_wires(skin)
 
     def check_baud(self, skin: Skin | Several) -> None:
-        """Raise SkinError for a rate that the bridge does not reach, or misses by more than a UART bears."""
+        """Raise SkinError for a rate that the bridge does not reach, or misses by more than a UART tolerates."""
         if skin.baud > self.bridge.max_baud:
             raise SkinError(
                 f"baud is {skin.baud}, the {self.bridge.chip} of {self.title} reaches {self.bridge.max_baud} at most"
@@ -222,14 +222,14 @@ class BoardSpec:
 
 
 def row_wires(skin: Skin) -> dict[str, int]:
-    """Bits of each port at the rows, in the order of their pins."""
+    """Bits of each row port, in pin order."""
     if skin.row_drive == "direct":
         return {"rows": skin.row_lines}
     return {"row_clock": 1, "row_latch": 1, "row_enable_n": 1, "row_data": skin.row_chains}
 
 
 def column_wires(skin: Skin) -> dict[str, int]:
-    """Bits of each port at the columns, in the order of their pins."""
+    """Bits of each column port, in pin order."""
     if skin.column_read == "direct":
         return {"columns": skin.column_lines}
     return {"column_clock": 1, "column_load_n": 1, "column_data": skin.column_chains}
@@ -245,5 +245,5 @@ def pins_of(connector: str, numbers: str) -> tuple[str, ...]:
 
 
 def bitstream_path(board: BoardSpec, folder: Path) -> Path:
-    """Where a build puts the bitstream."""
+    """Path of a build's bitstream."""
     return folder / f"{NAME}.{board.bitstream}"

@@ -1,4 +1,4 @@
-"""Which pin of a board, or output of a shift register, leads to which line of a Skin's sheet. Loads no Amaranth."""
+"""Connections of a board's pins, or of shift registers' outputs, to the lines of a Skin's sheet. Loads no Amaranth."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
 
 OWN = "(on the board)"
-"""Where a wire leads that nobody has to solder."""
+"""Destination of a wire that nobody has to solder."""
 
 ROW_OUTPUTS = ("QA", 15), ("QB", 1), ("QC", 2), ("QD", 3), ("QE", 4), ("QF", 5), ("QG", 6), ("QH", 7)
-"""Outputs of a 74HC595 with their pins, the one that line 0 is on first."""
+"""Outputs of a 74HC595 with their pins, line 0's first."""
 COLUMN_INPUTS = ("H", 6), ("G", 5), ("F", 4), ("E", 3), ("D", 14), ("C", 13), ("B", 12), ("A", 11)
-"""Inputs of a 74HC165, likewise."""
+"""Inputs of a 74HC165 with their pins, line 0's first."""
 
 _CHIP_PINS = {
     "row_clock": "SRCLK 11 of every 74HC595",
@@ -45,29 +45,29 @@ _CONVERTER_PINS = {
         "spi_pace": "XTAL1/CLKIN 23 of the ADS131M08",
     },
 }
-"""By the name of the converter; of one of your own the port itself is said."""
+"""Pins by converter name; for your own the port itself is shown."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Connection:
-    """What is soldered to a line, and what hangs on it."""
+    """The destination of a line, and its parts."""
 
     leads_to: str
-    """Such as ``row 3``, ``guard column``, ``nothing``."""
+    """Destination such as ``row 3``, ``guard column``, ``nothing``."""
     kind: str = ""
-    """``row`` or ``column`` of the sheet; nothing for other wires."""
+    """``row`` or ``column`` of the sheet; empty for other wires."""
     pull: str = ""
-    """``up``, ``down``, or nothing: where a resistor on a line of the sheet leads."""
+    """``up``, ``down``, or empty: direction of the pull on a line of the sheet."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Wire:
-    """A pin of the FPGA that the gateware uses."""
+    """An FPGA pin of the gateware."""
 
     port: str
-    """As in the constraints, with its bit where it has several: ``rows[3]``, ``uart rx``."""
+    """Name in the constraints, with its bit if there are several: ``rows[3]``, ``uart rx``."""
     pin: str
-    """``connector:pin``, as the platform names it; nothing where the board wires it by itself."""
+    """``connector:pin`` as the platform names it; empty if the board itself connects it."""
     line: Connection
 
 
@@ -78,19 +78,19 @@ class Output:
     chip: str
     chain: int
     number: int
-    """Of the chip in its chain; 0 is next to the board."""
+    """Position of the chip in its chain; 0 is next to the board."""
     name: str
     pin: int
     line: Connection
 
     @property
     def place(self) -> tuple[str, str, str, str]:
-        """The same in words."""
+        """The output's place in words."""
         return self.chip, str(self.chain), str(self.number), f"{self.name} {self.pin}"
 
 
 def wires(board: BoardSpec, skin: Skin | Several) -> list[Wire]:
-    """Every pin of the FPGA that the gateware of ``skin``, or of several sheets, uses, in the order of its ports."""
+    """Every FPGA pin that the gateware of ``skin``, or of several sheets, uses, in port order."""
     found = []
     for port, pins in board.pins(skin).items():
         lines = _lines_of_sheet(skin, port, len(pins)) if isinstance(skin, Several) else _lines(skin, port, len(pins))
@@ -119,7 +119,7 @@ def outputs(skin: Skin) -> list[Output]:
 
 
 def parts(skin: Skin) -> dict[str, int]:
-    """How many of each part the sheet takes, without connectors."""
+    """Number of each part on the sheet, without connectors."""
     lines = [*row_lines(skin), *column_lines(skin)]
     cells = skin.rows * skin.columns - len(skin.mask)
     chips = collections.Counter(chip for chip, *_ in {(one.chip, one.chain, one.number) for one in outputs(skin)})
@@ -136,13 +136,13 @@ def parts(skin: Skin) -> dict[str, int]:
 
 
 def row_lines(skin: Skin) -> list[Connection]:
-    """What is soldered to each row's line; the guard row's is the last one."""
+    """Connection of each row's line, the guard row's last."""
     pull = ("down" if skin.selects_low else "up") if skin.reads_rows else ""
     return _sheet_lines("row", skin.line_of_row, skin.rows, pull)
 
 
 def column_lines(skin: Skin) -> list[Connection]:
-    """The same for columns."""
+    """Connection of each column's line, the guard column's last."""
     return _sheet_lines("column", skin.line_of_column, skin.columns, "up" if skin.selects_low else "down")
 
 
@@ -170,7 +170,8 @@ def _lines_of_sheet(several: Several, port: str, count: int) -> Sequence[Connect
 
 
 def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Sequence[Connection]) -> Iterator[Output]:
-    """Chain j has lines j n to j n + n - 1, n to a chain; its first line is on the chip next to the board."""
+    """Outputs of chains: chain j has lines j n to j n + n - 1, n to a chain; its first line is on the chip next to the
+    board."""
     length = -(-len(lines) // chains)
     for index, line in enumerate(lines):
         chain, place = divmod(index, length)
@@ -179,7 +180,7 @@ def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Se
 
 
 def ohms(value: float) -> str:
-    """A resistance as it is printed on a resistor's bag."""
+    """A resistance as printed on a resistor's bag."""
     for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
         if value >= limit:
             return f"{value / limit:g} {unit}"

@@ -1,5 +1,5 @@
-"""What a Skin can choose from: labellers, scans, debounces and reports, each registered in one place.
+"""Choices of a Skin: labellers, scans, debounces and reports, each registered in one place.
 
-A choice holds what all parts of the project need to know of it: its name, its title in charts, its bounds, what a Skin
-must fulfill, and where its gateware and its golden rule are. These two stay apart and are loaded only when needed.
+A choice holds what all parts of the project need: its name, its title in charts, its bounds, its requirements, and the
+places of its gateware and its golden rule. These two stay apart and are loaded on demand.
 """

@@ -1,4 +1,4 @@
-"""What every choice has, and how one is found: by a built-in name, or as ``module:attribute`` of your own."""
+"""Common parts of choices, which are found by a built-in name, or as your own ``module:attribute``."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from contactfpga.errors import SkinError
 from contactfpga.inputs.values import shown
 
 Bound = Callable[[Any], int]
-"""Clocks or slots that a choice takes at most, from the :class:`~contactfpga.skin.derived.Derived` of a Skin."""
+"""An upper bound in clocks or slots, from the :class:`~contactfpga.skin.derived.Derived` of a Skin."""
 
 FIELDS = ("labeller", "scan", "debounce", "converter")
-"""Fields of a Skin that may name a choice of your own, ``module:attribute``."""
+"""Fields of a Skin that may name your own choice, ``module:attribute``."""
 
 _trusting: contextvars.ContextVar[bool] = contextvars.ContextVar("trusting", default=False)
 
 
 @contextlib.contextmanager
 def trusted(trust: bool) -> Iterator[None]:
-    """With ``trust``, files that are read in this block may name modules, which are then imported and so run."""
+    """With ``trust``, files read in this block may name modules, which are imported and so run."""
     token = _trusting.set(trust or trusting())
     try:
         yield
@@ -34,12 +34,12 @@ def trusted(trust: bool) -> Iterator[None]:
 
 
 def trusting() -> bool:
-    """Whether this is a block of :func:`trusted`."""
+    """Whether this is inside :func:`trusted`."""
     return _trusting.get()
 
 
 def refuse_modules(values: Mapping[str, Any], source: str) -> None:
-    """Raise SkinError where a Skin that came from ``source`` names a module, but in a block of :func:`trusted`."""
+    """Raise SkinError if a Skin from ``source`` names a module, outside :func:`trusted`."""
     if trusting():
         return
     for field in FIELDS:
@@ -56,13 +56,13 @@ class Choice:
     """One way to do a stage. Two choices with one name are the same choice."""
 
     name: str
-    """What a Skin calls it: a built-in name, or ``module:attribute``, where this object is found."""
+    """Name in a Skin: a built-in one, or the ``module:attribute`` of this object."""
     title: str
     """Its label in charts and tables."""
     gateware: str
-    """Where the gateware's class is, ``module:attribute``; it is called with the Skin. Empty: there is none."""
+    """Place of the gateware's class, ``module:attribute``, which is called with the Skin. Empty: none."""
     golden: str
-    """Where the golden model's rule is, ``module:attribute``; it shares no code with the gateware."""
+    """Place of the golden model's rule, ``module:attribute``; it shares no code with the gateware."""
 
     def load_gateware(self) -> Any:
         """The gateware's class. Imports Amaranth."""
@@ -77,7 +77,7 @@ AnyChoice = TypeVar("AnyChoice", bound=Choice)
 
 
 def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object) -> AnyChoice:
-    """The choice of this kind that ``value`` names or is. Raises SkinError that lists what there is."""
+    """The choice of this kind that ``value`` names or is. Raises SkinError that lists the choices."""
     field = kind.__name__.lower()
     if isinstance(value, kind):
         if find(kind, built_in, value.name) != value:
@@ -99,13 +99,13 @@ def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object
 
 
 def load(place: str) -> Any:
-    """What is at ``module:attribute``."""
+    """The object at ``module:attribute``."""
     module, _, attribute = place.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
 def load_own(place: str, what: str) -> Any:
-    """What is at a place that a user names. Raises SkinError, which begins with ``what``, however the module fails."""
+    """The object at a place that a user names. Raises SkinError, beginning with ``what``, however the module fails."""
     try:
         return load(place)
     except (ImportError, AttributeError, ValueError) as error:
@@ -115,7 +115,7 @@ def load_own(place: str, what: str) -> Any:
 
 
 def own_files(skin: object) -> set[Path]:
-    """Files of the modules that a Skin's choices of your own name, for keys of what is kept."""
+    """Module files of a Skin's own choices, for cache keys."""
     own = [
         load(value) for value in (getattr(skin, field) for field in FIELDS) if isinstance(value, str) and ":" in value
     ]

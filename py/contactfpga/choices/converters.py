@@ -1,4 +1,4 @@
-"""Converters: what reads the pressure units, over SPI."""
+"""Converters, which read the pressure units over SPI."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from contactfpga.choices.choice import find as find_choice
 
 @dataclasses.dataclass(frozen=True)
 class ConverterPace:
-    """Of a converter that converts all channels by itself, at the pace of a clock that the board gives it."""
+    """A converter that converts all channels by itself, paced by a clock from the board."""
 
     most_hz: int
-    """Of that clock."""
+    """Highest frequency of that clock."""
     least_level_ns: int
-    """How long it must be high and low."""
+    """Shortest high and low level of that clock."""
     period: int
-    """Its periods from one conversion to the next."""
+    """Clock periods from one conversion to the next."""
     delay_halves: int
-    """Halves of that, from the middle of what a conversion averages until it is ready."""
+    """Half periods from the middle of a conversion's average until it is ready."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -32,24 +32,24 @@ class Converter(Choice):
     """
 
     bits: int
-    """Of a reading, at most 28."""
+    """Bits of a reading, at most 28."""
     channels: int
-    """The most units."""
+    """Largest number of units."""
     limits: tuple[tuple[float, int], ...]
-    """(supply in V, SPI clock in Hz at most) of the data sheet, rising; the first one is the least supply."""
+    """(supply in V, highest SPI clock in Hz) of the data sheet, rising; the first is the lowest supply."""
     most_v: float
     """The highest supply."""
     least_level_ns: int
-    """How long the SPI clock must be high and low."""
+    """Shortest high and low level of the SPI clock."""
     sweep_levels: int
-    """High or low levels of the SPI clock in a sweep, for each unit."""
+    """Levels (half periods) of the SPI clock in a sweep, for each unit."""
     spacing_levels: int
-    """The same between the samples of two units; 0 where all are taken at once."""
+    """Levels of the SPI clock between the samples of two units; 0 for simultaneous samples."""
     pace: ConverterPace | None = None
-    """None: it converts as it is asked."""
+    """None: it converts on request."""
 
     def most_hz(self, supply_v: float) -> int:
-        """The SPI clock at most; between two supplies of the data sheet that of the lower one counts."""
+        """The highest SPI clock; between two supplies of the data sheet that of the lower one."""
         return max((hz for volts, hz in self.limits if volts <= supply_v), default=0)
 
 
@@ -91,7 +91,7 @@ CONVERTERS: dict[str, Converter] = {
         ),
     )
 }
-"""The built-in ones, by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
+"""The built-in converters by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
 
 
 def find(value: object) -> Converter:

@@ -1,4 +1,4 @@
-"""Debounces: when a switch that reads otherwise counts otherwise. Methods and names as in QMK."""
+"""Debounces: when a switch that reads differently changes its state. Methods and names as in QMK."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from contactfpga.choices.choice import find as find_choice
 class Debounce(Choice):
     """Rows in, rows out.
 
-    ``gateware`` counts scan periods, for scans that sample evenly; ``timed_gateware`` counts row times, for the others.
+    ``gateware`` counts scan periods, for evenly sampling scans; ``timed_gateware`` counts row times, for others.
     ``golden`` is a :class:`contactfpga_sim.model.golden.debounce.DebounceRule`.
     """
 
     timed_gateware: str
     delays_press: bool
-    """A press counts only after ``debounce_press_us``."""
+    """Whether a press counts only after ``debounce_press_us``."""
 
     def load_timed_gateware(self) -> Any:
-        """The gateware's class for scans that sample unevenly. Imports Amaranth."""
+        """The gateware's class for unevenly sampling scans. Imports Amaranth."""
         return load(self.timed_gateware)
 
 
@@ -59,7 +59,7 @@ DEBOUNCES: dict[str, Debounce] = {
         ),
     )
 }
-"""The built-in ones, by name."""
+"""The built-in debounces by name."""
 
 
 def find(value: object) -> Debounce:

@@ -18,16 +18,15 @@ class Labeller(Choice):
     """
 
     exact: bool
-    """Zones are the connected components of the cells, with the Skin's connectivity. Connectivity makes no difference
-    to a labeller that is not exact."""
+    """Whether zones are the connected components of the cells. Inexact labellers ignore the connectivity."""
     end_clocks: Bound
-    """The most clocks from a frame's last row to its end mark; the last record leaves earlier."""
+    """The most clocks from a frame's last row to its end mark, which follows the last record."""
     row_clocks: Bound
-    """The most clocks from a row to the next one it can take."""
+    """The most clocks from a row to the next one that can be taken."""
     empty_row_clocks: Bound = lambda derived: 1
-    """The same for an empty row below an empty row."""
+    """The most clocks from an empty row below an empty row to the next one that can be taken."""
     closed: bool = False
-    """It joins zones over the seam of a sheet whose ends meet."""
+    """Whether it joins zones over the seam of a sheet whose ends meet."""
 
 
 LabellerName = Literal["run", "serial", "projection", "single"]
@@ -76,7 +75,7 @@ LABELLERS: dict[str, Labeller] = {
         ),
     )
 }
-"""The built-in ones, by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
+"""The built-in labellers by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
 
 
 def find(value: object) -> Labeller:

@@ -1,4 +1,4 @@
-"""Reports: what a frame carries. Each is a kind of packet in docs/protocol.md, so the set is closed."""
+"""Reports: the content of frames. Each is a kind of packet in docs/protocol.md, so the set is closed."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import Literal
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Report:
-    """What a frame carries, and where it is made."""
+    """The content of a frame, and where it is computed."""
 
     name: str
-    """What a Skin calls it."""
+    """Name in a Skin."""
     title: str
     """Its label in charts and tables."""
     kind: int
-    """Of its packets."""
+    """Kind of its packets."""
     code: int
-    """In a hello."""
+    """Code in a hello."""
     zones: bool
-    """The board finds zones. Otherwise a frame carries the rows as they are."""
+    """Whether the board finds zones; otherwise a frame has the plain rows."""
     divided: bool
-    """The board divides: zones carry barycenters."""
+    """Whether the board divides: zones have barycenters."""
 
 
 ReportName = Literal["moments", "barycenter", "cells"]
@@ -34,4 +34,4 @@ REPORTS: dict[str, Report] = {
         Report(name="cells", title="cells", kind=6, code=1, zones=False, divided=False),
     )
 }
-"""All of them, by name."""
+"""All reports by name."""

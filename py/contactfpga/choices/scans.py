@@ -1,4 +1,4 @@
-"""Scans: which rows are driven when."""
+"""Scans: the order of driven rows."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ class Scan(Choice):
     """
 
     even: bool
-    """Every row is sampled once per frame and frames take the same time. Otherwise times are counted in row times, and
-    each frame tells how many it took, or in us where the scan ``waits``."""
+    """Whether every row is sampled once per frame and frames take the same time. Otherwise times are counted in row
+    times, whose number each frame reports, or in us if the scan ``waits``."""
     reads_rows: bool
-    """It lets the rows go and reads them while the columns are driven; all these pins go both ways."""
+    """Whether it releases the rows and reads them while columns are driven, by bidirectional pins."""
     waits: bool
-    """It waits until the stage after takes a row, and until a frame is packed before it begins another one, so that no
-    stage can be too slow for it. Where zones are found it hands on the rows that it drove, with their numbers."""
+    """Whether it waits until the next stage takes a row, and until a frame is packed before it begins another, so that
+    no stage is too slow. With zones it passes on the driven rows, with their numbers."""
     guards: bool = False
-    """It looks at the guard lines of a Skin with ``guard``, and has the port ``faults``."""
+    """Whether it checks the guard lines of a Skin with ``guard``, and has the port ``faults``."""
     moves_sample: bool = False
-    """It obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
+    """Whether it obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
     check: Callable[[Any], None]
-    """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
+    """Raises SkinError if the scan cannot serve a Skin; called before anything is derived from it."""
     choice_clocks: Bound
-    """From a strobe until the next rows to drive are known; 0 where they are known beforehand."""
+    """Clocks from a strobe until the next rows are known; 0 if known beforehand."""
     max_frame_slots: Bound
-    """The most row times that a frame can take."""
+    """The most row times of a frame."""
     max_frame_clocks: Bound
-    """The most clocks that a frame can take, from its first sample to its last."""
+    """The most clocks of a frame, from its first sample to its last."""
     min_row_clocks: Bound
-    """The least clocks of a row time in which the later stages keep up, end mark and all; the scanner's tag is kept
-    until the frame before it is packed, and no longer."""
+    """The least clocks of a row time in which the later stages keep up, including the end mark; the scanner's tag is
+    kept only until the frame before it is packed."""
 
 
 def _check_adaptive(skin: Any) -> None:
@@ -71,8 +71,8 @@ def _check_reversal(skin: Any) -> None:
 
 
 def _reversal_frame_clocks(derived: Any) -> int:
-    """All rows are touched, and each waits until the one before it is debounced, labelled and counted; then guard lines
-    are checked."""
+    """Clocks when all rows are touched, and each waits until the one before it is debounced, labelled and counted; then
+    guard lines are checked."""
     handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones) + 16
     checked = max(derived.project_clocks, derived.row_clocks) + 1 if derived.skin.guard else 0
     clocks: int = derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed) + checked
@@ -86,8 +86,8 @@ def _raster_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_min_row_clocks(derived: Any) -> int:
-    """All that a slot tells is handed on before the next strobe: a row that was driven alone, then all others as empty,
-    up to the end mark. And a frame with any number of pressed rows is packed before the next frame ends."""
+    """Clocks to pass on all of a slot's results before the next strobe: a row that was driven alone, then all others as
+    empty, up to the end mark; and to pack a frame with any number of pressed rows before the next frame ends."""
     rows = derived.skin.rows
     handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
     least: int = max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
@@ -95,7 +95,7 @@ def _adaptive_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_packing_clocks(derived: Any, pressed: int) -> int:
-    """The next frame drives the same rows again one by one, and all others together."""
+    """Packing time while the next frame drives the same rows one by one, and all others together."""
     skin = derived.skin
     if not derived.report.zones:
         items = skin.rows
@@ -161,7 +161,7 @@ SCANS: dict[str, Scan] = {
         ),
     )
 }
-"""The built-in ones, by name."""
+"""The built-in scans by name."""
 
 
 def find(value: object) -> Scan:

@@ -1,1 +1,1 @@
-"""What designs a sheet: the cover over it, and its circuit."""
+"""Design of a sheet: the cover over it, its circuit, and its layout."""

@@ -1,4 +1,4 @@
-"""Whether a sheet, its circuit and a board go together, and values that do."""
+"""Whether a sheet, its circuit and a board fit together, and values that do."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from contactfpga.design.circuit import Circuit, CircuitError, check, check_times
 from contactfpga.skin import Skin, SkinError
 
 _LONGER = (1, 2, 4, 8)
-"""By these a row is made longer until the shift registers and the labeller keep up."""
+"""Factors by which a row time is lengthened until the shift registers and the labeller keep up."""
 _SLOW_US = 100.0
 
 
 def findings(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str, str]:
-    """What is wrong with pins, clock, baud rate, levels and times, by what it concerns; "" where nothing is. Without a
-    circuit the last two are left out. Size and speed are known after place and route alone."""
+    """Problems with pins, clock, baud rate, levels and times, by subject; "" where there is none. Without a circuit the
+    last two are left out. Size and speed are only known after place and route."""
     asked: dict[str, Callable[[], None]] = {
         "pins": lambda: board.check_pins(skin),
         "clock": lambda: board.check_clock(skin),
@@ -37,8 +37,8 @@ def _said(ask: Callable[[], None]) -> str:
 
 
 def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str, Any]:
-    """Changes of the Skin with which it, its circuit and the board go together; none where they do. Raises SkinError
-    where shift registers, the board's own clock and baud rate, and longer times are not enough."""
+    """Changes of the Skin that make it fit its circuit and the board; none if they fit. Raises SkinError if shift
+    registers, the board's own clock and baud rate, and longer times do not suffice."""
     wrong = findings(board, skin, circuit)
     if wrong.get("levels"):
         raise SkinError(wrong["levels"])
@@ -61,14 +61,14 @@ def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str,
 
 
 def _wirings(skin: Skin) -> Iterator[dict[str, Any]]:
-    """Ways to take fewer pins: what drives columns cannot stand behind registers."""
+    """Ways to need fewer pins; driven columns cannot be on registers."""
     rows: dict[str, Any] = {"row_drive": "74hc595"}
     columns: dict[str, Any] = {"column_read": "74hc165"} | ({"precharge_us": 0.0} if skin.precharge_us else {})
     yield from (rows, columns, rows | columns)
 
 
 def _times(skin: Skin, changes: dict[str, Any], circuit: Circuit | None, factor: int) -> dict[str, Any]:
-    """Times that the circuit needs, where the Skin's are shorter, and a longer one for the row."""
+    """Times that the circuit needs beyond the Skin's, and a longer row time."""
     found: dict[str, Any] = {"settle_us": skin.settle_us * factor} if factor > 1 else {}
     if circuit is not None:
         slow = skin.replace(**changes, settle_us=_SLOW_US)  # so that no row is too short to ask

@@ -1,4 +1,4 @@
-"""Kits: a sheet, its cover, its board and the parts beside them, as files under ``examples/kits``."""
+"""Kits: a sheet, its cover, its board and further parts, as files under ``examples/kits``."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from contactfpga.skin import Skin
 
 
 class KitError(ContactFPGAError, ValueError):
-    """A kit that does not exist or whose files are wrong; the message names the file and what it may hold."""
+    """A missing kit or wrong files; the message names the file and its allowed content."""
 
 
 @dataclasses.dataclass(frozen=True)
 class KitPart:
-    """Something to buy that is not on the sheet's own board."""
+    """An article to buy that is not on the sheet's own board."""
 
     count: int
     what: str
     maker: str
     number: str
-    """The maker's; "" where any part of the description will do, and the description then says what counts."""
+    """The maker's number; "" if any part that fits the description will do."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Kit:
-    """A sheet that one can build, with everything that belongs to it."""
+    """A sheet to build, with everything it needs."""
 
     name: str
     title: str
@@ -47,12 +47,12 @@ class Kit:
 
     @property
     def bitstream(self) -> Path:
-        """The bitstream that a release carries; a source tree has none."""
+        """The bitstream in a release; a source tree has none."""
         return bitstream_path(self.board, self.folder)
 
     @functools.cached_property
     def skin(self) -> Skin:
-        """What the bitstream is built from."""
+        """The Skin of the bitstream."""
         return self.board.load(self.skin_path)
 
 

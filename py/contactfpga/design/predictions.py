@@ -1,7 +1,7 @@
-"""Predictions of a kit that a builder can prove wrong: numbers with intervals, each with the command that computes it.
+"""Predictions of a kit that a builder can prove wrong: numbers with intervals, each with its command.
 
-They stand in ``predictions.toml`` of the kit's folder. A prediction that changes is a new entry below the old one, so
-what was said before a sheet was built stays.
+They are in ``predictions.toml`` of the kit's folder. A changed prediction is a new entry below the old one, which
+stays.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FILE = "predictions.toml"
 
 @dataclasses.dataclass(frozen=True)
 class Prediction:
-    """A number and the interval in which it is expected with 95 %."""
+    """A number and its 95 % interval."""
 
     name: str
     what: str
@@ -28,16 +28,16 @@ class Prediction:
     low: float
     high: float
     model: str
-    """What is wrong if it is: gateware, bridge, circuit or cover."""
+    """The model that it tests: gateware, bridge, circuit or cover."""
     command: str
-    """Computes it."""
+    """The command that computes it."""
     date: datetime.date
     commit: str
     """Abbreviated hash of the commit whose code computed the value."""
 
 
 def load(kit: Kit) -> dict[str, Prediction]:
-    """The newest prediction of each name, in the order of the file; raises :class:`KitError`, OSError."""
+    """The newest prediction of each name, in file order; raises :class:`KitError`, OSError."""
     path = kit.folder / FILE
     found: dict[str, Prediction] = {}
     for entry in tomlfile.load(path, KitError).get("prediction", []):
@@ -49,7 +49,7 @@ def load(kit: Kit) -> dict[str, Prediction]:
 
 
 def added(text: str, now: Mapping[str, Prediction]) -> str:
-    """The text of the file with an entry for each prediction that is not in it with this value and this interval."""
+    """The text of the file with an entry for each new or changed prediction."""
     newest = {entry["name"]: entry for entry in tomllib.loads(text).get("prediction", [])}
     for one in now.values():
         before = newest.get(one.name, {})

@@ -1,1 +1,1 @@
-"""Values and files from outside, refused with a sentence where they cannot be read."""
+"""Values and files from outside, refused with a sentence if unreadable."""

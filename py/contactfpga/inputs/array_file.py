@@ -1,4 +1,4 @@
-""".npy and .npz files from anywhere. numpy would allocate whatever a header claims."""
+""".npz and .npy files from outside. numpy would allocate whatever a header claims."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import visible
 
 MAX_BYTES = 1 << 30
-"""Of an array: packed, a thousandth of it may be in the file."""
+"""Largest array; packed, a thousandth of it may be in the file."""
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Those of numpy. Of others a few bytes are unpacked to any number at once."""
+"""numpy's compressions; others could expand a few bytes without limit."""
 NUMBERS = "biuf"
-"""Kinds of arrays that are read: bools, whole numbers, floats."""
+"""Accepted kinds of arrays: bools, integers, floats."""
 _SHOWN = 8
 
 
 class ArrayFileError(ValueError):
-    """What a file holds that is no array of numbers."""
+    """The file has no array of numbers."""
 
 
 def read(path: str | Path, names: Sequence[str], most: int = MAX_BYTES) -> dict[str, np.ndarray]:
-    """The named arrays of a .npz file that it has; of a .npy file the one array, by the first name.
+    """The named arrays in a .npz file; of a .npy file the one array, by the first name.
 
-    ``most``: bytes of an array. Raises :class:`ArrayFileError` where the first one is not there or the file is damaged,
-    and OSError.
+    ``most``: bytes of an array. Raises :class:`ArrayFileError` if the first is missing or the file is damaged, and
+    OSError.
     """
     with open_regular(path) as file:
         try:
@@ -64,7 +64,7 @@ def _arrays(archive: zipfile.ZipFile, names: Sequence[str], path: str, most: int
 
 
 def _array(file: BinaryIO, size: int, what: str, most: int) -> np.ndarray:
-    """The array that begins here, of ``size`` bytes with its header."""
+    """The array that begins here, with ``size`` bytes including its header."""
     file.seek(0)
     version = npy.read_magic(file)
     header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0

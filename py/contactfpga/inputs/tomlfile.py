@@ -1,4 +1,4 @@
-"""TOML files from anywhere: what a parser or a reader would stumble over is refused with a sentence."""
+"""TOML files from outside, refused with a sentence if a parser or reader would fail."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ Table = TypeVar("Table")
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 16
-"""Tables and lists within each other, and parts of a dotted key: the parser's time goes with the square of these."""
+"""Most nested tables and lists, and parts of a dotted key, whose parsing time is quadratic."""
 
 _NO_KEY = re.compile(
     r'''"""(?:[^\\"]|\\.|"(?!""))*+(?:"""|\Z)|'{3}(?:[^']|'(?!''))*+(?:'{3}|\Z)'''
     r"""|"(?:[^\\"\n]|\\.)*+"?|'[^'\n]*+'?|\#[^\n]*+""",
     re.DOTALL,
 )
-"""Strings and comments, also those that do not end."""
+"""Strings and comments, also unterminated ones."""
 _LONG_KEY = re.compile(rf"\.(?:[^.=,{{}}\[\]\n]*+\.){{{MAX_DEPTH - 1}}}")
 
 
 def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
-    """What the file says. Raises ``refused`` for what is no TOML file, OSError for what cannot be read."""
+    """The content of a file. Raises ``refused`` for invalid TOML, OSError if unreadable."""
     return parse(read_small(path, MAX_BYTES, "a TOML file", refused), path, refused)
 
 
 def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
-    """What a file of these bytes says; ``path``: how messages call it. Raises ``refused``."""
+    """The content of a file of these bytes; ``path``: its name in messages. Raises ``refused``."""
     if len(data) > MAX_BYTES:
         raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
     try:
@@ -53,7 +53,7 @@ def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str,
 
 
 def load_table(path: str | Path, name: str, read: Callable[[Any], Table], refused: type[ValueError]) -> Table | None:
-    """What ``read`` makes of the file's table of this name; None where it has none. Raises ``refused``, OSError."""
+    """The file's table of this name, converted by ``read``; None without one. Raises ``refused``, OSError."""
     values = load(path, refused)
     if name not in values:
         return None
@@ -64,7 +64,7 @@ def load_table(path: str | Path, name: str, read: Callable[[Any], Table], refuse
 
 
 def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> dict[str, Any]:
-    """A table whose keys are fields of a dataclass; raises ``refused`` for anything else."""
+    """A table whose keys are fields of a dataclass; raises ``refused`` otherwise."""
     if not isinstance(values, dict):
         raise refused(f"{name} is {shown(values)}; it must be a part, [{name}]")
     known = [field.name for field in dataclasses.fields(kind)]
@@ -75,7 +75,8 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
 
 
 def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:
-    """Whole numbers have 64 bits, as TOML has it, and no table is deep. A loop, as deep tables end a recursion."""
+    """Check that integers have 64 bits, as in TOML, and that no table is too deep; iteratively, as recursion would
+    overflow."""
     todo: list[tuple[str, Any, int]] = [(name, value, 1) for name, value in values.items()]
     while todo:
         name, value, depth = todo.pop()

@@ -1,4 +1,4 @@
-"""What a value from outside is: a number, a whole number, a text that a terminal can show."""
+"""Checks of values from outside: numbers, integers, and text that a terminal can show."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from numbers import Real
 from typing import Any
 
 MAX_SHOWN = 80
-"""Characters of a value in a message."""
+"""Most characters of a value in a message."""
 MAX_MESSAGE = 4000
-"""Of a message: paths have 4,096 at most."""
+"""Most characters of a message; paths have up to 4,096."""
 
 
 def is_finite(value: object) -> bool:
-    """A number, no bool, that a float can hold. Python's whole numbers can be too large for one."""
+    """Whether a value is a finite number that fits a float, and no bool."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     try:
@@ -25,7 +25,7 @@ def is_finite(value: object) -> bool:
 
 
 def whole(value: object) -> int | None:
-    """The value as an int if it is a whole number by its type, numpy's included; None for anything else, 8.0 too."""
+    """The value as an int if its type is an integer, including numpy's; else None, also for 8.0."""
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         return None
     try:
@@ -35,7 +35,7 @@ def whole(value: object) -> int | None:
 
 
 def number_in(text: str) -> float:
-    """The number that a text is; NaN, which lies in no range, where it is none."""
+    """The number in a text; NaN, which is out of every range, if it is none."""
     try:
         return float(text)
     except ValueError:
@@ -52,7 +52,7 @@ def shown(value: Any) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """What to say of a name that is not known: the one that is spelled nearly so, or all that there are."""
+    """A hint on an unknown name: the most similar known one, or all."""
     from difflib import get_close_matches  # for whoever misspells alone
 
     names = list(known)
@@ -61,15 +61,14 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def shortened(text: str) -> str:
-    """A message, without its middle where that is longer than anybody reads: it begins with what failed and ends with
-    the next step."""
+    """A message, long ones without their middle: it begins with the failure and ends with the next step."""
     if len(text) <= MAX_MESSAGE:
         return text
     return f"{text[: MAX_MESSAGE // 2]}... ({len(text):,} characters) ...{text[-MAX_MESSAGE // 2 :]}"
 
 
 def visible(text: str) -> str:
-    """The text with what a terminal would obey written as an escape: control characters, marks that reorder text."""
+    """The text with control characters and bidirectional marks escaped."""
     return "".join(one if one.isprintable() else _escaped(one) for one in text)
 
 

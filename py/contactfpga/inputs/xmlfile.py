@@ -1,4 +1,4 @@
-"""XML from anywhere: what would fill the memory is refused with a sentence."""
+"""XML from outside, refused with a sentence if it would fill the memory."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ MAX_ELEMENTS = 100_000
 
 
 def parse(data: bytes, path: str | Path, what: str, refused: type[Exception]) -> ElementTree.Element:
-    """The outermost element of a file of these bytes; ``path`` and ``what``: how messages call the file and its kind.
-    Raises ``refused``."""
+    """The root element of a file of these bytes; ``path`` and ``what``: its name and kind in messages. Raises
+    ``refused``."""
     try:
         return ElementTree.fromstring(data, ElementTree.XMLParser(target=_Elements()))
     except _Doctype:
@@ -22,26 +22,26 @@ def parse(data: bytes, path: str | Path, what: str, refused: type[Exception]) ->
 
 
 class _Doctype(Exception):
-    """Entities of entities would fill the memory."""
+    """A document type, whose nested entities could fill the memory."""
 
 
 class _TooMany(Exception):
-    """So would elements."""
+    """Too many elements for the memory."""
 
 
 class _Elements(ElementTree.TreeBuilder):
-    """Elements as the parser hands them on, in whatever encoding the file is."""
+    """Builds elements from the parser, in any encoding."""
 
     def __init__(self) -> None:
         super().__init__()
         self._count = 0
 
     def doctype(self, *_: object) -> None:
-        """Called before what it declares is read."""
+        """Refuse a document type before its declarations are read."""
         raise _Doctype
 
     def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
-        """As the base class does."""
+        """Count an element, then build it."""
         self._count += 1
         if self._count > MAX_ELEMENTS:
             raise _TooMany

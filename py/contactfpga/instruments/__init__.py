@@ -1,1 +1,1 @@
-"""Measurements on a sheet by its frames: bounce, settling, lines that do not work, cells that look wrong."""
+"""Measurements on a sheet by its frames: bounce, settling, broken lines, suspicious cells."""

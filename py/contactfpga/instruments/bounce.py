@@ -1,4 +1,4 @@
-"""How long switches bounce, from frames that carry cells."""
+"""Bounce times of switches, from frames with cells."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from contactfpga.instruments.watch import Cell
 from contactfpga.zones.zone import Zones
 
 QUIET_US = 20_000
-"""A switch that has not changed for so long has stopped bouncing; what changes later is another touch."""
+"""Time without change after which a bounce has ended; later changes are another touch."""
 
 MARGIN = 2.0
-"""By how much a proposed time is longer than the longest bounce."""
+"""Factor from the longest bounce to a proposed time."""
 
 STEP_US = 100
-"""Proposed times are whole multiples of this."""
+"""Step of proposed times."""
 
 SLOW = 2.0
-"""Switches are slow that bounced this much longer than half of all switches."""
+"""Factor over the median bounce from which a switch is slow."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,16 +30,16 @@ class Transition:
 
     cell: Cell
     pressed: bool
-    """A press, else a release."""
+    """Whether it is a press, else a release."""
     us: int
-    """From the first change to the last one."""
+    """Time from the first change to the last."""
     changes: int
-    """1: it did not bounce as far as the frames show."""
+    """Number of changes; 1: no bounce visible in the frames."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Proposal:
-    """Fields of a Skin."""
+    """Proposed fields of a Skin."""
 
     debounce: str
     debounce_press_us: float
@@ -47,7 +47,7 @@ class Proposal:
 
     @property
     def lines(self) -> str:
-        """The same as lines of a Skin's TOML file."""
+        """The proposal as lines of a Skin's TOML file."""
         return "\n".join(
             f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value:g}"
             for name, value in dataclasses.asdict(self).items()
@@ -55,16 +55,16 @@ class Proposal:
 
 
 class Bounce:
-    """Takes frames that carry cells which no debounce has touched. A press or a release begins with a change after
+    """Measures bounce in frames with cells, without debounce. A press or a release begins with a change after
     :data:`QUIET_US` of rest and ends with the last change before as much rest."""
 
     def __init__(self, on_change: bool = False) -> None:
         """``on_change``: the board sends no frame while nothing changes."""
         self._on_change = on_change
         self.bounced: list[Transition] = []
-        """Presses and releases, in the order in which they ended."""
+        """Presses and releases, in the order of their ends."""
         self.blips: list[Transition] = []
-        """The same of switches that ended as they began: touches shorter than :data:`QUIET_US`, or noise."""
+        """Changes that end as they began: touches shorter than :data:`QUIET_US`, or noise."""
         self._open: np.ndarray
         self._before: np.ndarray
         self._now: np.ndarray
@@ -75,7 +75,7 @@ class Bounce:
         self._gaps_us: dict[int, int] = {}
 
     def update(self, zones: Zones) -> None:
-        """Take the next frame. Raises :class:`ContactFPGAError` for one without cells."""
+        """Add the next frame. Raises :class:`ContactFPGAError` for one without cells."""
         if zones.cells is None:
             raise ContactFPGAError('zones do not tell which switch bounces; report = "cells" does')
         last, self._last = self._last, zones
@@ -97,7 +97,7 @@ class Bounce:
             self._now = zones.cells.copy()
 
     def finish(self) -> None:
-        """After the last frame: what rests by now has ended."""
+        """End the transitions at rest after the last frame."""
         if self._last is not None:
             self._end(self._open & (self._last.time_us - self._to_us > QUIET_US))
 
@@ -118,9 +118,8 @@ class Bounce:
 
     @property
     def resolution_us(self) -> int:
-        """How far apart frames come, half of them at most; of a board that sends on change only, the least distance. 0
-        before the second frame. A shorter bounce may be missed, and each of the times may be up to twice this longer.
-        """
+        """Median interval of frames; for a board that sends only on change, the least. 0 before the second frame. A
+        shorter bounce may be missed, and each time may be up to twice this longer."""
         if not self._gaps_us:
             return 0
         if self._on_change:
@@ -133,19 +132,18 @@ class Bounce:
         return gap_us
 
     def times_us(self, pressed: bool) -> np.ndarray:
-        """(n,) of all presses, or releases, from the shortest to the longest."""
+        """(n,) durations of all presses, or releases, ascending."""
         return np.sort([one.us for one in self.bounced if one.pressed == pressed])
 
     def longest(self) -> dict[Cell, int]:
-        """Of each switch that was pressed or released, in us; the slowest first."""
+        """Longest duration in us of each switch that was pressed or released; the slowest first."""
         found: dict[Cell, int] = {}
         for one in self.bounced:
             found[one.cell] = max(one.us, found.get(one.cell, 0))
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def slow(self) -> dict[Cell, int]:
-        """Of :meth:`longest`, the switches that stand out: more than :data:`SLOW` times what half of all took, and two
-        frames."""
+        """The outliers of :meth:`longest`: more than :data:`SLOW` times the median, and two frames."""
         longest = self.longest()
         if not longest:
             return {}
@@ -153,8 +151,8 @@ class Bounce:
         return {cell: us for cell, us in longest.items() if us > most}
 
     def proposal(self) -> Proposal | None:
-        """What hides every bounce that was seen, and what frames may have missed of it, :data:`MARGIN` times over; None
-        where no switch was seen to bounce. A press still counts at once."""
+        """Times that hide every bounce seen, and what frames may have missed, times :data:`MARGIN`; None if no switch
+        bounced. A press still counts at once."""
         if not any(one.us for one in self.bounced):
             return None
         return Proposal("asym_eager_defer_pk", self._proposed_us(True), self._proposed_us(False))

@@ -1,4 +1,4 @@
-"""What a board's self-test says of its lines and diodes (docs/faults.md)."""
+"""The result of a board's self-test of lines and diodes (docs/faults.md)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contactfpga.wire.faults import SelfTestSlot
 
 
 class LineFinding(NamedTuple):
-    """One thing that a self-test found."""
+    """One finding of a self-test."""
 
     kind: Literal["fault", "untested"]
     sentence: str
@@ -30,32 +30,32 @@ class SelfTest:
     """
 
     slots: tuple[SelfTestSlot, ...] = dataclasses.field(repr=False)
-    """As the board sent them: one with no line driven, one per row, one per column."""
+    """Slots as sent: one with no line driven, one per row, one per column."""
     rows: int
     columns: int
     guard: bool = False
-    """There are guard lines."""
+    """Whether there are guard lines."""
     mask: frozenset[tuple[int, int]] | None = None
-    """(row, column) of switches that are masked; None: not known."""
+    """(row, column) of masked switches; None: unknown."""
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Lines that are joined, diodes that are bridged, lines that do not rise; () where none was found."""
+        """Joined lines, bridged diodes, lines that do not rise; () without any."""
         return tuple(finding.sentence for finding in self.findings if finding.kind == "fault")
 
     @property
     def untested(self) -> tuple[str, ...]:
-        """Lines that say nothing, as they rise by themselves."""
+        """Lines that cannot be tested, as they rise by themselves."""
         return tuple(finding.sentence for finding in self.findings if finding.kind == "untested")
 
     @property
     def pressed(self) -> frozenset[tuple[int, int]]:
-        """(row, column) of switches that conducted the way of their diode; only their diodes were tested."""
+        """(row, column) of switches that conducted in their diode's direction; only their diodes were tested."""
         return frozenset((row, column) for column in range(self.columns) for row in self._of_column(column).rows)
 
     @property
     def findings(self) -> tuple[LineFinding, ...]:
-        """All that was found, faults first."""
+        """All findings, faults first."""
         return tuple(sorted({*self._still(), *self._joined(), *self._crossed(), *self._at_guards(), *self._rest()}))
 
     # ---- what rose where
@@ -67,7 +67,7 @@ class SelfTest:
         return self.slots[1 + self.rows + column]
 
     def _rows_after(self, row: int) -> set[int]:
-        """Other rows that rise with a row, and not by themselves."""
+        """Other rows that rise with a row, but not by themselves."""
         return set(self._of_row(row).rows) - {row, *self.slots[0].rows}
 
     def _columns_after_row(self, row: int) -> set[int]:
@@ -77,7 +77,7 @@ class SelfTest:
         return set(self._of_column(column).columns) - {column, *self.slots[0].columns}
 
     def _tested(self, column: bool) -> set[int]:
-        """Lines that are driven: those that are not masked whole."""
+        """Lines that are driven: those not fully masked."""
         masked = self.mask or frozenset()
         lines, others = (self.columns, self.rows) if column else (self.rows, self.columns)
         return {
@@ -89,7 +89,7 @@ class SelfTest:
     # ---- findings
 
     def _still(self) -> Iterator[LineFinding]:
-        """Lines that rise with none driven, and those that do not when they are."""
+        """Lines that rise with none driven, and those that do not when driven."""
         first = self.slots[0]
         for column in first.columns:
             cause = "its pull is too strong, or it is held at the released level"
@@ -117,14 +117,14 @@ class SelfTest:
                 yield LineFinding("fault", f"{name} {_listed(group)} joined")
 
     def _crossed(self) -> Iterator[LineFinding]:
-        """Columns that rise with a row: against the diode, whoever is pressed."""
+        """Columns that rise with a row: against the diode, whatever is pressed."""
         for row in range(self.rows):
             for column in self._columns_after_row(row):
                 either = f"row {row} and column {column} joined"
                 yield LineFinding("fault", f"{either}, or the diode at ({row}, {column}) is bridged")
 
     def _at_guards(self) -> Iterator[LineFinding]:
-        """Through a guard line a line reaches all others, and is reached by none of them."""
+        """A line that reaches all others through a guard line, and is reached by none."""
         for row in self._reach_all(self._rows_after, self._tested(column=False)):
             yield LineFinding("fault", f"row {row} and the guard column joined, or the diode between them is bridged")
         for column in self._reached_by_all():
@@ -147,7 +147,7 @@ class SelfTest:
         ]
 
     def _rest(self) -> Iterator[LineFinding]:
-        """Lines that follow another one, and no other finding says why."""
+        """Lines that follow another one without another finding's explanation."""
         through_guard = set(self._reach_all(self._rows_after, self._tested(column=False)))
         for row in range(self.rows):
             fed = {below for column in self._columns_after_row(row) for below in self._of_column(column).rows}
@@ -163,7 +163,7 @@ class SelfTest:
 
 
 def _groups(after: Callable[[int], set[int]], lines: int) -> list[list[int]]:
-    """Lines that rise with each other, as groups of two or more."""
+    """Groups of two or more lines that rise with each other."""
     groups: list[set[int]] = []
     for line in range(lines):
         both = {line} | {other for other in after(line) if line in after(other)}
@@ -179,10 +179,10 @@ def _listed(lines: list[int]) -> str:
 
 
 def merged(tests: Iterable[SelfTest]) -> tuple[LineFinding, ...]:
-    """What several self-tests found, each finding once, faults first."""
+    """The findings of several self-tests, each once, faults first."""
     return tuple(sorted({finding for test in tests for finding in test.findings}))
 
 
 def untried(test: SelfTest, pressed: frozenset[tuple[int, int]]) -> int:
-    """Switches of a sheet that are neither masked nor among those that were ``pressed``."""
+    """Unmasked switches of a sheet that are not among the ``pressed``."""
     return test.rows * test.columns - len(pressed | (test.mask or frozenset()))

@@ -1,7 +1,7 @@
-"""How many clocks after its row is selected each cell reads pressed, of frames that were sampled at different ones.
+"""Clocks from a row's selection until each cell reads pressed, from frames sampled at different clocks.
 
-A frame that is sampled early lies between two that are not. A cell tells something only where it was pressed in both,
-and in those before: then it is no press that has just begun, and none that bounces.
+A frame sampled early is between two usual ones. A cell counts only if it was pressed in both, and in those before: then
+its press is neither new nor bouncing.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ import dataclasses
 import numpy as np
 
 AGREE = 3
-"""Frames of one kind after which a clock is known to be enough for a cell, or not."""
+"""Consistent frames after which a clock is known to suffice for a cell, or not."""
 
 STEADY = 4
-"""Frames at the full settle time, up to the one after, in which a cell must have been pressed."""
+"""Consecutive frames at the full settle time in which a cell must have been pressed."""
 
 SLOW = 2.0
-"""A cell that takes more than this many times the median is slow; so is one whose time is near the settle time."""
+"""Factor over the median time from which a cell is slow, besides those near the settle time."""
 NEAR = 0.75
-"""Of the settle time."""
+"""Share of the settle time that counts as near it."""
 
 LINE_CELLS = 3
-"""Cells of a line from which on it can be slow itself, if most of them are."""
+"""Least number of cells of a line that can be slow itself, if most of them are."""
 
 
 class _Search:
-    """For each place the least clocks that are enough, by halving; all places see the same frames."""
+    """For each place the least sufficient clocks, by bisection; all places see the same frames."""
 
     def __init__(self, shape: tuple[int, ...], first: int, settle: int):
         self.too_few = np.full(shape, first - 1)
@@ -35,16 +35,16 @@ class _Search:
 
     @property
     def open(self) -> np.ndarray:
-        """Places whose time is not known yet."""
+        """Places of unknown time."""
         return np.asarray(self.enough - self.too_few > 1)
 
     @property
     def middle(self) -> np.ndarray:
-        """What is to be tried next at each place."""
+        """The next clock to try at each place."""
         return np.asarray((self.enough + self.too_few) // 2)
 
     def vote(self, clocks: int, counts: np.ndarray, enough: np.ndarray) -> None:
-        """A frame sampled at ``clocks``, which was ``enough`` or not at the places where it ``counts``."""
+        """Add a frame sampled at ``clocks``, with whether that was ``enough`` at the places where it ``counts``."""
         asked = counts & self.open & (self.middle == clocks)
         self._votes += np.array([asked & ~enough, asked & enough])
         no, yes = self._votes >= AGREE
@@ -54,7 +54,7 @@ class _Search:
 
 @dataclasses.dataclass(frozen=True)
 class Slow:
-    """What takes longer than the rest, or nearly the whole settle time."""
+    """Outliers, and times near the settle time."""
 
     cells: list[tuple[int, int]]
     rows: list[int]
@@ -62,10 +62,11 @@ class Slow:
 
 
 class Settling:
-    """Made of frames in turn: one at the full settle time, one at :meth:`next_clocks`, one at the full settle time, ...
+    """Fed with frames in turn: one at the full settle time, one at :meth:`next_clocks`, one at the full settle time,
+    ...
 
-    first, settle: least and most clocks that a sample can be moved to; skips: the scan drives touched rows only; guard:
-    a guard row is driven before row 0.
+    first, settle: least and most sampling clocks; skips: the scan drives only touched rows; guard: a guard row is
+    driven before row 0.
     """
 
     def __init__(self, shape: tuple[int, int], first: int, settle: int, *, skips: bool = False, guard: bool = False):
@@ -79,12 +80,12 @@ class Settling:
     # ---- frames
 
     def start(self, full: np.ndarray) -> None:
-        """A frame at the full settle time, (rows, columns) bool."""
+        """Begin with a frame at the full settle time, (rows, columns) bool."""
         self._steady = np.where(full, self._steady + 1, 0)
         self._full = full
 
     def next_clocks(self) -> int | None:
-        """Where to sample next: where most places that can tell want it; None: nothing that is pressed is unknown."""
+        """The next sampling clock, which most informative places need; None: everything pressed is known."""
         columns = (self._after_pressed(self._full) & ~self._full).any(axis=0)
         wanted = [
             search.middle[search.open & now] for search, now in ((self._press, self._full), (self._back, columns))
@@ -93,7 +94,7 @@ class Settling:
         return int(counts.argmax()) if len(counts) else None
 
     def take(self, clocks: int, early: np.ndarray, full: np.ndarray) -> None:
-        """A frame that was sampled at ``clocks``, and the next one at the full settle time."""
+        """Add a frame sampled at ``clocks``, and the next one at the full settle time."""
         before = self._full
         self.start(full)
         held = self._steady >= STEADY
@@ -102,7 +103,7 @@ class Settling:
         self._back.vote(clocks, ghosts.any(axis=0), ~(early & ghosts).any(axis=0))
 
     def _after_pressed(self, cells: np.ndarray) -> np.ndarray:
-        """(rows, columns) bool: places whose column the row that is driven before pulls."""
+        """(rows, columns) bool: places whose column is pulled by the row driven before."""
         if not self._skips:
             before = np.roll(cells, 1, axis=0)
             before[0] |= self._guard
@@ -116,24 +117,23 @@ class Settling:
 
     @property
     def clocks(self) -> np.ndarray:
-        """(rows, columns) of the least clocks at which a cell reads pressed; :attr:`first` also where fewer would do, 0
-        where it is not known."""
+        """(rows, columns) least clocks at which a cell reads pressed; at least :attr:`first`, 0 if unknown."""
         return np.where(self._press.open, 0, self._press.enough)
 
     @property
     def back_clocks(self) -> np.ndarray:
-        """(columns,) of the least clocks after the next row is selected at which a column reads released again;
-        :attr:`first` also where it does before, 0 where it is not known."""
+        """(columns,) least clocks after the next row's selection at which a column reads released again; at least
+        :attr:`first`, 0 if unknown."""
         return np.where(self._back.open, 0, self._back.enough)
 
     @property
     def median(self) -> float:
-        """Of the clocks of all cells that are known; NaN where none is."""
+        """Median clocks of all known cells; NaN without any."""
         known = self.clocks[self.clocks > 0]
         return float(np.median(known)) if len(known) else float("nan")
 
     def slow(self) -> Slow:
-        """Of what is known."""
+        """Outliers so far."""
         known = self.clocks > 0
         slow = known & ((self.clocks > SLOW * self.median) | (self.clocks > NEAR * self.settle))
         rows, columns = (

@@ -1,4 +1,4 @@
-"""Watches frames for switches that are stuck, loose or dead, by when each cell or zone changed."""
+"""Watches frames for stuck, loose or dead switches, by the changes of each cell or zone."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Cell = tuple[int, int]
 """(row, column)"""
 
 FEW_CELLS = 3
-"""As many side by side that do not change are stuck switches; more of them are rather something that lies there."""
+"""Largest group of unchanging cells that counts as stuck switches; a larger one is rather an object."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Suspicion:
-    """One thing that is wrong with the sheet, or looks so.
+    """A real or apparent fault of the sheet.
 
     >>> contactfpga.Suspicion("stuck", "cell (3, 4) is stuck", cells=((3, 4),), time_us=0).cells
     ((3, 4),)
@@ -44,20 +44,19 @@ class Suspicion:
 
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """From when on something is suspected, in us of device time."""
+    """Thresholds of suspicion, in us of device time."""
 
     stuck_us: int
     others: int
     flutter_hz: float
 
     def needed(self, elsewhere: np.ndarray) -> int:
-        """How many others must have come and gone, of the cells marked in ``elsewhere``: half of them on a sheet that
-        is small."""
+        """Number of the cells marked in ``elsewhere`` that must have come and gone: at most half of them."""
         return min(self.others, max(1, int(elsewhere.sum()) // 2))
 
 
 def away_from(cells: Iterable[Cell], reach: int, sheet: Sheet) -> np.ndarray:
-    """(rows, columns) bool: the cells farther than ``reach`` from all of these, so that no contact joins them."""
+    """(rows, columns) bool: cells farther than ``reach`` from all of these, so that no contact joins them."""
     away = np.ones((sheet.rows, sheet.columns), bool)
     for row, column in cells:
         columns = np.arange(column - reach, column + reach + 1)
@@ -82,7 +81,7 @@ def named(cells: Iterable[Cell], most: int = 12) -> str:
 
 
 def reach_of(area: int) -> int:
-    """How far from its barycenter a round zone of this area reaches, and one cell more."""
+    """Reach of a round zone of this area from its barycenter, plus one cell."""
     return math.ceil(math.sqrt(area / math.pi)) + 1
 
 
@@ -92,10 +91,10 @@ def places(cells: np.ndarray) -> tuple[Cell, ...]:
 
 
 APART_US = 10_000
-"""Changes of a cell closer than this count once: a switch that bounces at a press does not flutter."""
+"""Interval below which changes of a cell count once: a bouncing switch does not flutter."""
 
 QUIET = 10
-"""For this part of the time nothing has changed beside a switch that is told as stuck."""
+"""Share of the time for which nothing beside a stuck switch may have changed."""
 
 SECOND_US = 1_000_000
 
@@ -119,16 +118,16 @@ class CellHistory:
 
     @property
     def stuck(self) -> set[Cell]:
-        """Told as stuck, and not changed since."""
+        """Cells reported as stuck, without change since."""
         return set(places(self._stuck))
 
     @property
     def flutters(self) -> set[Cell]:
-        """Told to flutter."""
+        """Cells reported to flutter."""
         return set(places(self._flutters))
 
     def take(self, zones: Zones) -> None:
-        """One more frame."""
+        """Add a frame."""
         assert zones.cells is not None
         cells, time_us = zones.cells, zones.time_us
         changed = cells != self._cells
@@ -145,7 +144,7 @@ class CellHistory:
         self._cells = cells.copy()
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
-        """Those that are new."""
+        """New suspicions."""
         yield from self._unchanged(time_us)
         if time_us - self._count_from_us >= SECOND_US:
             yield from self._fluttering(time_us)
@@ -169,7 +168,7 @@ class CellHistory:
                 yield self._told(group, few, since_us, others, time_us)
 
     def _alone(self, group: np.ndarray, time_us: int) -> bool:
-        """Whether nothing is pressed beside it, and was not lately: else it may be what is left of a contact."""
+        """Whether nothing beside the group is, or recently was, pressed; else it may be the rest of a contact."""
         beside = ~away_from(places(group), 1, self._sheet) & ~group
         quiet_us = time_us - self._limits.stuck_us // QUIET
         return not (beside & (self._cells | (self._changed_us > quiet_us))).any()
@@ -185,7 +184,7 @@ class CellHistory:
         return Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _middle(self, group: np.ndarray) -> str:
-        """Row and column of the barycenter; of a group around a sheet whose ends meet the row alone."""
+        """Row and column of the barycenter; for a group around a closed sheet the row alone."""
         if self._sheet.closed:
             records = around.label(group, 8)[1]
             area, x, y = around.flat(records, self._sheet.columns)[0].tolist()
@@ -210,19 +209,19 @@ class CellHistory:
 
 
 Record = tuple[int, int, int]
-"""Area and sums of a zone, or area and barycenter, as the board sent them."""
+"""Area and sums of a zone, or area and barycenter, as sent."""
 
 Key = tuple[int, int, int, str]
-"""The same with :attr:`Zone.winding`, by which a zone has no x."""
+"""The record with :attr:`Zone.winding`, with which a zone has no x."""
 
 _AROUND = {"ring": "a ring around the sheet", "wound": "wound around the sheet"}
 
 
 class ZoneHistory:
-    """Zones over time. One is the same for as long as nothing of its record changes."""
+    """Zones over time. A zone with an unchanged record is the same zone."""
 
     def __init__(self, first: Zones, limits: Limits, present: np.ndarray):
-        """``present``: as for :class:`CellHistory`."""
+        """``present``: see :class:`CellHistory`."""
         self._limits = limits
         self._present = present
         self._sheet = first.sheet
@@ -233,14 +232,14 @@ class ZoneHistory:
 
     @property
     def stuck(self) -> set[Cell]:
-        """Told as stuck where that is known to the cell, and not changed since."""
+        """Cells reported as stuck, where known exactly, without change since."""
         return {cell for cells in self._told.values() for cell in cells}
 
     flutters: frozenset[Cell] = frozenset()
-    """Zones do not tell which cells change."""
+    """Always empty: zones do not show which cells change."""
 
     def take(self, zones: Zones) -> None:
-        """One more frame."""
+        """Add a frame."""
         keys, time_us = _keys(zones), zones.time_us
         if keys == self._since_us.keys():
             return
@@ -253,7 +252,7 @@ class ZoneHistory:
         self._told = {key: cells for key, cells in self._told.items() if key in keys or self._may_have_joined(key)}
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
-        """Those that are new."""
+        """New suspicions."""
         for key, since_us in self._since_us.items():
             if key in self._told or since_us > time_us - self._limits.stuck_us:
                 continue
@@ -270,7 +269,7 @@ class ZoneHistory:
             yield Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _may_have_joined(self, gone: Key) -> bool:
-        """Whether a zone lies so near that this one may be part of it now."""
+        """Whether a zone is so near that this one may be part of it now."""
         middles = self._middles(gone)
         for key in self._since_us:
             away = away_from(middles, reach_of(gone[0]) + reach_of(key[0]), self._sheet)
@@ -288,12 +287,12 @@ class ZoneHistory:
         return f'a zone of {key[0]} cells at {where} (report = "cells" would tell which) pressed'
 
     def _middles(self, key: Key) -> list[Cell]:
-        """Where the barycenter may lie: all the way round where it has no x."""
+        """Possible cells of the barycenter: all columns if it has no x."""
         row, column = self._cell(key)
         return [(row, each) for each in range(self._sheet.columns)] if key[3] else [(row, column)]
 
     def _cell(self, key: Key) -> Cell:
-        """The one in which the barycenter lies; without an x only the row counts."""
+        """The cell of the barycenter; without an x only the row counts."""
         x, y = self._place(key)
         column = round(x) % self._sheet.columns if self._sheet.closed else min(round(x), self._sheet.columns - 1)
         return min(round(y), self._sheet.rows - 1), column
@@ -306,7 +305,7 @@ class ZoneHistory:
 
 
 def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
-    """The (row, column) of a zone's cells where its record leaves one choice: a single cell, or two side by side."""
+    """The (row, column) of a zone's cells if its record determines them: a single cell, or two adjacent ones."""
     area, x, y = record
     if area not in (1, 2):
         return ()
@@ -323,13 +322,13 @@ def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
 
 
 def _keys(zones: Zones) -> set[Key]:
-    """Of the zones that lie somewhere: a frame flagged ``mismatch`` may hold one without cells."""
+    """Keys of zones with a place: a frame flagged ``mismatch`` may have one without cells."""
     windings = zones.windings or [""] * len(zones)
     return {(area, x, y, winding) for (area, x, y), winding in zip(zones.records.tolist(), windings) if area}
 
 
 LOOKS = 100
-"""Within the time after which a switch is stuck; between them frames are only taken down."""
+"""Evaluations within the time after which a switch is stuck; in between frames are only recorded."""
 
 
 class Watch:
@@ -366,8 +365,8 @@ class Watch:
         self._last_us = self._look_us = -1
 
     def update(self, zones: Zones) -> tuple[Suspicion, ...]:
-        """Take the next frame; returns what is newly suspected, each thing once. A board that restarts, or has another
-        sheet, begins a new history."""
+        """Add the next frame; returns new suspicions, each once. A board that restarts, or has another sheet, begins a
+        new history."""
         time_us = zones.time_us
         if zones.sheet != self._sheet:
             self._meet(zones.sheet)
@@ -400,24 +399,24 @@ class Watch:
 
     @property
     def seen(self) -> np.ndarray | None:
-        """(rows, columns) bool: cells that read pressed at least once; None where the board sends no cells, or before
-        the first frame."""
+        """(rows, columns) bool: cells that read pressed at least once; None if the board sends no cells, or before the
+        first frame."""
         return self._seen.copy() if self._sheet is not None and self._sheet.report == "cells" else None
 
     @property
     def never(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that never read pressed: those that nobody touched, and dead ones. () where the
-        board sends no cells."""
+        """(row, column) of switches that never read pressed: untouched and dead ones. () if the board sends no
+        cells."""
         return () if self.seen is None else places(self._present & ~self._seen)
 
     @property
     def stuck(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that were reported as ``stuck`` and have not changed since."""
+        """(row, column) of switches reported as ``stuck``, without change since."""
         return () if self._sheet is None else tuple(sorted(self._history.stuck))
 
     @property
     def fluttering(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that were reported to ``flutter``."""
+        """(row, column) of switches reported to ``flutter``."""
         return () if self._sheet is None else tuple(sorted(self._history.flutters))
 
     @property
@@ -427,5 +426,5 @@ class Watch:
 
     @property
     def mask_line(self) -> str:
-        """The same as the line of a Skin's TOML file; "" where no switch is stuck."""
+        """The mask as a line of a Skin's TOML file; "" if no switch is stuck."""
         return f"mask = {json.dumps(self.mask)}" if self.stuck else ""

@@ -1,1 +1,1 @@
-"""What serves a robot: links on a body, forces, the network, ROS 2."""
+"""Support for robots: links on a body, forces, the network, ROS 2."""

@@ -1,4 +1,4 @@
-"""The one description of a sheet, its limits, and everything that follows from it."""
+"""The description of a sheet, its limits, and derived quantities."""
 
 from contactfpga.errors import SkinError
 from contactfpga.skin.skin import Skin

@@ -1,4 +1,4 @@
-"""What makes a :class:`~contactfpga.Skin` impossible; each error names the field, its value and the limit."""
+"""Checks of a :class:`~contactfpga.Skin`; each error names the field, its value and the limit."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ _WHOLE = (
 
 
 def check_types(skin: Skin) -> dict[str, Any]:
-    """Every field is of its type; returns choices, whole numbers, lengths and times as the types that they are to be.
+    """Check the type of every field; returns choices, integers, lengths and times in their final types.
 
-    Equal Skins have one fingerprint, so 8.0 is no 8. A whole number of numpy's is one, and is kept as Python's.
+    Equal Skins have one fingerprint, so 8.0 is no 8. An integer of numpy is accepted, and kept as Python's.
     """
     _check_name(skin.name)
     return (
@@ -104,7 +104,7 @@ def _check_name(name: object) -> None:
 
 
 def check_sheet(skin: Skin) -> dict[str, Any]:
-    """Sheet, wiring and scan go together; returns the mask in order, and the orders of the lines as tuples."""
+    """Check sheet, wiring and scan; returns the sorted mask, and the orders of the lines as tuples."""
     for name in ("rows", "columns"):
         _within(name, getattr(skin, name), 1, limits.MAX_LINES)
     for name in ("pitch_x_mm", "pitch_y_mm"):
@@ -197,7 +197,7 @@ def _check_precharge(skin: Skin) -> None:
 
 
 def _check_ghosts(skin: Skin, mask: Mask) -> None:
-    """Without diodes only what can still be told apart from ghosts is taken."""
+    """Check that without diodes ghosts remain distinguishable."""
     if not skin.ghosts:
         return
     wanted: dict[str, Any] = {"scan": "raster", "row_drive": "direct"}
@@ -218,7 +218,7 @@ def _check_ghosts(skin: Skin, mask: Mask) -> None:
 
 
 def check_link(skin: Skin) -> None:
-    """Clock, baud rate and report go together."""
+    """Check clock, baud rate and report."""
     _within("barycenter_bits", skin.barycenter_bits, 0, limits.MAX_BARYCENTER_BITS)
     if skin.report != "barycenter" and skin.barycenter_bits != limits.BARYCENTER_BITS:
         raise SkinError(f"barycenter_bits is {shown(skin.barycenter_bits)}; leave it out, or set report = 'barycenter'")
@@ -238,7 +238,7 @@ def check_link(skin: Skin) -> None:
 
 
 def check_timing(skin: Skin) -> None:
-    """What follows a row is done before the next, with the zone capacity that the Skin has by now."""
+    """Check that a row's processing ends before the next, with the Skin's zone capacity."""
     assert skin.zone_capacity is not None
     _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
     for name in ("settle_us", "release_us", "precharge_us", "project_us"):
@@ -285,11 +285,11 @@ def _within(name: str, value: float, low: float, high: float, unit: str = "") ->
 
 _MIN_RADIUS_MM, _MAX_RADIUS_MM = 0.1, 100_000.0
 _PITCH_TOLERANCE = 1e-3
-"""By which share a pitch may miss the one that the radius gives."""
+"""Allowed relative error of a pitch against the radius."""
 
 
 def check_surface(skin: Skin) -> dict[str, float]:
-    """Surface, radius and pitch go together; returns the pitch of a closed sheet."""
+    """Check surface, radius and pitch; returns the pitch of a closed sheet."""
     if skin.surface == "plane":
         if skin.closed:
             raise SkinError("surface is 'plane'; closed = true needs surface = 'cylinder' and radius_mm")
@@ -307,7 +307,7 @@ def check_surface(skin: Skin) -> dict[str, float]:
 
 
 def _check_gap(skin: Skin, around_mm: float) -> dict[str, float]:
-    """The ends do not meet."""
+    """Check that the ends of the sheet do not meet."""
     if skin.columns * skin.pitch_x_mm >= around_mm:
         most = math.ceil(around_mm / skin.pitch_x_mm) - 1
         advice = f"use at most {most} columns" if most else "use a larger radius_mm or a smaller pitch_x_mm"
@@ -344,7 +344,7 @@ def _check_closed(skin: Skin, around_mm: float) -> dict[str, float]:
 
 
 def check_units(skin: Skin) -> dict[str, Any]:
-    """Units, converter and sums go together; returns the sums as tuples."""
+    """Check units, converter and sums; returns the sums as tuples."""
     converter = converters.find(skin.converter)
     if not 0 <= skin.units <= converter.channels:
         raise SkinError(f"units is {skin.units}; {converter.title} has {converter.channels} channels")

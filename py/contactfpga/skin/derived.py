@@ -1,4 +1,4 @@
-"""Everything that follows from a Skin or its sheet: widths in bits, sizes in bytes, clocks and depths."""
+"""Quantities derived from a Skin or its sheet: widths in bits, sizes in bytes, clocks and depths."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ CHECK_BYTES = 3
 TIME_BITS = 24
 SEQUENCE_BITS = 8
 HEARD_BITS = 3
-"""Of a request's number, in each frame."""
+"""Bits of a request's number in each frame."""
 
 MIN_OVERWRITTEN_BITS = 4
 
 HELLO_PERIOD_US = 500_000
-"""The board says hello this often, so that one can wait for a frame and still come every second."""
+"""Interval of hellos, short enough to wait for a frame and still have one every second."""
 
 HELLO_BIT = 19
-"""Of the clock in us: a scan that waits makes a hello due when it toggles, every 0.52 s."""
+"""Bit of the us clock whose toggles, every 0.52 s, make a hello of a scan that waits due."""
 KEEP_ALIVE_BIT = 10
-"""Likewise: a keep-alive is counted in its toggles, every 1.024 ms."""
+"""Bit of the us clock whose toggles, every 1.024 ms, count a keep-alive."""
 
 EPOCH_BITS = 22
-"""The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
+"""Bits of an epoch: the board counts periods of 2^22 us beside a frame's time, less than half of its range."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
-"""The stuck-line counter stops here."""
+"""Largest value of the stuck-line counter."""
 
 SELF_TEST = 1
-"""Number of a command: test all lines (docs/protocol.md)."""
+"""Number of the command that tests all lines (docs/protocol.md)."""
 SAMPLE_AT = 2
-"""Of another one: sample the columns at another clock of the time for which a row is driven."""
+"""Number of the command that samples the columns at another clock of a row."""
 
 
 class Widths:
@@ -82,11 +82,11 @@ class Widths:
 
     @functools.cached_property
     def record_bits(self) -> tuple[int, ...]:
-        """Of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter; on a sheet whose ends meet
-        after them the cells past the seam.
+        """Bits of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter; for a sheet whose ends
+        meet, then the cells past the seam.
 
-        An area that a barycenter goes with is never 0. So where the sheet's cells are a power of two all of them are
-        sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
+        With a barycenter the area is never 0. So if the sheet's cells are a power of two, all of them are sent as 0,
+        which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
         """
         if not self.report.divided:
             past = (self.area_bits,) if self.sheet.closed else ()
@@ -109,12 +109,12 @@ class Widths:
 
     @functools.cached_property
     def trailer_bytes(self) -> int:
-        """Bytes that close a frame, its kind byte among them."""
+        """Bytes of a frame's end, including its kind byte."""
         return math.ceil((self._counted_bits + MIN_OVERWRITTEN_BITS) / 8) + 1
 
     @functools.cached_property
     def overwritten_bits(self) -> int:
-        """What the other fields leave of the trailer: four bits or more."""
+        """Bits that the other fields leave in the trailer, at least four."""
         return 8 * (self.trailer_bytes - 1) - self._counted_bits
 
     @property
@@ -132,13 +132,13 @@ class Widths:
 
     @functools.cached_property
     def max_stored_bytes(self) -> int:
-        """The longest frame as the board keeps it: items and trailer, stuffed."""
+        """The longest stored frame: items and trailer, stuffed."""
         plain = self.max_items * self.item_bytes + self.trailer_bytes
         return plain + math.ceil(plain / 254)
 
     @functools.cached_property
     def max_frame_bytes(self) -> int:
-        """The longest frame on the wire: with its check bytes and its delimiter."""
+        """The longest frame on the wire, with check bytes and delimiter."""
         return self.max_stored_bytes + CHECK_BYTES + 1
 
 
@@ -157,11 +157,11 @@ LONGEST_PACKET = Widths(
         ghosts=False,
     )
 ).max_frame_bytes
-"""No frame of any Skin takes more bytes on the wire."""
+"""Upper bound on the wire bytes of a frame of any Skin."""
 
 
 SAMPLED_BIT_CLOCKS = 4
-"""From this many clocks per bit on, a receiver can sample near the middle of each bit."""
+"""Clocks per bit from which a receiver can sample near the middle of each bit."""
 
 
 def bit_clocks(clock_hz: int, baud: int) -> int:
@@ -170,12 +170,12 @@ def bit_clocks(clock_hz: int, baud: int) -> int:
 
 
 def pulsed(clock_hz: int, baud: int) -> bool:
-    """Whether the board is sent pulses instead of bytes (docs/protocol.md): it has too few clocks per bit to sample."""
+    """Whether the board needs pulses instead of bytes (docs/protocol.md): it has too few clocks per bit to sample."""
     return bit_clocks(clock_hz, baud) < SAMPLED_BIT_CLOCKS
 
 
 class Derived(Widths):
-    """Clocks, widths and depths of a :class:`~contactfpga.Skin`, which has them as its ``derived``."""
+    """Clocks, widths and depths of a :class:`~contactfpga.Skin`, its ``derived``."""
 
     def __init__(self, skin: Skin):
         super().__init__(skin.sheet)
@@ -195,14 +195,14 @@ class Derived(Widths):
 
     @property
     def commands(self) -> tuple[int, ...]:
-        """Numbers of the commands that the board takes."""
+        """Numbers of the board's commands."""
         self_test = (SELF_TEST,) if self.skin.self_test else ()
         moves = self.scan.moves_sample and not self.report.zones
         return self_test + ((SAMPLE_AT,) if moves else ()) + self.units.commands
 
     @functools.cached_property
     def units(self) -> Units:
-        """What follows from its pressure units."""
+        """Quantities of its pressure units."""
         return Units(self.skin)
 
     # ---- clocks in which lines are driven and read, and those of a bit on the link
@@ -217,20 +217,21 @@ class Derived(Widths):
 
     @property
     def settle_clocks(self) -> int:
-        """How long a row is driven: as asked, until the columns of the slot before and the next row are shifted."""
+        """Time for which a row is driven: as requested, but at least until the previous slot's columns and the next row
+        are shifted."""
         row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
         return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
 
     @property
     def first_sample_clocks(self) -> int:
-        """The least value of the command "sample at": with shift registers the columns of the slot before are in by
+        """The least value of the command "sample at": with shift registers the previous slot's columns are complete by
         then."""
         return max(2, self.column_load_clocks + self.column_shift_clocks)
 
     @property
     def release_clocks(self) -> int:
-        """How long no row is driven: as asked, until the columns are shifted, the next row is latched, or chosen and
-        then shifted."""
+        """Time without a driven row: as requested, but at least until the columns are shifted, and the next row is
+        latched, or chosen and then shifted."""
         column = self.column_load_clocks + self.column_shift_clocks
         row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
         precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
@@ -238,12 +239,12 @@ class Derived(Widths):
 
     @property
     def precharge_clocks(self) -> int:
-        """How long columns are driven at least before a row is; 0: they never are."""
+        """Least time for which columns are driven before a row; 0: never."""
         return self.clocks(self.skin.precharge_us)
 
     @property
     def project_clocks(self) -> int:
-        """How long all columns are driven and rows let go before these are sampled."""
+        """Time for which all columns are driven and rows released before these are sampled."""
         return self.clocks(self.skin.project_us)
 
     @property
@@ -252,12 +253,12 @@ class Derived(Widths):
 
     @property
     def shift_clocks(self) -> int:
-        """A bit on a chain of shift registers; two at least, as its clock has to rise and fall."""
+        """A bit on a chain of shift registers; at least two, for both levels of its clock."""
         return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
 
     @property
     def row_latch_clocks(self) -> int:
-        """The pulse that puts a shifted row pattern on the outputs; 0 with direct rows."""
+        """The pulse that latches a shifted row pattern; 0 with direct rows."""
         return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
 
     @property
@@ -267,22 +268,22 @@ class Derived(Widths):
 
     @property
     def column_load_clocks(self) -> int:
-        """The pulse that takes all columns at once, in whose last clock they are sampled; 0 with direct columns."""
+        """The pulse that loads all columns, sampled in its last clock; 0 with direct columns."""
         return self.shift_clocks if self.skin.column_read == "74hc165" else 0
 
     @property
     def column_shift_clocks(self) -> int:
-        """How much later than direct ones the columns of a sample are known; 0 with direct columns."""
+        """Delay of a sample's columns against direct ones; 0 with direct columns."""
         return self.column_chain_lines * self.column_load_clocks
 
     @property
     def row_levels(self) -> int:
-        """ceil(log2 rows): how often the rows can be halved until one is left."""
+        """ceil(log2 rows): the halvings of the rows until one is left."""
         return (self.skin.rows - 1).bit_length()
 
     @property
     def choice_clocks(self) -> int:
-        """From a strobe until the scan can drive its next rows; 0 where it knows them beforehand."""
+        """From a strobe until the scan can drive its next rows; 0 if it knows them beforehand."""
         return self.scan.choice_clocks(self)
 
     @property
@@ -295,7 +296,7 @@ class Derived(Widths):
 
     @property
     def frame_clocks(self) -> int:
-        """One scan period: every row once, a guard row too. Frames of an adaptive scan take fewer or more clocks."""
+        """One scan period: every row once, including a guard row. Frames of an adaptive scan vary."""
         return self.row_clocks * self.skin.row_lines
 
     @property
@@ -304,44 +305,44 @@ class Derived(Widths):
 
     @property
     def pulsed(self) -> bool:
-        """Requests come as pulses: a bit is too short to be sampled."""
+        """Whether requests come as pulses: a bit is too short to sample."""
         return pulsed(self.skin.clock_hz, self.skin.baud)
 
     # ---- times, in clocks unless named otherwise
 
     @property
     def max_frame_slots(self) -> int:
-        """The most row times that a frame can take."""
+        """The most row times of a frame."""
         return self.scan.max_frame_slots(self)
 
     @property
     def max_frame_clocks(self) -> int:
-        """The most clocks that a frame can take, from its first sample to its last."""
+        """The most clocks of a frame, from its first sample to its last."""
         return self.scan.max_frame_clocks(self)
 
     @property
     def skips(self) -> bool:
-        """Rows that were not driven are not handed on, but for an empty one where zones have to end."""
+        """Whether undriven rows are not passed on, except an empty one where zones must end."""
         return self.scan.waits and self.report.zones
 
     @property
     def min_row_clocks(self) -> int:
-        """A row must last until debounce and labeller are done with the one before it, end mark and all, and a frame
-        until the one before it is packed: the scanner's tag is kept for no longer."""
+        """The least clocks of a row, for debounce and labeller to finish the one before it, end mark included; and for
+        a frame to last until the one before it is packed, as the scanner's tag is kept no longer."""
         return self.scan.min_row_clocks(self)
 
     @property
     def debounce_clocks(self) -> int:
-        """How much later a row leaves the debounce."""
+        """Delay of a row in the debounce."""
         return self.skin.columns + 3 if self.debounced else 0
 
     @property
     def packed_clocks(self) -> int:
-        """From the offer of a frame's last row to the end of its packing, but for the bytes packed in this time."""
+        """From the offer of a frame's last row to the end of its packing, without the bytes packed meanwhile."""
         return 1 + self.debounce_clocks + self.label_clocks + 2 + 4
 
     def items_clocks(self, items: int) -> int:
-        """For a frame's items and trailer, a byte per clock; where items are divided that takes longer than packing."""
+        """For a frame's items and trailer: a byte per clock, or the longer division of items."""
         plain = items * self.item_bytes + self.trailer_bytes
         stuffing = math.ceil(plain / 254)
         if not self.report.divided:
@@ -350,8 +351,7 @@ class Derived(Widths):
 
     @property
     def keep_alive_frames(self) -> int:
-        """A frame is sent at the latest after this many scans; where frames differ in length, after this many row
-        times."""
+        """Scans, or for frames of varying length row times, within which a frame is sent."""
         clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
         if self.scan.even:
             return math.floor(clocks / self.frame_clocks + 1e-9)
@@ -359,13 +359,13 @@ class Derived(Widths):
 
     @property
     def keep_alive_toggles(self) -> int:
-        """Toggles of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame; the rest of the
-        time is for that frame."""
+        """Toggles of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame, which uses the
+        remaining time."""
         return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_toggles
 
     @property
     def min_keep_alive_ms(self) -> float:
-        """Of a scan that waits."""
+        """Least keep-alive time of a scan that waits."""
         return (self._spare_toggles + 1) * (1 << KEEP_ALIVE_BIT) / 1000
 
     @property
@@ -374,7 +374,7 @@ class Derived(Widths):
 
     @property
     def hello_frames(self) -> int:
-        """A hello is due after this many scans; where frames differ in length, after this many row times."""
+        """Scans, or for frames of varying length row times, after which a hello is due."""
         periods = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
         return periods if self.scan.even else periods * self.skin.rows
 
@@ -390,12 +390,12 @@ class Derived(Widths):
 
     @property
     def press_ticks(self) -> int:
-        """A press has lasted when this many ticks are over: row times, or us of a scan that waits; docs/timing.md."""
+        """Ticks after which a press has lasted: row times, or us of a scan that waits; docs/timing.md."""
         return self._debounce_ticks(self.skin.debounce_press_us, self.press_scans)
 
     @property
     def release_ticks(self) -> int:
-        """The same of a release."""
+        """Ticks after which a release has lasted: row times, or us of a scan that waits."""
         return self._debounce_ticks(self.skin.debounce_release_us, self.release_scans)
 
     def _debounce_ticks(self, us: float, scans: int) -> int:
@@ -407,7 +407,7 @@ class Derived(Widths):
 
     @functools.cached_property
     def tick_bits(self) -> int:
-        """Of a count in which a debounce time, and two frames more, can be counted."""
+        """Bits of a counter for a debounce time and two frames more."""
         longest = max(self.press_ticks, self.release_ticks)
         if self.scan.waits:
             frame = self.max_frame_clocks + self.packed_clocks + self.items_clocks(self.max_items)
@@ -416,12 +416,12 @@ class Derived(Widths):
 
     @property
     def cell_bits(self) -> int:
-        """Of a whole number of cells that a barycenter can be away from the origin, along the longer side."""
+        """Integer bits of a barycenter, along the longer side."""
         return (max(self.skin.rows, self.skin.columns) - 1).bit_length()
 
     @property
     def quotient_bits(self) -> int:
-        """Of a barycenter before it is rounded: one fraction bit more than there will be. One comes each clock."""
+        """Bits of a barycenter before rounding: one more fraction bit. One is computed per clock."""
         return self.cell_bits + self.skin.barycenter_bits + 1
 
     @property
@@ -434,7 +434,7 @@ class Derived(Widths):
 
     @functools.cached_property
     def open_zones(self) -> int:
-        """The most zones two adjacent rows can hold between them: C/2 with 8-connectivity, C with 4."""
+        """The most zones in two adjacent rows: C/2 with 8-connectivity, C with 4."""
         return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
 
     @property
@@ -444,23 +444,23 @@ class Derived(Widths):
 
     @property
     def label_row_clocks(self) -> int:
-        """The most clocks from a row to the next one that the labeller, or what stands in its place, can take."""
+        """The most clocks from a row to the next one that the labeller, or its replacement, can take."""
         return self.labeller.row_clocks(self) if self.report.zones else 1
 
     @property
     def label_empty_row_clocks(self) -> int:
-        """The same for an empty row below an empty row."""
+        """The most clocks from an empty row below an empty row to the next one."""
         return self.labeller.empty_row_clocks(self) if self.report.zones else 1
 
     @functools.cached_property
     def backlog(self) -> int:
-        """Items that can wait for the packer.
+        """Capacity of the queue before the packer.
 
-        Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
-        them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
-        are packed before the next one comes. An adaptive scan omits empty rows, so that every row may close as many
-        zones, and bitmap rows of two frames may wait. A scan that waits has one frame at most under
-        way, and its first item is taken before its end mark comes; a power of two takes less logic.
+        Two rows close at most ``open_zones`` zones, which may come in one burst; if packing them is slower than two
+        rows, the rest accumulates, over at most the capacity of two frames. Bitmap rows are packed before the next one.
+        An adaptive scan omits empty rows, so that every row may close as many zones, and bitmap rows of two frames may
+        wait. A scan that waits has at most one frame under way, and its first item is taken before its end mark; a
+        power of two needs less logic.
         """
         if self.scan.waits:
             return max(8, 1 << (self.max_items - 1).bit_length())
@@ -472,5 +472,5 @@ class Derived(Widths):
 
 
 def whole(value: float) -> int:
-    """The next whole number upward, not counting what a float's rounding added."""
+    """The next integer upward, ignoring float rounding."""
     return math.ceil(value - 1e-9)

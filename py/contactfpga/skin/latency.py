@@ -1,4 +1,4 @@
-"""How long a touch takes from the switch to the last byte on the wire."""
+"""Time of a touch from the switch to the last byte on the wire."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ AROUND_S = 3e-6
 def latency_s(skin: Skin) -> float:
     """A bound in s for one zone: two scans, as a touch may just have missed its row, the bytes, and 3 us.
 
-    A frame counts at its longest. Debounce adds the time that a press must last, a labeller that takes a
-    cell per clock its clocks after the last row, and a board that divides those of a division.
+    Frames count at their longest. Debounce adds the press time, a labeller with a cell per clock its clocks after the
+    last row, and a dividing board those of a division.
     """
     derived = skin.derived
     items = 1 if derived.report.zones else derived.max_items

@@ -1,8 +1,8 @@
-"""What a :class:`~contactfpga.Skin` can be, in numbers."""
+"""Limits of a :class:`~contactfpga.Skin` in numbers."""
 
 MAX_LINES = 64
 MIN_AROUND = 3
-"""Columns of a sheet whose ends meet."""
+"""Least columns of a sheet whose ends meet."""
 MAX_NAME_BYTES = 32
 MAX_BAUD_ERROR = 0.015
 MIN_PITCH_MM, MAX_PITCH_MM = 0.01, 1000.0

@@ -1,4 +1,4 @@
-"""Several sheets at one FPGA: their Skins, and what these must share."""
+"""Several sheets on one FPGA: their Skins, and what these must share."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from contactfpga.inputs.values import shown
 from contactfpga.skin.skin import Skin
 
 MOST_SHEETS = 16
-"""As many as a packet can number."""
+"""Largest number of sheets, by the packets' numbering."""
 
 _ALONE = ("guard", "units", "alive", "dual")
-"""Fields that only the one sheet of a board can have."""
+"""Fields that only a board's single sheet can have."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Several:
     """The sheets of one FPGA, each on shift registers of its own; they share its clock, its UART and its contact pin.
 
-    Their numbers are their places in ``skins``. Raises :class:`SkinError` where they cannot go together.
+    Their numbers are their indexes in ``skins``. Raises :class:`SkinError` for Skins that do not fit together.
     """
 
     skins: tuple[Skin, ...]
@@ -36,7 +36,7 @@ class Several:
 
     @classmethod
     def load(cls, path: str | Path, trust: bool = False) -> Several:
-        """Read a TOML file whose only key is ``sheets``, a list of Skin files; their paths begin at its folder.
+        """Read a TOML file whose only key is ``sheets``, a list of Skin files with paths relative to its folder.
         ``trust`` as for :meth:`Skin.load`."""
         values = tomlfile.load(path, SkinError)
         if set(values) != {"sheets"}:
@@ -56,12 +56,12 @@ class Several:
 
     @property
     def clock_hz(self) -> int:
-        """Clock of the gateware in Hz, that of every sheet."""
+        """Common clock of the gateware in Hz."""
         return self.skins[0].clock_hz
 
     @property
     def baud(self) -> int:
-        """Bits per second on the wire, those of every sheet."""
+        """Common bits per second on the wire."""
         return self.skins[0].baud
 
     def _check(self, number: int, skin: Skin) -> None:

@@ -1,4 +1,4 @@
-"""What of a Skin its board's frames cannot be read without: the hello tells all of it."""
+"""The part of a Skin that reading its board's frames needs; the hello contains it."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Sheet:
     radius_mm: float | None
     """None on a plane."""
     closed: bool = False
-    """The last column is a neighbor of the first."""
+    """Whether the last column is a neighbor of the first."""
     ghosts: bool
     """The sheet has no diodes: pressed switches can make others read pressed."""
 
     @property
     def around_mm(self) -> float | None:
-        """Circumference of a sheet whose ends meet; None for any other sheet."""
+        """Circumference of a sheet whose ends meet; None for any other."""
         return self.columns * self.pitch_x_mm if self.closed else None
 
     def max_zones(self) -> int:
@@ -43,7 +43,7 @@ class Sheet:
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def check(self) -> None:
-        """Raises ValueError where frames of such a sheet could not be read."""
+        """Raises ValueError if frames of such a sheet would be unreadable."""
         lengths = {"pitch_x_mm": self.pitch_x_mm, "pitch_y_mm": self.pitch_y_mm}
         if self.radius_mm is not None:
             lengths["radius_mm"] = self.radius_mm
@@ -67,10 +67,10 @@ class Sheet:
 
 
 def max_zones(rows: int, columns: int, connectivity: int, closed: bool = False) -> int:
-    """The most zones a sheet can hold.
+    """The most zones of a sheet.
 
-    With 8-connectivity every 2x2 block holds cells of one zone at most; with 4-connectivity the checkerboard is the
-    worst. Where the ends meet a row holds no more runs than half its columns.
+    With 8-connectivity every 2x2 block holds cells of at most one zone; with 4-connectivity the checkerboard is the
+    worst. Around a cylinder a row holds no more runs than half its columns.
     """
     if closed:
         return (math.ceil(rows / 2) if connectivity == 8 else rows) * (columns // 2)

@@ -38,8 +38,7 @@ class Skin:
     """
 
     name: str = ""
-    """What the board calls itself, at most 32 bytes of UTF-8. It tells boards with the same Skin apart. It is in the
-    bitstream, but not in the fingerprint."""
+    """What the board calls itself, at most 32 bytes of UTF-8; not in the fingerprint."""
 
     rows: int = 16
     """Driven lines, 1 to 64."""
@@ -54,45 +53,40 @@ class Skin:
     radius_mm: float | None = None
     """Radius of the sheet on a cylinder in mm; None on a plane."""
     closed: bool = False
-    """The columns run all the way round the cylinder, so that the last one is a neighbor of the first. ``pitch_x_mm``
-    follows from the radius and need not be given."""
+    """The last column is a neighbor of the first, all the way round the cylinder. ``pitch_x_mm`` then follows from the
+    radius."""
     mask: tuple[tuple[int, int], ...] = ()
     """(row, column) of switches that are absent or broken: never pressed, never stuck."""
     guard: bool = False
-    """One more row and one more column at the far ends, whose crossings are always closed, so that the board can report
-    broken lines by name (docs/faults.md)."""
+    """One more row and column whose crossings are always closed, so that broken lines are reported by name
+    (docs/faults.md)."""
     row_order: tuple[int, ...] = ()
-    """The line that each row is soldered to, counted from 0 in the order of the board's pins or the chain's outputs.
-    (): row i is on line i. A guard row is always the last line."""
+    """The line that each row is soldered to, counted from 0 (docs/faults.md). (): row i is on line i."""
     column_order: tuple[int, ...] = ()
     """The same for columns."""
     connectivity: int = 8
     """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
 
     diodes: Literal["col2row", "row2col", "none"] = "col2row"
-    """``col2row``: the selected row is low, columns are pulled up. ``row2col``: the selected row is high, columns are
-    pulled down. ``none``: as ``col2row``, but without diodes. Rows float while they are not selected, and three pressed
-    corners of a rectangle make the fourth read pressed; zones that this may have made are flagged ``ghost``."""
+    """``col2row``: the selected row is low, columns are pulled up. ``row2col``: the opposite. ``none``: as ``col2row``,
+    but without diodes; zones that ghosts may have made are flagged."""
     scan: ScanName | Scan = "raster"
-    """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched;
-    ``reversal`` drives all columns and reads the rows, and then drives only the rows that are touched."""
+    """``raster`` drives one row after the other; ``adaptive`` drives untouched rows together; ``reversal`` drives all
+    columns and reads the rows, and then drives only touched rows."""
     settle_us: float = 5.0
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = 1.0
     """Time without a driven row before the next one, in us; with ``precharge_us`` at least that and two clocks."""
     precharge_us: float = 0.0
-    """How long the board drives the columns to the released level before it drives a row, in us; 0: pulls alone bring
-    them there."""
+    """How long the board drives the columns to the released level before it drives a row, in us; 0: not at all."""
     project_us: float = limits.PROJECT_US
     """How long ``scan = "reversal"`` drives all columns before it reads the rows, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
-    """``direct``: a pin per row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
+    """``direct``: a pin per row; ``74hc595``: rows on shift registers."""
     row_chains: int = 1
-    """Chains of 74HC595 that are shifted at once; chain j drives lines j n to j n + n - 1, n = ceil(lines / chains).
-    Lines are the rows, in their ``row_order``, and the guard row."""
+    """Chains of 74HC595 that are shifted at once; chain j drives lines j n to j n + n - 1, n = ceil(lines / chains)."""
     column_read: Literal["direct", "74hc165"] = "direct"
-    """``direct``: a pin per column; ``74hc165``: columns on shift registers, which settle and release may have to wait
-    for."""
+    """``direct``: a pin per column; ``74hc165``: columns on shift registers."""
     column_chains: int = 1
     """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
     shift_hz: int = limits.SHIFT_HZ
@@ -106,23 +100,20 @@ class Skin:
     """How long a release must last to count, in us."""
 
     labeller: LabellerName | Labeller = "run"
-    """How zones are found. Two labellers are exact: ``run`` is the fastest and takes a run of pressed cells per clock;
-    ``serial`` is smaller and takes a cell per clock. ``projection`` uses the shadows on the two axes and is wrong where
-    these cross. ``single`` takes all pressed cells as one zone."""
+    """How zones are found. ``run``, the fastest, and ``serial``, smaller, are exact. ``projection`` uses the shadows on
+    the two axes and is wrong where these cross. ``single`` joins all pressed cells."""
     report: ReportName = "moments"
-    """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and barycenter, divided on the board and
-    rounded; ``cells``: the pressed cells as a bitmap."""
+    """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: the
+    pressed cells as a bitmap."""
     barycenter_bits: int = limits.BARYCENTER_BITS
-    """With ``report = "barycenter"``, x and y are rounded to the nearest 1 / 2^barycenter_bits of a cell, halves
-    upward."""
+    """With ``report = "barycenter"``, x and y are rounded to 1 / 2^barycenter_bits of a cell, halves upward."""
     send: Literal["always", "on_change"] = "always"
-    """``always``: the board sends every frame. ``on_change``: it sends a frame whose cells differ from the last one,
-    and keep-alives."""
+    """``always``: every frame is sent. ``on_change``: frames whose cells differ from the last one, and keep-alives."""
     keep_alive_ms: float = 100.0
     """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
     zone_capacity: int | None = None
-    """Zones that a frame can carry. None stands for the most that can occur up to 32x32, at most 256 above that, and at
-    most 64 with ``report = "barycenter"``; the Skin replaces it by that number."""
+    """Zones that a frame can carry. By default the most that can occur up to 32x32, at most 256 above that, and at most
+    64 with ``report = "barycenter"``."""
 
     fail_safe: bool = False
     """``contact`` is high while the board knows of a fault."""
@@ -131,8 +122,7 @@ class Skin:
     self_test: bool = False
     """The board tests its lines against each other, at start and when the host asks; needs a scan that reads rows."""
     dual: bool = False
-    """Two copies of the gateware are compared in each clock. If they differ, no wrong packet is completed, and both
-    restart."""
+    """Two copies of the gateware are compared in each clock; if they differ, both restart."""
 
     units: int = 0
     """Pressure units, read by an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
@@ -141,8 +131,8 @@ class Skin:
     converter_v: float = limits.CONVERTER_V
     """The converter's supply in V, which limits its SPI clock."""
     unit_sums: tuple[tuple[int, ...], ...] = ()
-    """Up to four weighted sums of the units' deviations from their zeros, each with its own threshold. A sum has a
-    weight from -127 to 127 for each unit."""
+    """Up to four weighted sums of the units' deviations from their zeros, with a weight from -127 to 127 for each
+    unit."""
 
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
@@ -184,7 +174,7 @@ class Skin:
 
     def replace(self, **changes: Any) -> Skin:
         """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
-        one that begins or ends to divide."""
+        one whose division is switched on or off."""
         divides = self.report == "barycenter"
         if {"rows", "columns", "connectivity", "closed"} & set(changes) or divides != (
             changes.get("report", self.report) == "barycenter"
@@ -204,16 +194,16 @@ class Skin:
 
     @property
     def fingerprint(self) -> bytes:
-        """Eight bytes that differ between any two Skins that differ in more than their names.
+        """Eight bytes that differ between Skins that differ in more than their names.
 
-        They are made of the fields that differ from their defaults, so that a new field with a default changes no
-        fingerprint (docs/protocol.md).
+        They cover the fields that differ from their defaults, so that a new field with a default changes no fingerprint
+        (docs/protocol.md).
         """
         return hashlib.sha256(json.dumps(self.changed, sort_keys=True).encode()).digest()[:8]
 
     @property
     def changed(self) -> dict[str, Any]:
-        """The fields that differ from their defaults, but for the name."""
+        """The fields that differ from their defaults, except the name."""
         defaults = {field.name: field.default for field in dataclasses.fields(self)}
         defaults["zone_capacity"] = self._default_capacity()
         fields = dataclasses.asdict(self)
@@ -222,42 +212,42 @@ class Skin:
 
     @property
     def selects_low(self) -> bool:
-        """A selected row is low, as is a column that reads pressed; else both are high."""
+        """Whether a selected row, and a pressed column, is low; else both are high."""
         return self.diodes != "row2col"
 
     @property
     def reads_rows(self) -> bool:
-        """The board lets the rows go and reads them while it drives the columns."""
+        """Whether the board releases the rows and reads them while it drives the columns."""
         return scans.find(self.scan).reads_rows
 
     @property
     def row_lines(self) -> int:
-        """Rows, and the guard row."""
+        """Rows, including the guard row."""
         return self.rows + self.guard
 
     @property
     def column_lines(self) -> int:
-        """Columns, and the guard column."""
+        """Columns, including the guard column."""
         return self.columns + self.guard
 
     @property
     def line_of_row(self) -> tuple[int, ...]:
-        """The line that each row is soldered to, and after them the guard row."""
+        """The line of each row, and finally of the guard row."""
         return (*(self.row_order or range(self.rows)), *range(self.rows, self.row_lines))
 
     @property
     def line_of_column(self) -> tuple[int, ...]:
-        """The line that each column is soldered to, and after them the guard column."""
+        """The line of each column, and finally of the guard column."""
         return (*(self.column_order or range(self.columns)), *range(self.columns, self.column_lines))
 
     @property
     def ghosts(self) -> bool:
-        """Pressed switches can make others read pressed."""
+        """Whether pressed switches can make others read pressed."""
         return self.diodes == "none"
 
     @property
     def sheet(self) -> Sheet:
-        """What frames of this Skin's board cannot be read without."""
+        """The part of the Skin that reading frames needs."""
         assert self.zone_capacity is not None
         return Sheet(
             rows=self.rows,
@@ -279,11 +269,11 @@ class Skin:
         return Derived(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone. Another process computes again what follows from them."""
+        """The fields alone, as other processes recompute derived values."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def max_zones(self) -> int:
-        """The most zones a frame of this sheet can hold; see :meth:`Sheet.max_zones`."""
+        """The most zones in a frame of this sheet; see :meth:`Sheet.max_zones`."""
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def _keep(self, **values: Any) -> None:
@@ -297,7 +287,7 @@ class Skin:
 
 
 def _suggesting(init: Callable[..., None]) -> Callable[..., None]:
-    """The same, but a field that does not exist is refused with the one that is spelled nearly so."""
+    """The initializer, which for an unknown field suggests the most similar one."""
     known = [field.name for field in dataclasses.fields(Skin)]
 
     @functools.wraps(init)

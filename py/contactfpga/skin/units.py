@@ -1,4 +1,4 @@
-"""What follows from a Skin's pressure units: clocks of their converter, widths of their sums, and their packets."""
+"""Quantities of a Skin's pressure units: clocks of their converter, widths of their sums, and their packets."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 ZERO, THRESHOLD, SUM_THRESHOLD = 3, 4, 5
-"""Numbers of commands: what a unit reads without load, from which deviation on a unit, and a sum, raises ``contact``
+"""Numbers of commands: a unit's zero, and the deviation from which a unit, or a sum, raises ``contact``
 (docs/protocol.md)."""
 
 INDEX_BITS, NUMBER_BITS = 3, 18
-"""Of such a command's value: which unit or sum, and a number in steps of a power of two."""
+"""Bits of such a command's value: index of the unit or sum, and a number in steps of a power of two."""
 MAX_SUMS, MAX_WEIGHT = 4, 127
 
 
 @dataclasses.dataclass(frozen=True)
 class Units:
-    """What follows from a Skin with ``units``."""
+    """Quantities of a Skin with ``units``."""
 
     skin: Skin
 
@@ -34,25 +34,25 @@ class Units:
 
     @property
     def level_clocks(self) -> int:
-        """Clocks for which the SPI clock is high, and for which it is low."""
+        """Clocks of a high, and of a low, level of the SPI clock."""
         most_hz = self.converter.most_hz(self.skin.converter_v)
         least = self.converter.least_level_ns * self.skin.clock_hz
         return max(-(-self.skin.clock_hz // (2 * most_hz)), -(-least // 1_000_000_000))
 
     @property
     def spacing_clocks(self) -> int:
-        """Clocks from a unit's sample to that of the next unit; 0 where all are sampled at once."""
+        """Clocks from a unit's sample to that of the next unit; 0 for simultaneous samples."""
         return self.converter.spacing_levels * self.level_clocks
 
     @property
     def pace_level_clocks(self) -> int:
-        """How long the clock is high, and how long low, that a converter with a pace of its own is given; else 0."""
+        """Clocks of a high, and of a low, level of a converter's pacing clock; 0 without one."""
         pace, hz = self.converter.pace, self.skin.clock_hz
         return 0 if pace is None else max(-(-hz // (2 * pace.most_hz)), -(-pace.least_level_ns * hz // 1_000_000_000))
 
     @property
     def delay_us(self) -> int:
-        """Latency of a conversion: from the middle of what it averages until it is ready, to the nearest us."""
+        """Latency of a conversion: from the middle of its average until it is ready, to the nearest us."""
         pace = self.converter.pace
         return 0 if pace is None else round(pace.delay_halves * self.sweep_clocks * 500_000 / self.skin.clock_hz)
 
@@ -65,20 +65,20 @@ class Units:
 
     @functools.cached_property
     def sum_bits(self) -> int:
-        """Bits of the largest amount that a weighted sum of deviations can have; 0 without sums."""
+        """Bits of the largest magnitude of a weighted sum of deviations; 0 without sums."""
         full = (1 << self.converter.bits) - 1
         return max((full * sum(map(abs, row)) for row in self.skin.unit_sums), default=0).bit_length()
 
     @property
     def commands(self) -> tuple[int, ...]:
-        """Numbers of the commands that a board takes for its units."""
+        """Numbers of the commands for units."""
         if not self.skin.units:
             return ()
         return (ZERO, THRESHOLD, SUM_THRESHOLD) if self.skin.unit_sums else (ZERO, THRESHOLD)
 
 
 def number_shift(bits: int) -> int:
-    """Commands give numbers of so many bits in steps of 2 to this power."""
+    """log2 of the step of commands' numbers with this many bits."""
     return max(0, bits - NUMBER_BITS)
 
 

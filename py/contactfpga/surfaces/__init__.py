@@ -1,4 +1,4 @@
-"""Where places of a sheet lie on its link: point and outward normal, in mm."""
+"""Places of a sheet on its link: point and outward normal, in mm."""
 
 import functools
 
@@ -13,7 +13,7 @@ __all__ = ["Cone", "CylinderSurface", "Mesh", "MirroredSurface", "PlaneSurface",
 
 
 def of(sheet: Sheet) -> PlaneSurface | CylinderSurface:
-    """The surface that a Skin, or a board's hello, tells of."""
+    """The surface of a Skin, or of a board's hello."""
     return _of(sheet.radius_mm)
 
 

@@ -1,4 +1,4 @@
-"""A sheet laid on a triangle mesh: where each of its cells comes to lie."""
+"""A sheet laid on a triangle mesh: the place of each cell."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from contactfpga.surfaces.mesh import Mesh
 from contactfpga.surfaces.shapes import Floats, SurfaceError
 
 FINE = 8
-"""Rays per pitch where arc lengths are measured."""
+"""Rays per pitch for measuring arc lengths."""
 CHUNK = 2_000_000
-"""Pairs of ray and triangle at a time."""
+"""Pairs of ray and triangle per batch."""
 EDGE = 0.8
-"""Cosine of the angle from which on two triangles meet at an edge and not on a round surface."""
+"""Cosine of the angle from which two triangles form an edge, not a round surface."""
 MAX_AROUND = 20_000_000
-"""Corners times the triangles around the busiest of them: a table of the library's."""
+"""Most corners times the triangles around the busiest of them: the size of a table in the library."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,12 +29,12 @@ class Triangles:
     corners_mm: Floats
     """(n, 3, 3)."""
     normals: Floats
-    """(n, 3, 3): at each corner."""
+    """(n, 3, 3): normals at the corners."""
 
     @classmethod
     def load(cls, path: str | Path, scale: float = 1.0) -> Triangles:
-        """From a file of :data:`mesh_file.SUFFIXES`, whose lengths are times ``scale`` mm. Raises
-        :class:`SurfaceError`, OSError."""
+        """A mesh from a file of :data:`mesh_file.SUFFIXES`, whose unit is ``scale`` mm. Raises :class:`SurfaceError`,
+        OSError."""
         mesh = mesh_file.read(path, "surface")
         corners = np.asarray(mesh.triangles, float)
         if wrong := int((~np.isfinite(corners)).any(axis=(1, 2)).sum()):
@@ -43,7 +43,7 @@ class Triangles:
         return cls(scale * corners, _corner_normals(mesh))
 
     def hit(self, starts: Floats, ways: Floats) -> tuple[Floats, Floats]:
-        """(n, 3) points that rays meet first, and outward normals there; NaN where they meet nothing."""
+        """(n, 3) first hits of rays, and outward normals there; NaN without a hit."""
         points, normals = np.full(starts.shape, np.nan), np.full(starts.shape, np.nan)
         step = max(1, CHUNK // len(self.corners_mm))
         for first in range(0, len(starts), step):
@@ -52,7 +52,7 @@ class Triangles:
         return points, normals
 
     def _hit(self, starts: Floats, ways: Floats) -> tuple[Floats, Floats]:
-        """By Moeller and Trumbore, each ray with each triangle."""
+        """Hits by Moeller and Trumbore, each ray with each triangle."""
         corner = self.corners_mm[:, 0]
         first, second = self.corners_mm[:, 1] - corner, self.corners_mm[:, 2] - corner
         aside = np.cross(ways[:, None], second[None])
@@ -78,13 +78,13 @@ class Triangles:
 
     @property
     def size_mm(self) -> float:
-        """More than the distance of any two corners."""
+        """An upper bound on the distance of corners."""
         spread = self.corners_mm.reshape(-1, 3)
         return float(np.linalg.norm(spread.max(axis=0) - spread.min(axis=0))) + 1.0
 
 
 def _corner_normals(mesh: Any) -> Floats:
-    """(n, 3, 3): at each corner the mean of the triangles around it, by area, but for those beyond an edge."""
+    """(n, 3, 3): at each corner the area-weighted mean of the triangles around it, without those beyond an edge."""
     faces, normals = np.asarray(mesh.faces), np.asarray(mesh.face_normals, float)
     most = int(np.bincount(faces.ravel()).max())
     if most * len(mesh.vertices) > MAX_AROUND:
@@ -105,7 +105,7 @@ def _corner_normals(mesh: Any) -> Floats:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Placement:
-    """The sheet and where its own frame lies in the mesh's."""
+    """The laid sheet, and its own frame's pose in the mesh's."""
 
     rows: int
     columns: int
@@ -116,7 +116,7 @@ class Placement:
     origin_mm: Floats
 
     def projected(self, mesh: Triangles) -> Mesh:
-        """Each cell of the flat sheet goes straight down, against z, to the mesh; distances grow where it is steep."""
+        """The flat sheet projected down, against z, onto the mesh; distances grow on steep parts."""
         x, y = np.meshgrid(np.arange(self.columns) * self.pitch_x_mm, np.arange(self.rows) * self.pitch_y_mm)
         flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
         down = -self.rotation[:, 2]
@@ -125,8 +125,8 @@ class Placement:
         return self._table(points.reshape(self.rows, self.columns, 3), normals.reshape(self.rows, self.columns, 3))
 
     def unrolled(self, mesh: Triangles, *, closed: bool = False) -> Mesh:
-        """Column 0 goes up along z at the side where x is, row 0 around z from there. Along both, cells lie a pitch
-        apart on the mesh; a closed sheet's columns share the way around evenly."""
+        """The sheet unrolled around z: column 0 goes up along z on the x side, row 0 around from there. Cells are a
+        pitch apart on the mesh along both; a closed sheet's columns share the circumference evenly."""
         heights = self._heights(mesh)
         points, normals = np.empty((2, self.rows, self.columns, 3))
         # An arc is found between rays: fine enough that its chord is no shorter by more than a few parts in 10,000.
@@ -146,7 +146,7 @@ class Placement:
         return self._table(points, normals, closed=closed)
 
     def _heights(self, mesh: Triangles) -> Floats:
-        """Along z, of each row: a pitch apart on the mesh along column 0."""
+        """z of each row, a pitch apart on the mesh along column 0."""
         far = (self.rows - 1) * self.pitch_y_mm
         fine = np.linspace(0, far, FINE * self.rows)
         line, _ = self._seen(mesh, np.zeros(len(fine)), fine)
@@ -161,7 +161,7 @@ class Placement:
         return np.asarray(np.interp(np.arange(self.rows) * self.pitch_y_mm, ways, fine[:end]))
 
     def _seen(self, mesh: Triangles, angles: Floats, heights: Floats) -> tuple[Floats, Floats]:
-        """What is met from outside toward the axis."""
+        """Hits from outside toward the axis."""
         out = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
         far = 2 * mesh.size_mm
         starts = self._placed(far * out + heights[:, None] * np.array([0.0, 0.0, 1.0]))

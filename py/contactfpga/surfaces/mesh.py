@@ -1,4 +1,4 @@
-"""A surface of any shape: a table of the point and the normal at each cell of a sheet."""
+"""A surface of any shape: a table of point and normal at each cell of a sheet."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, le
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
 MAX_BYTES = 8 * 3 * MAX_LINES**2
-"""Of an array: numbers of 64 bits."""
+"""Largest array, of 64-bit numbers."""
 BEYOND = 1.0
-"""Pitches beyond the outermost cells up to which the surface goes on as it ends there."""
+"""Pitches beyond the outermost cells to which the surface is extrapolated."""
 STEPS = 30
-"""Of the search for the place of a point."""
+"""Most steps of the search for a point's place."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh:
-    """Between cells points are interpolated, and normals, too."""
+    """A surface with points and normals interpolated between cells."""
 
     points_mm: Floats
     """(R, C, 3), in the link's frame."""
@@ -35,7 +35,7 @@ class Mesh:
     pitch_x_mm: float
     pitch_y_mm: float
     closed: bool = False
-    """Column 0 is the neighbor of the last one."""
+    """Whether column 0 is the neighbor of the last one."""
 
     def __post_init__(self) -> None:
         points, normals = (np.array(one, float) for one in (self.points_mm, self.normals))
@@ -107,7 +107,7 @@ class Mesh:
         return points, normals
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's point nearest to this one, from the nearest cell on."""
+        """The place, in mm, of the surface's nearest point, found from the nearest cell."""
         target = np.array(point_mm, float)
         rows, columns = self.lines
         nearest = int(np.linalg.norm(self.points_mm - target, axis=2).argmin())
@@ -139,7 +139,7 @@ class Mesh:
                 raise SurfaceError(f"{name} is {float(value[off].flat[0]) * pitch:g} mm; {far}")
 
     def _around(self, u: Any, v: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-        """Rows and columns of the four cells around, and how far the place lies from the first ones."""
+        """Rows and columns of the four cells around, and the offset from the first."""
         rows, columns = self.lines
         row = np.clip(np.floor(v).astype(int), 0, rows - 2)
         if self.closed:
@@ -156,7 +156,7 @@ class Mesh:
         return np.asarray((1 - up) * bottom + up * top)
 
     def _slopes(self, u: Any, v: Any) -> tuple[Floats, Floats]:
-        """How a point moves with u and v."""
+        """Derivatives of a point by u and v."""
         low, high, left, right, across, up = self._around(u, v)
         p = self.points_mm
         along_u = (1 - up) * (p[low, right] - p[low, left]) + up * (p[high, right] - p[high, left])

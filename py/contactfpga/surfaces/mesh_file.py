@@ -1,4 +1,4 @@
-"""Triangle meshes in files: plain formats alone, as an archive or a picture in one may unpack to any size."""
+"""Triangle meshes in files, in plain formats only, as archives or pictures may unpack to any size."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from contactfpga.surfaces.shapes import SurfaceError
 
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 COLLADA = ".dae"
-"""Of robots' files; its lengths may be in any unit, which the robot's file scales."""
+"""Format of robots' files, with lengths in any unit, which the robot's file scales."""
 MAX_BYTES = 20_000_000
 MAX_TRIANGLES = 500_000
 _OBJ = re.compile(rb"^[vf][ \t].*$", re.MULTILINE)
-"""Vertices and faces: materials and groups say nothing of a shape, and thousands of groups take the library minutes."""
+"""Vertices and faces; materials and groups are irrelevant, and thousands of groups take the library minutes."""
 _OBJ_SKIPPED = re.compile(rb"\\\r?\n|/\S*")
-"""Lines that go on, and what a face names beside vertices."""
+"""Continued lines, and references of a face besides vertices."""
 
 
 def read(path: str | Path, extra: str, suffixes: tuple[str, ...] = SUFFIXES) -> Any:
-    """The mesh of a file as the library's object, whose ``vertices`` are (n, 3) and ``faces`` (m, 3) indices of them.
+    """The mesh of a file as the library's object, with (n, 3) ``vertices`` and (m, 3) ``faces``, their indices.
 
-    ``extra``: what to install where the library is missing. Raises :class:`SurfaceError`,
-    :class:`~contactfpga.MissingExtra`, OSError.
+    ``extra``: what to install without the library. Raises :class:`SurfaceError`, :class:`~contactfpga.MissingExtra`,
+    OSError.
     """
     path = Path(path)
     kind = path.suffix.lower()
@@ -65,7 +65,7 @@ def read(path: str | Path, extra: str, suffixes: tuple[str, ...] = SUFFIXES) -> 
 
 
 def _check_collada(data: bytes, path: Path) -> None:
-    """The library takes an archive for such a file, too, and scenes of scenes grow without end."""
+    """Check for archives, which the library would accept, and for endlessly nested scenes."""
     if zipfile.is_zipfile(io.BytesIO(data)):
         raise SurfaceError(f"{path}: it is an archive; unpack it")
     shown: collections.Counter[str] = collections.Counter()

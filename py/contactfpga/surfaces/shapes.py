@@ -1,4 +1,4 @@
-"""Plane and cylinder as plain functions, all lengths in one unit, whichever it is; and surfaces that cannot be."""
+"""Plane and cylinder as plain functions in any unit of length; and errors of impossible surfaces."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ def on_plane(x: float, y: float, height: float) -> tuple[Vector, Vector]:
 
 
 def on_cylinder(x: float, y: float, radius: float) -> tuple[Vector, Vector]:
-    """The same on a cylinder about z: ``x`` is the arc length from the x axis toward the y axis, ``y`` runs along z."""
+    """Point and outward normal of a place on a cylinder about z: ``x`` is the arc length from the x axis toward the y
+    axis, ``y`` is along z."""
     angle = x / radius
     cosine, sine = math.cos(angle), math.sin(angle)
     return (radius * cosine, radius * sine, y), (cosine, sine, 0.0)
 
 
 def off_cylinder(point: Vector, radius: float) -> tuple[float, float]:
-    """The place of the cylinder's point nearest to this one, with the arc from half a turn back to half a turn on."""
+    """The place of the cylinder's nearest point, with an arc within half a turn of 0."""
     return radius * math.atan2(point[1], point[0]), point[2]
 
 
 def angles_of(x: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Cosines and sines of arc lengths, by the same functions as for one: numpy's may differ in the last bit."""
+    """Cosines and sines of arc lengths by the scalar functions, as numpy's may differ in the last bit."""
     return _each(math.cos, x / radius), _each(math.sin, x / radius)
 
 
@@ -44,7 +45,7 @@ def _each(function: Callable[[float], float], values: Floats) -> Floats:
 
 
 def vector(values: Floats) -> Vector:
-    """Three numbers as plain ones."""
+    """Three numbers as plain floats."""
     x, y, z = values.tolist()
     return x, y, z
 
@@ -58,7 +59,7 @@ LONGEST_MM = 1e6
 
 
 class SurfaceError(ContactFPGAError, ValueError):
-    """A surface, or a place on one, that cannot be; the message names the value and the limit."""
+    """An impossible surface or place; the message names the value and the limit."""
 
 
 def length(name: str, value: Any, low: float = -LONGEST_MM, unit: str = "mm") -> float:

@@ -1,8 +1,8 @@
-"""Where places of a sheet lie on its link: on a plane, a cylinder or a cone.
+"""Surfaces of a sheet on its link: a plane, a cylinder or a cone.
 
-``place`` takes a place of the sheet laid flat, in mm, and returns point and outward unit normal in the link's frame;
-``flat`` returns the place of the point that is nearest. Of arrays of one shape, ``place`` returns arrays with one axis
-more. A place that is NaN, that of a zone without cells, lies at NaN.
+``place`` maps a place of the sheet laid flat, in mm, to point and outward unit normal in the link's frame; ``flat``
+returns the place of the nearest point. For arrays of one shape, ``place`` returns arrays with one more axis. A NaN
+place, that of a zone without cells, has a NaN point.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, le
 
 @dataclasses.dataclass(frozen=True)
 class PlaneSurface:
-    """The plane z = ``height_mm``, outside where z is larger; x and y are those of the sheet."""
+    """The plane z = ``height_mm``, with outside toward larger z; x and y are the sheet's."""
 
     height_mm: float = 0.0
 
@@ -49,7 +49,7 @@ class PlaneSurface:
 
 @dataclasses.dataclass(frozen=True)
 class CylinderSurface:
-    """A cylinder about z: x runs around it, from the x axis toward the y axis, y along it."""
+    """A cylinder about z: x goes around it, from the x axis toward the y axis, y along it."""
 
     radius_mm: float
 
@@ -73,22 +73,22 @@ class CylinderSurface:
         return points, np.stack([cosine, sine, np.where(nowhere, math.nan, 0.0)], axis=-1)
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's point nearest to this one; x lies within half a turn of 0."""
+        """The place, in mm, of the surface's nearest point; x is within half a turn of 0."""
         return shapes.off_cylinder(point_mm, self.radius_mm)
 
 
 @dataclasses.dataclass(frozen=True)
 class Cone:
-    """A cone about z, for instance a forearm, with a sheet that was bent around it and not stretched.
+    """A cone about z, for instance a forearm, with a sheet bent around it without stretching.
 
-    Distances on the sheet are distances on the cone. Column 0 lies on a straight line from (``radius_mm``, 0, 0) to the
-    side where z is larger; row 0 is square to it there and, as a straight strip on a cone, climbs away from it.
+    Distances on the sheet are distances on the cone. Column 0 is on a straight line from (``radius_mm``, 0, 0) toward
+    larger z; row 0 is perpendicular to it there and, as a straight strip on a cone, climbs away from it.
     """
 
     radius_mm: float
-    """At z = 0."""
+    """Radius at z = 0."""
     slope: float
-    """By how much the radius grows per mm along z; below 0: it shrinks."""
+    """Growth of the radius per mm along z; below 0: it shrinks."""
 
     def __post_init__(self) -> None:
         length("radius_mm", self.radius_mm, 0)
@@ -127,7 +127,7 @@ class Cone:
         return (shapes.vector(points), shapes.vector(normals)) if is_one(x_mm, y_mm) else (points, normals)
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's point nearest to this one; it lies within half a turn of column 0."""
+        """The place, in mm, of the surface's nearest point, within half a turn of column 0."""
         sine, cosine = self._sine, self._cosine
         tip = self.radius_mm / sine
         out = math.hypot(point_mm[0], point_mm[1]) - self.radius_mm
@@ -142,7 +142,7 @@ class MirroredSurface:
 
     surface: PlaneSurface | CylinderSurface | Cone | Mesh
     width_mm: float
-    """From the first to the last column."""
+    """Distance from the first to the last column."""
 
     @overload
     def place(self, x_mm: float, y_mm: float) -> tuple[Vector, Vector]: ...

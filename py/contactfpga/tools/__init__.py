@@ -1,1 +1,1 @@
-"""What a person uses: commands, the view in the browser, recordings."""
+"""Tools for people: commands, the view in the browser, recordings."""

@@ -1,4 +1,4 @@
-"""The command `contactfpga`: the table of its commands, and how they fail."""
+"""The command `contactfpga`: the table of its commands, and its error handling."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ COMMANDS = {
     "fit": "Find the cheapest Skin that is good enough for given scenes.",
     "study": "Run one of the studies: speed against accuracy, failures, flipped bits, the arm.",
 }
-"""Help of each command. The command itself is the module of this name in :mod:`contactfpga.tools.commands`, a
-:class:`Subcommand` or a :class:`TopicGroup`; it is imported when the command is called."""
+"""Help of each command. The command is the module of this name in :mod:`contactfpga.tools.commands`, a
+:class:`Subcommand` or a :class:`TopicGroup`, imported on call."""
 
 FIRST = {
     "view": "press a virtual sheet in the browser",
@@ -53,7 +53,7 @@ FIRST = {
     "zones": "see its contact zones, live",
     "build icebreaker --wiring": "see how to wire a sheet to a board",
 }
-"""What people do first, and what it is for: shown where no command is given."""
+"""First steps with their purpose, shown without a command."""
 
 RENAMED = {
     "chart": "study chart",
@@ -63,15 +63,15 @@ RENAMED = {
     "surface": "body surface",
     "recover": "record --recover",
 }
-"""Old names of commands, which work in this release; the next one refuses them."""
+"""Old names of commands, valid in this release only."""
 
 
 class Subcommand(Protocol):
-    """A command, or a topic of one. Its module loads with the host alone; what else ``run`` needs, it imports."""
+    """A command, or a topic of one. Its module loads with the host alone; ``run`` imports further needs."""
 
     @property
     def EXTRA(self) -> str | None:  # noqa: N802
-        """The extra with all that the command needs; None where that depends on the port."""
+        """The extra with all needs of the command; None if that depends on the port."""
 
     def add_flags(self, parser: argparse.ArgumentParser) -> None:
         """Add the command's flags to its parser."""
@@ -81,7 +81,7 @@ class Subcommand(Protocol):
 
 
 class TopicGroup(Protocol):
-    """A command of several topics: a package in which each topic is a module, a :class:`Subcommand`."""
+    """A command of several topics: a package with a module, a :class:`Subcommand`, per topic."""
 
     @property
     def TOPICS(self) -> dict[str, str]:  # noqa: N802
@@ -89,14 +89,14 @@ class TopicGroup(Protocol):
 
     @property
     def USUAL(self) -> tuple[str, str] | None:  # noqa: N802
-        """The topic that need not be named, and what its usage shows in place of the name."""
+        """The default topic, and its place in the usage."""
 
     def run(self, topic: Callable[[], int]) -> int:
-        """Run a topic; handles the errors that all topics have in common."""
+        """Run a topic; handles the errors common to all topics."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status; errors print one line that names the next step."""
+    """Run one command and return its exit status; errors print one line with the next step."""
     return interrupt.guarded(lambda: _run(arguments))
 
 
@@ -119,7 +119,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _first() -> str:
-    """The first steps, as lines that can be copied."""
+    """The first steps, as lines to copy."""
     commands = [f"contactfpga {words}" for words in FIRST]
     width = max(map(len, commands))
     steps = [f"  {command:{width}}   {what}" for command, what in zip(commands, FIRST.values())]
@@ -129,7 +129,7 @@ def _first() -> str:
 
 
 def _renamed(arguments: Sequence[str]) -> list[str]:
-    """The arguments with the name that a command has today; says so."""
+    """The arguments with the command's current name; reports a renaming."""
     old, *rest = arguments or [""]
     if old not in RENAMED:
         return list(arguments)
@@ -187,18 +187,17 @@ def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Name
 
 
 class _Help(argparse.HelpFormatter):
-    """Leaves addresses whole."""
+    """Formatter that keeps addresses whole."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         return terminal.wrapped(" ".join(text.split()), width).split("\n")
 
 
 class Parser(argparse.ArgumentParser):
-    """Takes options anywhere. By itself argparse refuses a word after an option where it could have been left out, as
-    the port in `contactfpga record FILE --seconds 2 PORT`.
+    """Accepts options anywhere. Plain argparse refuses a word after an option where it could have been omitted, as the
+    port in `contactfpga record FILE --seconds 2 PORT`.
 
-    ``add``: adds the arguments to the parser, once the parser is used. So what they need is not loaded for a parser
-    that is only listed.
+    ``add`` adds the arguments on first use, so that a listed parser does not load their needs.
     """
 
     _within = False
@@ -211,7 +210,7 @@ class Parser(argparse.ArgumentParser):
         self._add = add
 
     def complete(self) -> None:
-        """Add the arguments, if that has not been done yet."""
+        """Add the arguments, once."""
         add, self._add = self._add, None
         if add is not None:
             add(self)
@@ -226,17 +225,17 @@ class Parser(argparse.ArgumentParser):
         return {name: parser for action in actions for name, parser in action.choices.items()}
 
     def error(self, message: str) -> NoReturn:
-        """End with argparse's message, in which control characters of the arguments are shown as escapes."""
+        """End with argparse's message, with control characters escaped."""
         super().error(visible_lines(shortened(message)))
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Of a word that is no command, say which one was meant."""
+        """For an unknown command, suggest the intended one."""
         if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
             raise argparse.ArgumentError(action, f"{value!r} is none; {suggestion(value, action.choices)}")
         super()._check_value(action, value)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As argparse does, but with options anywhere."""
+        """Like argparse's, but with options anywhere."""
         topics = self.topics
         if self.usual_topic is not None and args and args[0] not in ("-h", "--help", *topics):
             args = [self.usual_topic, *args]

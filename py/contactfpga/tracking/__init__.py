@@ -1,1 +1,1 @@
-"""Contacts over time: ids that stay, from the zones of one frame after the other."""
+"""Contacts over time, with constant ids, from successive frames' zones."""

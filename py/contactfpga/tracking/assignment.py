@@ -1,4 +1,4 @@
-"""Which contact goes on in which zone: the pairs with the least total distance, with a limit on each."""
+"""Assignment of contacts to zones with the least total distance, and a limit on each."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 Costs = Sequence[Sequence[float]]
-"""A row for each contact, a column for each zone; infinite where the two cannot be one."""
+"""A row for each contact, a column for each zone; infinite for impossible pairs."""
 
 
 def assign(costs: Costs, alone: float) -> list[int | None]:
-    """For each row its column or None. The sum of the costs of all pairs, plus ``alone`` for each row without one, is
-    the least there is."""
+    """For each row its column or None, with the least sum of pair costs plus ``alone`` for each row without one."""
     found: list[int | None] = [None] * len(costs)
     for rows, columns in _groups(costs):
         if len(rows) == 1:
@@ -26,7 +25,7 @@ def assign(costs: Costs, alone: float) -> list[int | None]:
 
 
 def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns that hang together by a finite cost; contacts that lie far apart fall into many small groups."""
+    """Rows and columns connected by finite costs; distant contacts form many small groups."""
     groups: list[tuple[list[int], set[int]]] = []
     for row, line in enumerate(costs):
         rows, columns = [row], {column for column, cost in enumerate(line) if cost < math.inf}
@@ -41,7 +40,7 @@ def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
 
 
 def _optimal(costs: Costs, alone: float) -> list[int | None]:
-    """The Hungarian method by shortest augmenting paths, with a column of its own for each row that stays alone."""
+    """The Hungarian method by shortest augmenting paths, with an extra column for each row, to stay alone."""
     size, real = len(costs), len(costs[0])
     padded = [
         [*line, *(alone if other == row else math.inf for other in range(size))] for row, line in enumerate(costs)

@@ -1,4 +1,4 @@
-"""What a tracker remembers: a spot on the sheet, how it moves, and the contacts that have it."""
+"""State of a tracker: a spot on the sheet, its motion, and its contacts."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone
 
 SUDDEN = 4e6
-"""How suddenly a contact speeds up or turns: the spectral density of its acceleration, in mm^2/s^3."""
+"""Acceleration noise of a contact: spectral density in mm^2/s^3."""
 
 FAST_MM_S = 1500.0
-"""How fast a contact may be that was seen once: one standard deviation along each axis."""
+"""Standard deviation of the speed along each axis of a contact seen once."""
 
 SAME_S = 0.003
-"""For how long the error of a barycenter stays the same: it jumps when a cell opens or closes, and frames that follow
-one another more closely say nothing new."""
+"""Time for which a barycenter's error stays the same: it jumps when a cell opens or closes, and denser frames add
+nothing."""
 
 COAST_S = 0.05
-"""How far ahead a speed is believed."""
+"""Longest extrapolation by a speed."""
 
 
 class Known(NamedTuple):
-    """How well a place and a speed are known: covariance along each axis, in mm^2, mm^2/s and mm^2/s^2."""
+    """Covariance of place and speed along each axis, in mm^2, mm^2/s and mm^2/s^2."""
 
     place: float
     both: float
     speed: float
 
     def later(self, seconds: float) -> Known:
-        """What is left of it after a time in which the contact may have sped up or turned."""
+        """The covariance after a time of possible acceleration."""
         spread = SUDDEN * seconds
         place = self.place + seconds * (2 * self.both + seconds * (self.speed + spread / 3))
         return Known(place, self.both + seconds * (self.speed + spread / 2), self.speed + spread)
 
 
 NEW = Known(0.0, 0.0, FAST_MM_S**2)
-"""Of a contact that was seen once."""
+"""Covariance of a contact seen once."""
 
 
 @dataclasses.dataclass(slots=True)
@@ -49,15 +49,15 @@ class Member:
     id: int
     since_us: int
     area_mm2: float
-    """When it was last seen alone."""
+    """Its area when last seen alone."""
     dx: float = 0.0
-    """Where it came into the spot, from its barycenter, in mm; 0 while it is alone."""
+    """Its offset from the spot's barycenter on entering, in mm; 0 while alone."""
     dy: float = 0.0
     vx: float = 0.0
-    """How fast it came, in mm/s, beside the spot's own speed."""
+    """Its speed on entering, in mm/s, relative to the spot's."""
     vy: float = 0.0
     known: Known = NEW
-    """How well that was known."""
+    """Covariance of its entry."""
 
 
 class Spot:
@@ -65,27 +65,27 @@ class Spot:
 
     def __init__(self, zone: Zone, time_us: int, members: list[Member]):
         self.members = members
-        """The one that it goes by comes first."""
+        """Contacts of the spot, the one that names it first."""
         self.vx = self.vy = 0.0
         self.known = NEW
         self.joined_us = time_us
         self.small_us: int | None = None
-        """Since when it is no larger than it would be without one of its contacts."""
+        """Since when it is no larger than without one of its contacts."""
         self.place(zone, time_us)
 
     def place(self, zone: Zone, time_us: int) -> None:
-        """Put it there, as a zone that grew or shrank by a whole contact is not the place it moved to."""
+        """Move it there without speed, as a zone that grew or shrank by a whole contact has not moved."""
         self.zone, self.seen_us, self.held = zone, time_us, False
         self.x, self.y = self.fx, self.fy = self.from_x, self.from_y = place(zone)
         self.known = Known(error_mm2(zone), 0.0, self.known.speed)
 
     def ahead(self, time_us: int) -> tuple[float, float]:
-        """Where it would be then."""
+        """Expected place at a time."""
         seconds = min((time_us - self.seen_us) / 1e6, COAST_S)
         return self.fx + self.vx * seconds, self.fy + self.vy * seconds
 
     def follow(self, zone: Zone, time_us: int, around_mm: float | None) -> None:
-        """Go on in this zone: a Kalman filter of a contact with constant velocity."""
+        """Continue in this zone: a Kalman filter of constant velocity."""
         x, y = place(zone)
         seconds = (time_us - self.seen_us) / 1e6
         if seconds > 0:
@@ -98,7 +98,7 @@ class Spot:
             self.members[0].area_mm2 = zone.area_mm2
 
     def correct(self, off_x: float, off_y: float, known: Known, error: float) -> None:
-        """Take a zone that is so far from where this would be, as well as that was known."""
+        """Correct by a zone at this offset from the expected place, with both uncertainties."""
         at, both, speed = known
         gain, turn = at / (at + error), both / (at + error)
         self.fx, self.fy = self.fx + gain * off_x, self.fy + gain * off_y
@@ -120,12 +120,12 @@ class Spot:
 
     @property
     def area_mm2(self) -> float:
-        """Of all its contacts, as each was last seen alone."""
+        """Area of all its contacts, each as last seen alone."""
         return math.fsum(one.area_mm2 for one in self.members)
 
     def spare(self) -> Member | None:
-        """The contact without which it would be as large as it is; None where it takes them all. Of several, the one
-        farthest from its middle, or the newest."""
+        """The contact without which its area would fit; None if it needs all. Of several, the one farthest from its
+        middle, or the newest."""
         if len(self.members) == 1:
             return None
         total, area = self.area_mm2, self.zone.area_mm2
@@ -137,24 +137,24 @@ class Spot:
         return best if abs(total - best.area_mm2 - area) < abs(total - area) else None
 
     def track(self) -> Track:
-        """As users see it."""
+        """The track for users."""
         first = self.members[0]
         merged = tuple(one.id for one in self.members[1:]) if len(self.members) > 1 else ()
         return Track(first.id, self.zone, first.since_us, self.seen_us, self.vx, self.vy, self.held, merged)
 
 
 def place(zone: Zone) -> tuple[float, float]:
-    """Where a zone is; in a frame without ``mismatch`` each one is somewhere."""
+    """Place of a zone; without ``mismatch`` every zone has one."""
     assert zone.x_mm is not None
     assert zone.y_mm is not None
     return zone.x_mm, zone.y_mm
 
 
 def error_mm2(zone: Zone) -> float:
-    """Variance of its barycenter along each axis: that of a cell, as it says no more than which cells are closed."""
+    """Variance of its barycenter along each axis: that of a cell, the resolution of closed cells."""
     return zone.area_mm2 / (12 * zone.area_cells)
 
 
 def radius_mm(area_mm2: float) -> float:
-    """Of a disc of this area."""
+    """Radius of a disc of this area."""
     return math.sqrt(area_mm2 / math.pi)

@@ -1,6 +1,6 @@
 """Follows contacts from frame to frame.
 
-Contacts that come together in one zone, and zones that come apart, are told from a lift and a touch by their areas.
+Merging and parting zones are distinguished from lifts and touches by their areas.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LIMITS = {
     "shared_ms": (0.0, 60_000.0, "ms"),
     "move_mm": (0.1, 10_000.0, "mm"),
 }
-"""Least and most of each setting."""
+"""Least and largest value of each setting."""
 
 
 class Tracker:
@@ -95,7 +95,7 @@ class Tracker:
         return restarted
 
     def _step(self, zones: Zones) -> list[Zone]:
-        """Returns the zones that no contact has."""
+        """Process a frame; returns the zones without a contact."""
         pairs, lost, free = self._paired([zone for zone in zones if zone.x_mm is not None])
         winding = [zone for zone in zones if zone.winding]
         unsure = [zone for zone in free if zone.ghost] + winding
@@ -118,7 +118,7 @@ class Tracker:
         return unsure
 
     def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:
-        """Spots with the zones they go on in, spots that are not found, and zones that are new."""
+        """Spots with their continuing zones, spots not found, and new zones."""
         spots = self._spots
         if not spots or not seen:
             return [], list(spots), list(seen)
@@ -132,7 +132,7 @@ class Tracker:
         return pairs, lost, [zone for column, zone in enumerate(seen) if column not in taken]
 
     def _costs(self, spot: Spot, seen: list[Zone]) -> list[float]:
-        """Squared Mahalanobis distances from where it would be. One that stopped at once is within the gate, too."""
+        """Squared Mahalanobis distances from the expected place, with the gate widened for a sudden stop."""
         ahead_x, ahead_y = spot.ahead(self._time_us)
         seconds = (self._time_us - spot.seen_us) / 1e6
         spread = max((self._gate_mm / SIGMAS) ** 2, spot.known.later(seconds).place)
@@ -151,7 +151,7 @@ class Tracker:
         return math.hypot(across(zone_x - x, self._around_mm), zone_y - y)
 
     def _apart(self, spot: Spot, zone: Zone) -> float:
-        """From where a spot would be to a zone, in mm."""
+        """Distance from a spot's expected place to a zone, in mm."""
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _expects(self, spot: Spot, zone: Zone) -> bool:
@@ -185,7 +185,7 @@ class Tracker:
                 self._say("split", members[0].id, zone, (first,))
 
     def _held(self, spot: Spot, overflow: bool) -> bool:
-        """Whether a spot that this frame does not show may still be there; ends it if not."""
+        """Whether a spot missing in this frame may still exist; ends it if not."""
         if overflow or self._time_us - spot.seen_us < self._hold_us:
             return True
         self._end(spot)
@@ -222,42 +222,42 @@ class Tracker:
 
 
 SIGMAS = 3.0
-"""How many standard deviations the gate is away from a contact of which least is known."""
+"""Standard deviations of the gate for the least certain contact."""
 
 GOING_S = 1.0
-"""For how long two that share a zone go on as they came, on average."""
+"""Mean time for which two contacts in a shared zone keep their motion."""
 
 FIRST_S = 0.01
 
 LARGER = 1.0
-"""Standard deviation of the logarithm of how many times as large a contact is after it shared a zone."""
+"""Standard deviation of the logarithm of a contact's growth in a shared zone."""
 
 
 class Way(NamedTuple):
-    """How a contact may have come to a zone."""
+    """A hypothesis of how a contact reached a zone."""
 
     off_mm: float
-    """From where it would be."""
+    """Distance from the expected place."""
     odd: float
     """-2 times the logarithm of its density there, in 1/mm^2."""
 
 
 Apart = Callable[[Spot, Zone], float]
-"""From where a spot would be to a zone, in mm."""
+"""Distance from a spot's expected place to a zone, in mm."""
 
 Pairs = list[tuple[Spot, Zone]]
 
 MOST = 0.75
-"""Part of the areas that a zone must have to be made of several spots, or several zones of one spot."""
+"""Share of the areas that a zone must have to be made of several spots, or several zones of one spot."""
 
 REACH = 1.5
-"""A zone comes out of another, or goes into it, within the gate and so many radii of the larger one: a foot is long.
-One of several contacts comes out within so many gates of where it would be."""
+"""Gates for parting and merging: a zone leaves another, or enters it, within the gate plus this many radii of the
+larger zone, since feet are long. One of several contacts leaves within this many gates of its expected place."""
 
 
 def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_mm: float) -> dict[Spot, list[Spot]]:
-    """Which lost spots are now in the zone of another one. They are taken from ``lost``; a new zone that several make
-    up is taken from ``free`` and paired with the largest."""
+    """Lost spots that are now in another's zone. They are removed from ``lost``; a new zone that several form is
+    removed from ``free`` and paired with the largest."""
     found: dict[Spot, list[Spot]] = {}
     area = {spot: spot.zone.area_mm2 for spot, _ in pairs}
     for spot in list(lost):
@@ -292,9 +292,8 @@ def parted(
     expects: Callable[[Spot, Zone], bool],
     gate_mm: float,
 ) -> dict[Spot, list[Zone]]:
-    """Which new zones come out of which spot: where it was, and of what it lost in area; of a spot with several
-    contacts, where one of these would be. They are taken from ``free``, a lost spot that lies in several from
-    ``lost``."""
+    """New zones that leave each spot, by its place and lost area; for a spot with several contacts, by their expected
+    places. They are removed from ``free``, a lost spot in several from ``lost``."""
     found: dict[Spot, list[Zone]] = {}
     left = {spot: zone.area_mm2 for spot, zone in pairs if spot not in merges}
     for zone in list(free):
@@ -321,12 +320,12 @@ def parted(
 
 
 def touch_mm(one: Zone, other: Zone) -> float:
-    """How close two round contacts come before they have one zone."""
+    """Distance at which two round contacts share a zone."""
     return radius_mm(one.area_mm2) + radius_mm(other.area_mm2)
 
 
 def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: float | None) -> None:
-    """Put the contacts of all these into this zone, each where it would be."""
+    """Put the contacts of all these into this zone, at their expected places."""
     x, y = place(zone)
     for one in (spot, *others):
         ahead_x, ahead_y = one.ahead(time_us)
@@ -345,13 +344,13 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
 
 
 def _rank(member: Member) -> tuple[float, int]:
-    """A zone goes by the largest of its contacts: a finger on a switch that is stuck stays the finger."""
+    """Sort key of a zone's contacts, the largest first: a finger on a stuck switch stays the finger."""
     return -member.area_mm2, member.id
 
 
 def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[Way, Way]:
-    """How a contact of a spot may have come to a zone: it went on as it came, less surely the longer ago that is; or it
-    stopped, or went back to where it came in."""
+    """Hypotheses of a contact's way to a zone: it kept its motion, less surely with time; or it stopped, or returned to
+    its entry."""
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy
@@ -368,12 +367,12 @@ def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float
 
 
 def _larger(member: Member, zone: Zone) -> float:
-    """How odd the area of a zone is for a contact of a spot, likewise."""
+    """Misfit of a zone's area for a contact of a spot, as for its place."""
     return (math.log(zone.area_mm2 / member.area_mm2) / LARGER) ** 2
 
 
 def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float) -> bool:
-    """Whether one of several contacts of a spot may be where a zone is new."""
+    """Whether one of a spot's several contacts may be at a new zone."""
     return len(spot.members) > 1 and any(
         way.off_mm <= REACH * gate_mm for one in spot.members for way in _ways(spot, one, zone, time_us, around_mm)
     )
@@ -382,8 +381,8 @@ def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate
 def shared_out(
     spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
 ) -> list[tuple[Zone, list[Member]]]:
-    """The zones a spot came apart into, each with its contacts: one each by place and area, the rest where their places
-    are most likely; none for a zone that begins a contact."""
+    """The zones of a parted spot with their contacts: one each by place and area, the rest where most likely; none for
+    a zone that begins a contact."""
     ways = [[_ways(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
     off = [[min(way.off_mm for way in both) for both in line] for line in ways]
     odd = [[min(way.odd for way in both) for both in line] for line in ways]
@@ -407,7 +406,7 @@ def shared_out(
 
 
 def piece(spot: Spot, zone: Zone, members: list[Member], time_us: int, around_mm: float | None) -> Spot:
-    """What becomes of a spot in one of the zones that it came apart into."""
+    """The part of a spot in one of its zones."""
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     made = Spot(zone, time_us, members)

@@ -1,4 +1,4 @@
-"""What a tracker says after a frame: the contacts that are there, and what happened to them."""
+"""Output of a tracker after a frame: the present contacts, and their events."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Bytes on the wire: stuffing and check, packets and their fields, what a board says of itself (docs/protocol.md)."""
+"""Bytes on the wire: stuffing and check, packets and their fields, a board's hello (docs/protocol.md)."""

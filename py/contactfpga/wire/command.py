@@ -1,4 +1,4 @@
-"""Commands to a board, and what bytes to one ask for (docs/protocol.md)."""
+"""Commands to a board, and the requests in bytes to one (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from contactfpga.wire.hello import HEARD_DIGITS
 from contactfpga.wire.protocol import KIND_REQUEST, REQUEST_HELLO, may_number
 
 KIND_COMMAND = 10
-"""To the board."""
+"""Kind of packets to the board."""
 WHAT_DIGITS, VALUE_DIGITS = 1, 3
 MOST_WHAT, MOST_VALUE = (1 << DIGIT_BITS * WHAT_DIGITS) - 1, (1 << DIGIT_BITS * VALUE_DIGITS) - 1
 
@@ -34,12 +34,12 @@ COMMANDS = {
     THRESHOLD: ("threshold of a pressure unit", "units"),
     SUM_THRESHOLD: ("threshold of a weighted sum", "unit_sums"),
 }
-"""Name of each command, and what has to be in the Skin of a board that takes it."""
+"""Name of each command, and the Skin's option that it needs."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """Something that a board shall do."""
+    """An action of a board."""
 
     what: int
     """Its number, a key of :data:`COMMANDS`."""
@@ -68,13 +68,13 @@ def encode_command(number: int, command: Command, hello: bool = False, pulsed: b
 
 
 _MARK, _ONE, _ZERO = 0xF0, 0xFF, 0x00
-"""Of pulses: :func:`contactfpga.wire.framing.pulses`."""
+"""Pulses: :func:`contactfpga.wire.framing.pulses`."""
 _SIZES = {KIND_REQUEST: HEARD_DIGITS + 1, KIND_COMMAND: HEARD_DIGITS + WHAT_DIGITS + VALUE_DIGITS + 1}
-"""Plain bytes of each."""
+"""Plain bytes of each packet."""
 
 
 class RequestKind(enum.Enum):
-    """The most that is among them."""
+    """The strongest request in some bytes."""
 
     REQUEST = "requests for a frame or a hello, which change nothing"
     COMMAND = "a command"
@@ -82,7 +82,7 @@ class RequestKind(enum.Enum):
 
 
 def request_kind(data: bytes) -> RequestKind:
-    """What these bytes, which must be whole packets, ask for."""
+    """The strongest request in these bytes, which must be whole packets."""
     found = RequestKind.REQUEST if data else RequestKind.OTHER
     while data:
         mark = data[0]

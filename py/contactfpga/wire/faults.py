@@ -1,4 +1,4 @@
-"""What a board tells of its lines: faults by name, and the slots of its self-test (docs/protocol.md)."""
+"""A board's reports on its lines: faults by name, and the slots of its self-test (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from contactfpga.wire.framing import DIGIT_BITS, PacketError, digits, last_byte,
 
 KIND_FAULTS = 9
 SLOT = 1
-"""Flag of a packet that holds a slot of the self-test."""
+"""Flag of a packet with a slot of the self-test."""
 SLOT_DIGITS = 2
-"""Of a slot's number."""
+"""Digits of a slot's number."""
 
 STUCK, UNNAMED = "stuck", "unnamed fault"
-"""Names of a fault where a board cannot name it, and where its name has not come."""
+"""Names of a fault that the board cannot name, and before its name arrives."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,18 +32,18 @@ class Faults:
     columns_stuck: tuple[int, ...] = ()
     """Columns that read pressed while no row was driven; the guard column counts as the one after the last."""
     joined: bool = False
-    """The self-test found lines that are joined."""
+    """Whether the self-test found joined lines."""
     names: tuple[str, ...] = dataclasses.field(default=(), compare=False)
-    """The same in words, sorted, as in :attr:`Zones.faults`."""
+    """The faults in words, sorted, as in :attr:`Zones.faults`."""
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
+        """Whether there is a fault."""
         return bool(self.rows_open or self.columns_open or self.columns_stuck or self.joined)
 
     def named(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> Faults:
-        """The same with their names, for a sheet of so many rows and columns; switches that are masked check no line.
+        """The faults with names, for a sheet of this size; masked switches check no line.
 
-        Where all columns that are checked are open it is the guard row that is, and likewise for rows.
+        If all checked columns are open, the guard row is, and likewise for rows.
         """
         masked = set(mask)
         all_rows, all_columns = range(rows), range(columns)
@@ -74,17 +74,17 @@ class SelfTestSlot:
     rows: tuple[int, ...]
     """Rows that read as selected, counted from 0."""
     columns: tuple[int, ...]
-    """Columns likewise."""
+    """Columns that read as selected, counted from 0."""
 
 
 def digits_of(bits: int) -> int:
-    """Digits that a word of so many bits takes."""
+    """Digits of a word of this many bits."""
     return -(-bits // DIGIT_BITS)
 
 
 def fault_bits(rows: int, columns: int, guard: bool, self_test: bool) -> int:
-    """Of the word that a board tells: rows and columns that are open, columns and the guard column that are stuck, and
-    whether lines are joined; 0: it tells none."""
+    """Bits of the fault word: open rows and columns, stuck columns and guard column, and whether lines are joined; 0:
+    none."""
     return (rows + 2 * columns + 1 if guard else 0) + self_test
 
 
@@ -99,19 +99,19 @@ def encode_slot(slot: int, word: int, bits: int) -> bytes:
 
 
 def is_slot(plain: bytes) -> bool:
-    """Whether a packet of this kind is of the self-test."""
+    """Whether a packet of this kind belongs to the self-test."""
     return bool(plain[-1] & SLOT)
 
 
 def decode_faults(plain: bytes, rows: int, columns: int, guard: bool, self_test: bool) -> Faults:
-    """Read an unsealed report of faults; raises :class:`PacketError` where it is none of such a board."""
+    """Read an unsealed fault report; raises :class:`PacketError` if this board cannot have sent it."""
     parts = (rows, columns, columns + 1) if guard else (0, 0, 0)
     rows_open, columns_open, columns_stuck, joined = _lines(plain[:-1], *parts, int(self_test))
     return Faults(rows_open, columns_open, columns_stuck, bool(joined))
 
 
 def decode_slot(plain: bytes, rows: int, columns: int) -> SelfTestSlot:
-    """Read an unsealed slot of the self-test; raises :class:`PacketError` where it is none of such a sheet."""
+    """Read an unsealed slot of the self-test; raises :class:`PacketError` if this sheet's board cannot have sent it."""
     slot, word = plain[:SLOT_DIGITS], plain[SLOT_DIGITS:-1]
     if len(slot) < SLOT_DIGITS or not all(byte & 0x80 for byte in slot):
         raise PacketError("content", "a slot of the self-test has no number")
@@ -119,7 +119,7 @@ def decode_slot(plain: bytes, rows: int, columns: int) -> SelfTestSlot:
 
 
 def _lines(data: bytes, *widths: int) -> list[tuple[int, ...]]:
-    """Of each field of a word in digits, lowest first, the bits that are set."""
+    """The set bits of each field of a word in digits, lowest first."""
     if len(data) != digits_of(sum(widths)):
         raise PacketError("length", f"word of {len(data)} digits; lines of this sheet take {digits_of(sum(widths))}")
     word = number(data)

@@ -1,5 +1,4 @@
-"""Packets as they travel: stuffing, check bytes, delimiter, and the last byte that says what a packet is
-(docs/protocol.md, docs/framing.md)."""
+"""Framing of packets: stuffing, check bytes, delimiter, and the last byte with the kind (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ KINDS = {report.name: report.kind for report in REPORTS.values()}
 """Kind of a frame, by the Skin's ``report``."""
 
 OLD_KINDS = (2, 3)
-"""What a packet of protocol 1 has in the place of a kind."""
+"""Bytes of protocol 1 in place of a kind."""
 _OLD_HELLO_BITS = 0xF8, 0x20
 _OLD_HELLO_BYTES = 26
 
@@ -45,7 +44,7 @@ def last_byte(kind: int, flags: int = 0) -> int:
 
 
 class PacketError(ValueError):
-    """Bytes that are not a whole, valid packet. ``reason`` is a key of the driver's counters."""
+    """Invalid bytes for a packet. ``reason`` is a key of the driver's counters."""
 
     def __init__(self, reason: str, message: str):
         super().__init__(message)
@@ -77,7 +76,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(data: bytes) -> bytes:
-    """Undo :func:`cobs_encode`; raises :class:`PacketError` where the blocks do not fit the length."""
+    """Undo :func:`cobs_encode`; raises :class:`PacketError` if the blocks do not fit the length."""
     out = bytearray()
     position = 0
     while position < len(data):
@@ -96,9 +95,9 @@ _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
 def check_bytes(stuffed: bytes, before: bytes = b"") -> bytes:
-    """CRC-16/MCRF4XX of ``before`` and the stuffed bytes, lowest bits first, in three bytes that are never zero.
+    """CRC-16/MCRF4XX of ``before`` and the stuffed bytes, lowest bits first, in three nonzero bytes.
 
-    That CRC takes bits in the order of the line; the standard library has its mirror image.
+    It reads bits in line order; the standard library has the mirror image.
     """
     mirrored = binascii.crc_hqx((before + stuffed).translate(_MIRRORED), 0xFFFF)
     crc = _MIRRORED[mirrored >> 8] | _MIRRORED[mirrored & 0xFF] << 8
@@ -111,8 +110,8 @@ _PULSES[DELIMITER] = bytes([_MARK])
 
 
 def pulses(data: bytes) -> bytes:
-    """Bytes for a board whose bits on the line are too short to be sampled: each zero byte as a low level of 5 bits,
-    each bit of the others, lowest first, as one of 9 bits for a zero and of 1 for a one."""
+    """Bytes for a board whose bits on the line are too short to be sampled: each zero byte becomes a low level of 5
+    bits, each bit of the others, lowest first, one of 9 bits for a zero and of 1 for a one."""
     return b"".join(_PULSES[byte] for byte in data)
 
 
@@ -123,20 +122,20 @@ def seal(plain: bytes, before: bytes = b"") -> bytes:
 
 
 def unreadable(packet: bytes) -> bool:
-    """Whether a packet from the board may be whole, which only the board's fingerprint can show."""
+    """Whether a packet from the board may be whole, which only the board's fingerprint can decide."""
     marked = all(byte & 0x80 for byte in packet[-CHECK_BYTES:]) and packet[-1] < 0x84
     return len(packet) >= SHORTEST_PACKET and marked and not _bare(packet[-CHECK_BYTES - 1])
 
 
 def _bare(last: int) -> bool:
-    """Whether the check of a packet with this last byte covers nothing but its stuffed bytes."""
+    """Whether the check of a packet with this last byte covers only its stuffed bytes."""
     return last >> FLAG_BITS in (KIND_HELLO, *OLD_KINDS)
 
 
 def unseal(packet: bytes, before: bytes) -> bytes:
     """Undo :func:`seal` for a packet from the board, without its delimiter; raises :class:`PacketError`.
 
-    ``before``: what the checks of all packets but hellos cover besides
+    ``before``: additional bytes in the checks of all packets except hellos
     (:func:`contactfpga.wire.protocol.check_prefix`).
     """
     stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]

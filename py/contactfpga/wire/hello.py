@@ -1,4 +1,4 @@
-"""What a board says of itself: fields by type and length, so that later boards can say more (docs/protocol.md)."""
+"""Hellos: fields by type and length, so that later boards can add fields (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _REPORTS = tuple(report.name for report in sorted(REPORTS.values(), key=lambda r
 _SENDS = ("always", "on_change")
 _FINGERPRINT_BYTES = 8
 _CLOSED = 0x80
-"""Beside the connectivity, where the ends of the sheet meet: a reader that does not know this refuses the hello."""
+"""Flag, beside the connectivity, of a sheet whose ends meet; readers that do not know it refuse the hello."""
 
 SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
 STATE_DIGITS = 16
-"""Of which the last is not used yet."""
+"""Digits of the state; the last is unused."""
 
 STATE_OFFSET = 16
-"""Of the first digit in a hello as :func:`encode_hello` writes it, from the leading delimiter on."""
+"""Offset of the first digit in a hello of :func:`encode_hello`, from the leading delimiter on."""
 
 _SIZES = {
     SHEET: _SHEET.size,
@@ -46,10 +46,10 @@ _SIZES = {
     PLACE: len(SheetPlace._fields),
     CHECK: _CHECK.size,
 }
-"""The least bytes of a field."""
+"""Least bytes of a field."""
 _MANDATORY = {SHEET, STATE, PITCH, FINGERPRINT, RATES}
 _MOST_BYTES = 8192
-"""A hello that is longer is none."""
+"""Most bytes of a hello."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -64,22 +64,22 @@ class Hello:
     sheet: Sheet
     fingerprint: bytes
     name: str
-    """The Skin's."""
+    """Name of the Skin."""
     clock_hz: int
     baud: int
     send: str
     guard: bool
-    """The board has guard lines, and reports faults by name."""
+    """Whether the board has guard lines, and reports faults by name."""
     commands: bytes
-    """Numbers of the commands that the board takes; see :meth:`Board.command`."""
+    """Numbers of the board's commands; see :meth:`Board.command`."""
     units: UnitFacts | None = None
-    """Its pressure units; None: it has none."""
+    """Its pressure units; None: none."""
     place: SheetPlace | None = None
-    """The sheet's number among several at one FPGA, and how many there are; None for a board with one sheet."""
+    """The sheet's number among several on one FPGA, and their count; None for a board with one sheet."""
     sent: int
     """Frames sent since power-up."""
     epoch: int
-    """Whole times 2^22 us since power-up."""
+    """Whole periods of 2^22 us since power-up."""
     heard: int
     """Number of the last request received; see :func:`contactfpga.wire.protocol.may_number`."""
     stuck: int
@@ -87,21 +87,21 @@ class Hello:
 
     @property
     def self_test(self) -> bool:
-        """The board can test its lines."""
+        """Whether the board can test its lines."""
         return SELF_TEST in self.commands
 
     @property
     def pulsed(self) -> bool:
-        """Whether requests go to the board as pulses: it has fewer than 4 clocks per bit."""
+        """Whether the board needs requests as pulses: it has fewer than 4 clocks per bit."""
         return pulsed(self.clock_hz, self.baud)
 
 
 def encode_hello(
     skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0, place: SheetPlace | None = None
 ) -> bytes:
-    """The hello of a board built from ``skin``, as on the wire, with a delimiter at either end.
+    """The hello of a board of ``skin``, as on the wire, with a delimiter at either end.
 
-    ``place``: of the sheet among several ones; the packet itself is not numbered here.
+    ``place``: of the sheet among several; the packet itself is not numbered here.
     """
     sheet = _SHEET.pack(
         skin.rows,
@@ -135,14 +135,14 @@ def encode_hello(
 
 
 class HelloReader:
-    """Collects hellos, which may come in several packets."""
+    """Collects hellos, which may span several packets."""
 
     def __init__(self) -> None:
         self._fields: dict[int, bytes] = {}
         self._checked = bytearray()
 
     def take(self, plain: bytes) -> Hello | None:
-        """An unsealed packet of kind hello; returns the hello that it completes. Raises :class:`PacketError`."""
+        """Add an unsealed hello packet; returns the hello that it completes. Raises :class:`PacketError`."""
         try:
             return self._take(plain[:-1])
         except PacketError:
@@ -246,7 +246,7 @@ def _counters(state: bytes) -> dict[str, int]:
 
 
 def begins_hello(packet: bytes) -> bool:
-    """Whether a packet, without delimiters, is a hello or the first one of several."""
+    """Whether a packet, without delimiters, is a hello or the first part of one."""
     if len(packet) < framing.SHORTEST_PACKET:
         return False
     if packet[-CHECK_BYTES - 1] >> framing.FLAG_BITS != framing.KIND_HELLO:  # quicker than the check
@@ -258,7 +258,7 @@ def begins_hello(packet: bytes) -> bool:
 
 
 def find_hello(data: bytes, last: bool = False) -> int:
-    """Where the first, or the ``last``, whole hello in ``data`` begins; -1: there is none."""
+    """Start of the first, or the ``last``, whole hello in ``data``; -1: none."""
     found, start = -1, 0
     while (end := data.find(0, start)) >= 0:
         if begins_hello(data[start:end]):
@@ -274,10 +274,10 @@ class Cutter:
 
     def __init__(self) -> None:
         self.held = b""
-        """The beginning of a packet that is not whole."""
+        """The beginning of an incomplete packet."""
 
     def take(self, data: bytes) -> tuple[bytes, bytes]:
-        """Bytes before the cut, and after it, which is empty as long as no hello has come."""
+        """Bytes before and after the cut; the latter are empty until a hello comes."""
         data = self.held + data
         at = find_hello(data)
         if at >= 0:
@@ -290,13 +290,13 @@ class Cutter:
 
 
 def report_of(sheet: Sheet) -> str:
-    """What a board reports."""
+    """A board's report."""
     precise = f" of {sheet.barycenter_bits} fraction bits" if sheet.report == "barycenter" else ""
     return f"report {sheet.report!r}{precise}"
 
 
 def describe(hello: Hello) -> str:
-    """The Skin that a board tells of."""
+    """The Skin in a board's hello."""
     sheet = hello.sheet
     name = f" named {hello.name!r}" if hello.name else ""
     return (
@@ -306,7 +306,7 @@ def describe(hello: Hello) -> str:
 
 
 def difference(hello: Hello, expected: Skin) -> str:
-    """What a board was built from, and how that differs from the Skin that was expected."""
+    """The Skin of a board, and its difference from the expected one."""
     told, asked = _facts(hello), _expected_facts(expected)
     differing = [f"{name} is {told[name]}, asked for was {asked[name]}" for name in told if told[name] != asked[name]]
     if differing:

@@ -1,5 +1,5 @@
-"""Many frames at once, as arrays. What is not a whole frame of the sheet is left to :mod:`contactfpga.wire.framing` and
-:func:`contactfpga.wire.protocol.decode_frame`, which read packets one by one and say what is wrong with them."""
+"""Many frames at once, as arrays. Anything but whole frames of the sheet is left to :mod:`contactfpga.wire.framing` and
+:func:`contactfpga.wire.protocol.decode_frame`, which read packets one by one and name their errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from contactfpga.wire.framing import FLAG_BITS, check_bytes
 from contactfpga.wire.protocol import FLAGS, KINDS
 
 _LONGEST = 254
-"""Bytes of a stuffed packet in which no block can be full."""
+"""Bytes of a stuffed packet without full blocks."""
 _FLAG_MASK = (1 << len(FLAGS)) - 1
 OVERFLOW, MISMATCH, FAULT, MOTION = (1 << bit for bit in range(len(FLAGS)))
 """Bits of :data:`FIELDS`' ``flags``."""
@@ -33,7 +33,7 @@ FIELDS = np.dtype(
     ],
     align=True,
 )
-"""Of a packet: whether it is a whole frame, and then what :class:`~contactfpga.wire.protocol.Frame` calls so; ``items``
+"""Fields of a packet: whether it is a whole frame, then those of :class:`~contactfpga.wire.protocol.Frame`; ``items``
 counts its records."""
 
 
@@ -44,10 +44,10 @@ class PacketTable:
     packets: np.ndarray
     """(n,) of :data:`FIELDS`."""
     starts: np.ndarray
-    """(n + 1,) where each one's records begin."""
+    """(n + 1,) starts of each packet's records."""
     records: np.ndarray
-    """(m, 3) int64, of all of them in order: area and sums, or area and barycenter; (m, 4) where the ends of the sheet
-    meet, as :attr:`contactfpga.wire.protocol.Frame.moments`."""
+    """(m, 3) int64 of all packets in order: area and sums, or area and barycenter; (m, 4) for a sheet whose ends meet,
+    as :attr:`contactfpga.wire.protocol.Frame.moments`."""
 
     def part(self, start: int, end: int) -> PacketTable:
         """Of some of them."""
@@ -55,10 +55,8 @@ class PacketTable:
 
 
 def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTable:
-    """Read packets as they came between delimiters; ``before`` as for :func:`contactfpga.wire.framing.unseal`.
-
-    The report of the sheet must have zones.
-    """
+    """Read packets between delimiters, of a sheet whose report has zones; ``before`` as for
+    :func:`contactfpga.wire.framing.unseal`."""
     found = np.zeros(len(packets), FIELDS)
     sizes = list(map(len, packets))
     lengths = np.array(sizes)
@@ -83,7 +81,7 @@ def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTab
 
 
 def _group(data: np.ndarray, items: int, widths: Widths, before: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Fields of packets of one length, and (n, items, 3) records of the valid ones, or (n, items, 4)."""
+    """Fields of packets of one length, and (n, items, 3) or (n, items, 4) records of the valid ones."""
     stuffed = data[:, :-CHECK_BYTES]
     plain, fits = _unstuff(stuffed)
     valid = fits & _checked(data, before) & (plain[:, -1] >> FLAG_BITS == KINDS[widths.sheet.report])
@@ -113,7 +111,7 @@ def _group(data: np.ndarray, items: int, widths: Widths, before: bytes) -> tuple
 
 
 def _unstuff(stuffed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Undo COBS where no block is full: the plain bytes, and whether the blocks fit."""
+    """Undo COBS without full blocks: the plain bytes, and whether the blocks fit."""
     count, length = stuffed.shape
     padded = np.zeros((count, length + 2), np.uint8)  # at the two places after the end nothing moves any more
     padded[:, :length] = stuffed
@@ -128,7 +126,7 @@ def _unstuff(stuffed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked(data: np.ndarray, before: bytes) -> np.ndarray:
-    """Whether the check bytes are right."""
+    """Whether the check bytes are correct."""
     table, constant = _crc_table(data.shape[1] - CHECK_BYTES), _constant(data.shape[1] - CHECK_BYTES, before)
     crc = np.bitwise_xor.reduce(np.take(table, data[:, :-CHECK_BYTES] + _row_starts(data.shape[1])), axis=1) ^ constant
     right: np.ndarray = data[:, -1] == 0x80 | crc >> 14
@@ -144,7 +142,7 @@ def _row_starts(length: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=256)
 def _crc_table(length: int) -> np.ndarray:
-    """(length * 256,) uint16: what each value of each byte changes in the CRC, which is linear."""
+    """(length * 256,) uint16: contribution of each value of each byte to the linear CRC."""
     one = np.zeros(256, np.uint16)
     for value in range(256):
         crc = value
@@ -165,7 +163,7 @@ def _constant(length: int, before: bytes) -> int:
 
 
 def _words(data: np.ndarray) -> np.ndarray:
-    """int64 of the last axis's bytes, lowest first."""
+    """int64 words of the last axis's bytes, lowest first."""
     padded = np.zeros((*data.shape[:-1], 8), np.uint8)
     padded[..., : data.shape[-1]] = data
     return padded.view("<i8")[..., 0]
@@ -180,7 +178,7 @@ def _split(words: np.ndarray, widths: Sequence[int]) -> Iterator[np.ndarray]:
 
 
 def _agrees(fields: np.ndarray, items: int, widths: Widths) -> np.ndarray:
-    """Whether a frame carries as many zones as it says, and says no more than there can be."""
+    """Whether a frame has as many zones as it states, at most the possible number."""
     zones = fields["zones"]
     carried, overflow = np.minimum(zones, widths.max_items), fields["flags"] & OVERFLOW > 0
     agrees: np.ndarray = (carried == items) & (overflow == (carried < zones)) & (zones <= widths.sheet.max_zones())
@@ -188,7 +186,7 @@ def _agrees(fields: np.ndarray, items: int, widths: Widths) -> np.ndarray:
 
 
 def _possible(fields: np.ndarray, records: np.ndarray, widths: Widths) -> np.ndarray:
-    """Whether zones and cells can be of one sheet."""
+    """Whether zones and cells are possible for one sheet."""
     area, x, y = (records[..., column] for column in range(3))
     scale = 1 << widths.sheet.barycenter_bits if widths.report.divided else area
     inside = (x <= (widths.sheet.columns - 1) * scale) & (y <= (widths.sheet.rows - 1) * scale) & (area > 0)

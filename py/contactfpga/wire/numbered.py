@@ -1,9 +1,8 @@
 """Packets of a numbered sheet: several sheets share one FPGA and its line (docs/protocol.md).
 
-Such a packet is an ordinary one with two bytes after its stuffed bytes, which the check covers too. Where the check is
-right after they are taken out and the CRC is run backward over them, it was right before, and the other way round. So
-whoever sorts packets by sheets need not know what the check covers besides, and hands on what a board of that one
-sheet would send.
+Such a packet is an ordinary one with two bytes after its stuffed bytes, which the check also covers. Removing them and
+running the CRC backward over them keeps the check right or wrong. So sorting packets by sheet does not require knowing
+the check's prefix, and yields what a board of that one sheet would send.
 """
 
 from __future__ import annotations
@@ -17,30 +16,30 @@ from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
 
 KIND_NUMBERED = 11
 NUMBER_BYTES = 2
-"""How many bytes longer a numbered packet is."""
+"""Extra bytes of a numbered packet."""
 _BLOCK = 2
 """A stuffed zero ends the packet itself; the block after it is one byte long."""
 _MARKS = (0x80, 0x80, 0xFC)
-"""Bits of the check bytes that are none of the CRC's."""
+"""Bits of the check bytes that are not part of the CRC."""
 _BITS = (DIGIT_BITS, DIGIT_BITS, 16 - 2 * DIGIT_BITS)
 _POLYNOMIAL = 0x8408
 
 
 class SheetPlace(NamedTuple):
-    """Where a sheet stands among those of its FPGA."""
+    """A sheet's position among those of its FPGA."""
 
     number: int
-    """From 0 on."""
+    """Number from 0 on."""
     sheets: int
 
 
 def closing(number: int) -> bytes:
-    """The two bytes that come after a packet's stuffed bytes."""
+    """The two bytes after a packet's stuffed bytes."""
     return bytes([_BLOCK, framing.last_byte(KIND_NUMBERED, number)])
 
 
 def sheet_of(packet: bytes) -> int | None:
-    """The number that a packet, without delimiters, says; None: it says none. Its check is not looked at."""
+    """The number in a packet without delimiters; None: none. The check is not verified."""
     if len(packet) < framing.SHORTEST_PACKET + NUMBER_BYTES:
         return None
     block, last = packet[-CHECK_BYTES - NUMBER_BYTES : -CHECK_BYTES]
@@ -55,13 +54,13 @@ def unnumbered(packet: bytes) -> bytes:
 
 
 def numbered(packet: bytes, number: int) -> bytes:
-    """An ordinary packet as that of a numbered sheet, both without delimiters."""
+    """An ordinary packet converted to a numbered sheet's, both without delimiters."""
     stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
     return stuffed + closing(number) + _moved(check, closing(number), _on)
 
 
 def numbered_requests(data: bytes, number: int) -> bytes:
-    """The same for whole requests and commands with their delimiters, as bytes or as pulses."""
+    """Numbered versions of whole requests and commands with their delimiters, as bytes or as pulses."""
     return b"".join(_numbered_request(packet, pulsed, number) for packet, pulsed in _requests(data))
 
 
@@ -81,7 +80,7 @@ def _requests(data: bytes) -> Iterator[tuple[bytes, bool]]:
 
 
 def _of_pulses(bits: bytes) -> bytes:
-    """Undo :func:`contactfpga.wire.framing.pulses` for bytes that are no delimiters."""
+    """Undo :func:`contactfpga.wire.framing.pulses` for bytes without delimiters."""
     levels = [bit & 1 for bit in bits]
     return bytes(sum(levels[at + place] << place for place in range(8)) for at in range(0, len(levels), 8))
 
@@ -101,7 +100,7 @@ def _moved(check: bytes, data: bytes, step: Callable[[int, int], int]) -> bytes:
 
 
 def _on(crc: int, byte: int) -> int:
-    """The CRC with a byte more."""
+    """The CRC after one more byte."""
     crc ^= byte
     for _ in range(8):
         crc = crc >> 1 ^ _POLYNOMIAL * (crc & 1)

@@ -1,4 +1,4 @@
-"""What travels on the wire: packets and their fields (docs/protocol.md)."""
+"""Packets on the wire and their fields (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -87,13 +87,13 @@ FLAGS = ("overflow", "mismatch", "fault", "motion")
 """Names of a frame's flags, lowest bit first."""
 
 KIND_REQUEST = 5
-"""To the board."""
+"""Kind of packets to the board."""
 REQUEST_HELLO = 1
-"""Flag of a request that asks for a hello as well."""
+"""Flag of a request for a hello as well."""
 
 
 def encode_request(number: int, hello: bool = False, pulsed: bool = False) -> bytes:
-    """A request with a number that :func:`may_number` allows, as on the wire, with a delimiter at either end;
+    """A request with a number allowed by :func:`may_number`, as on the wire, with a delimiter at either end;
     ``pulsed``: as :func:`~contactfpga.wire.framing.pulses`."""
     assert may_number(number), f"{number} is no number of a request"
     plain = digits(number, HEARD_DIGITS) + bytes([last_byte(KIND_REQUEST, REQUEST_HELLO * hello)])
@@ -102,19 +102,19 @@ def encode_request(number: int, hello: bool = False, pulsed: bool = False) -> by
 
 
 def may_number(number: int) -> bool:
-    """Whether a request may have this number: no digit of it is 0, nor are the bits that frames repeat."""
+    """Whether a request may have this number: no digit is 0, nor are the bits that frames repeat."""
     each = (number >> DIGIT_BITS * place & 0x7F for place in range(HEARD_DIGITS))
     return 0 <= number < 1 << DIGIT_BITS * HEARD_DIGITS and all(each) and number % (1 << HEARD_BITS) != 0
 
 
 def check_prefix(skin: Skin | Hello) -> bytes:
-    """What the check of frames covers besides their bytes: the start of the board's fingerprint."""
+    """Prefix of the frames' check: the start of the board's fingerprint."""
     return skin.fingerprint[:2]
 
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """One frame as it came over the wire."""
+    """One received frame."""
 
     sequence: int
     """Frames sent before this one, modulo 256."""
@@ -124,26 +124,26 @@ class Frame:
     overwritten: int
     """Complete frames that a newer one replaced before they were sent, modulo 2^``Widths.overwritten_bits``."""
     heard: int
-    """The lowest bits of the number of the last request received before the frame was scanned; 0: none."""
+    """The lowest bits of the number of the last request received before the frame's scan; 0: none."""
     zones: int
-    """Zones on the sheet, also those beyond the capacity; 0 with ``report = "cells"``."""
+    """Zones on the sheet, including those beyond the capacity; 0 with ``report = "cells"``."""
     cells: int
     """Pressed switches."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each zone the frame carries; (0, 3) with another report than ``moments``.
-    (n, 4) where the ends of the sheet meet: and the cells past the seam (:mod:`contactfpga.zones.around`)."""
+    """(n, 3) int64: area, sum x, sum y of each zone in the frame; (0, 3) with another report than ``moments``. (n, 4)
+    for a sheet whose ends meet, with the cells past the seam (:mod:`contactfpga.zones.around`)."""
     bitmap: np.ndarray | None
     """(rows, columns) bool with ``report = "cells"``, else None."""
     barycenters: np.ndarray | None = None
-    """With ``report = "barycenter"`` (n, 3) int64: area, x, y of each zone the frame carries, x and y in cells /
+    """With ``report = "barycenter"`` (n, 3) int64: area, x, y of each zone in the frame, x and y in cells /
     2^``barycenter_bits``; else None."""
 
 
 def decode_frame(plain: bytes, widths: Widths) -> Frame:
-    """Read an unsealed frame of the sheet that ``widths`` are of.
+    """Read an unsealed frame of the sheet of ``widths``.
 
-    Raises :class:`PacketError` unless its length agrees with its zone count and, where the board does not itself
-    flag a mismatch, its cells with its zones.
+    Raises :class:`PacketError` if its length contradicts its zone count, or, without a mismatch flag, its cells
+    contradict its zones.
     """
     sheet = widths.sheet
     kind = KINDS[sheet.report]
@@ -197,7 +197,7 @@ FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1
 
 
 def _check_sums(frame: Frame, widths: Widths) -> None:
-    """Zones and cells of one sheet agree; raises :class:`PacketError`."""
+    """Check that zones and cells are possible for one sheet; raises :class:`PacketError`."""
     sheet = widths.sheet
     if frame.bitmap is not None:
         carried = int(frame.bitmap.sum())
@@ -234,7 +234,7 @@ def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
 
 
 def _barycenters(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    """The same with ``report = "barycenter"``; where all cells of the sheet are sent as 0 they are put back."""
+    """(zones, 3) int64 with ``report = "barycenter"``; all cells of the sheet, sent as 0, are restored."""
     records = _records(data, zones, widths)
     if widths.cells == 1 << widths.record_bits[0] and zones:
         records[records[:, 0] == 0, 0] = widths.cells
@@ -250,7 +250,7 @@ def _bitmap(data: bytes, widths: Widths) -> np.ndarray:
 
 
 def _split(word: int, *widths: int) -> list[int]:
-    """Fields of a word, lowest first, and what is left above them."""
+    """Fields of a word, lowest first, and the rest above them."""
     fields = []
     for width in widths:
         fields.append(word & (1 << width) - 1)

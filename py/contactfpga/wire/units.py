@@ -1,4 +1,4 @@
-"""What a board tells of its pressure units, and the commands that set their zeros and thresholds (docs/protocol.md)."""
+"""A board's pressure units, and the commands for their zeros and thresholds (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ OVER, ARMED = 1, 2
 """Flags: a threshold is reached, and there is one."""
 
 MOST_BITS = 28
-"""Of a reading."""
+"""Largest number of bits of a reading."""
 MOST_SUM_BITS = MOST_BITS + 7 + 3
-"""Of a sum's largest amount: readings times weights of seven bits, of eight units."""
+"""Bits of the largest magnitude of a sum: readings times weights of seven bits, of eight units."""
 
 _FACTS = struct.Struct("<BBBBHI")
 FACTS_BYTES = _FACTS.size
@@ -34,34 +34,34 @@ FACTS_BYTES = _FACTS.size
 
 @dataclasses.dataclass(frozen=True)
 class UnitFacts:
-    """What a hello says of a board's pressure units."""
+    """The pressure units in a hello."""
 
     count: int
     bits: int
-    """Of a reading."""
+    """Bits of a reading."""
     sums: int
     sum_bits: int
-    """Of the largest amount of a sum; 0: there is none."""
+    """Bits of the largest magnitude of a sum; 0: none."""
     spacing_clocks: int
-    """From a unit's sample to that of the next one; 0: all are sampled at once."""
+    """Clocks from a unit's sample to the next one's; 0: simultaneous samples."""
     sweep_clocks: int
-    """From one sweep to the next."""
+    """Clocks from one sweep to the next."""
 
     @classmethod
     def of(cls, units: Units) -> UnitFacts:
-        """What the hello of a Skin's board says of its units."""
+        """The units in the hello of a Skin's board."""
         skin = units.skin
         sums = len(skin.unit_sums)
         clocks = units.spacing_clocks, units.sweep_clocks
         return cls(skin.units, units.converter.bits, sums, units.sum_bits, *clocks)
 
     def encode(self) -> bytes:
-        """As in a hello."""
+        """The value in a hello."""
         return _FACTS.pack(*dataclasses.astuple(self))
 
     @classmethod
     def decode(cls, value: bytes) -> UnitFacts:
-        """Raises ValueError."""
+        """Read a hello's value. Raises ValueError."""
         facts = cls(*_FACTS.unpack_from(value))
         if not (1 <= facts.count <= 1 << INDEX_BITS and 1 <= facts.bits <= MOST_BITS and facts.sweep_clocks):
             raise ValueError(f"{facts.count} units of {facts.bits} bits, {facts.sweep_clocks} clocks a sweep")
@@ -72,7 +72,7 @@ class UnitFacts:
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """The readings of all units, one after the other."""
+    """The readings of all units in turn."""
 
     time_us: int
     """Device time of the first unit's sample, modulo 2^24 us."""
@@ -80,9 +80,9 @@ class Sweep:
     """Sweeps before this one, modulo 256."""
     readings: tuple[int, ...]
     over: bool
-    """A threshold is reached."""
+    """Whether a threshold is reached."""
     armed: bool
-    """The board has a threshold."""
+    """Whether the board has a threshold."""
 
 
 def plain_bytes(units: int, bits: int) -> int:
@@ -98,7 +98,7 @@ def encode_sweep(sweep: Sweep, bits: int) -> bytes:
 
 
 def decode_sweep(plain: bytes, facts: UnitFacts) -> Sweep:
-    """Read an unsealed packet; raises :class:`PacketError` where it is none of such a board."""
+    """Read an unsealed packet; raises :class:`PacketError` if this board cannot have sent it."""
     if len(plain) != plain_bytes(facts.count, facts.bits):
         raise PacketError("length", f"sweep of {len(plain)} bytes; {facts.count} units take another number")
     width, trailer = digits_of_reading(facts.bits), number(plain[-TRAILER_DIGITS - 1 : -1])
@@ -113,17 +113,18 @@ def decode_sweep(plain: bytes, facts: UnitFacts) -> Sweep:
 
 
 def zero_value(facts: UnitFacts, unit: int, reading: object) -> tuple[int, int]:
-    """(what, value) of the command that says what a unit reads without load. Raises ValueError."""
+    """(what, value) of the command that sets a unit's zero. Raises ValueError."""
     return _value(ZERO, "unit", unit, facts.count, "zero", reading, facts.bits)
 
 
 def threshold_value(facts: UnitFacts, unit: int, deviation: object) -> tuple[int, int]:
-    """(what, value) of the command that sets the deviation from which on a unit raises ``contact``; 0: never."""
+    """(what, value) of the command that sets the deviation from which a unit raises ``contact``; 0: never."""
     return _value(THRESHOLD, "unit", unit, facts.count, "threshold", deviation, facts.bits)
 
 
 def sum_threshold_value(facts: UnitFacts, index: int, deviation: object) -> tuple[int, int]:
-    """The same of a weighted sum; rounded down where the board has no finer steps, but not to 0."""
+    """(what, value) of the command that sets a weighted sum's threshold, rounded down to the board's steps, but not to
+    0."""
     return _value(SUM_THRESHOLD, "sum", index, facts.sums, "threshold", deviation, facts.sum_bits)
 
 

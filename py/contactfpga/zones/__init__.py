@@ -1,1 +1,1 @@
-"""What a frame says of the sheet: zones, their places, many frames as arrays, labels and ghosts found on the host."""
+"""Zones of a frame and their places, many frames as arrays, and labels and ghosts found on the host."""

@@ -1,8 +1,8 @@
-"""Zones of a sheet whose ends meet: columns counted on past the seam, and zones that this does not give a place.
+"""Zones of a sheet whose ends meet: columns counted on past the seam, and zones without a place.
 
-A record then has a fourth number: how many of the zone's cells lie past the seam, seen from the others. As many as
-there are: the zone is a ``ring``, a way through its cells leads round the cylinder and back. More: it is ``wound``, its
-cells lie on more than two turns. Such a zone has a y but no x.
+Records have a fourth number: the zone's cells past the seam, relative to the others. All of them: the zone is a
+``ring``, whose cells form a closed path around the cylinder. More: it is ``wound``, its cells are on more than two
+turns. Such a zone has a y but no x.
 """
 
 from __future__ import annotations
@@ -10,24 +10,22 @@ from __future__ import annotations
 import numpy as np
 
 WINDINGS = ("", "ring", "wound")
-"""Names of what :func:`windings` tells; the first one is an ordinary zone."""
+"""Names for :func:`windings`; the first is an ordinary zone."""
 
 Run = tuple[int, int, int]
 """Row, first column, column after the last one."""
 
 
 def windings(records: np.ndarray) -> np.ndarray:
-    """(n,) int64, places in :data:`WINDINGS`, of (n, 4) records."""
+    """(n,) int64 indexes in :data:`WINDINGS` of (n, 4) records."""
     area, turned = records[:, 0], records[:, 3]
     found: np.ndarray = np.where(area == 0, 0, (turned >= area).astype(np.int64) + (turned > area))
     return found
 
 
 def flat(records: np.ndarray, columns: int) -> np.ndarray:
-    """(n, 3) int64: area and sums of (n, 4) records, with the columns counted on past the seam where that gives an x.
-
-    The x of a zone then lies from 0 to ``columns``.
-    """
+    """(n, 3) int64: area and sums of (n, 4) records, with columns counted on past the seam for zones with an x, which
+    is from 0 to ``columns``."""
     area, sum_x, sum_y, turned = records.T
     around = columns * np.maximum(area, 1)
     unwrapped = (sum_x + columns * turned) % around
@@ -35,12 +33,12 @@ def flat(records: np.ndarray, columns: int) -> np.ndarray:
 
 
 def across(distance: float, around: float | None) -> float:
-    """A distance along x, the shorter way around a cylinder of this circumference; None: there is no way around."""
+    """A distance along x, the shorter way around a cylinder of this circumference; None: no cylinder."""
     return distance if around is None else (distance + around / 2) % around - around / 2
 
 
 def label(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
-    """What :func:`contactfpga.zones.labels.label` finds, and the (n, 4) records of the zones."""
+    """The result of :func:`contactfpga.zones.labels.label`, and the (n, 4) records of the zones."""
     runs = _runs(cells)
     neighbors = _neighbors(runs, cells.shape[1], connectivity)
     turns: dict[int, int] = {}
@@ -66,7 +64,7 @@ def _runs(cells: np.ndarray) -> list[Run]:
 
 
 def _neighbors(runs: list[Run], columns: int, connectivity: int) -> list[list[tuple[int, int]]]:
-    """Of each run those that it touches, and by how many turns these lie further on."""
+    """The runs that touch each run, and by how many turns they are further on."""
     reach = 1 if connectivity == 8 else 0
     found: list[list[tuple[int, int]]] = [[] for _ in runs]
     of_row: dict[int, list[int]] = {}
@@ -83,7 +81,7 @@ def _neighbors(runs: list[Run], columns: int, connectivity: int) -> list[list[tu
 
 
 def _spread(seed: int, neighbors: list[list[tuple[int, int]]], turns: dict[int, int]) -> tuple[list[int], bool]:
-    """The runs of a zone, their turns, and whether a way leads round."""
+    """The runs of a zone, their turns, and whether they close around."""
     turns[seed] = 0
     found, ring = [seed], False
     for run in found:

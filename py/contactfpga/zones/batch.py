@@ -41,9 +41,9 @@ recording."""
 _WHICH = [("frame", np.int64), ("time_us", np.int64), ("sequence", np.int64)]
 ZONE_DTYPE = np.dtype(_WHICH + [(name, DTYPE[name]) for name in DTYPE.names or ()])
 """Fields of :attr:`Batch.zones`: ``frame`` is the index in :attr:`Batch.frames`, whose time and sequence are repeated;
-the others are those of :class:`Zone`, with NaN in the place of None."""
+the others are those of :class:`Zone`, with NaN for None."""
 DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in DIVIDED_DTYPE.names or ()])
-"""The same with ``report = "barycenter"``, whose boards send no sums."""
+""":data:`ZONE_DTYPE` without the sums, for ``report = "barycenter"``."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -65,7 +65,7 @@ class Batch:
     """:attr:`Zones.faults` of each frame."""
 
     def __len__(self) -> int:
-        """How many frames there are."""
+        """Number of frames."""
         return len(self.frames)
 
     def __repr__(self) -> str:
@@ -85,12 +85,12 @@ class Batch:
         return tables.to_pandas(self.zones)
 
     def to_arrow(self) -> pyarrow.Table:
-        """The same as a table of pyarrow, with null in the place of NaN. Raises :class:`MissingExtra`."""
+        """The zones as a table of pyarrow, with null for NaN. Raises :class:`MissingExtra`."""
         return tables.to_arrow(self.zones)
 
     @classmethod
     def of(cls, frames: Sequence[Zones | Run]) -> Batch:
-        """Of frames of one sheet."""
+        """A batch of frames of one sheet."""
         described = np.zeros(sum(len(one) if isinstance(one, Run) else 1 for one in frames), FRAME_DTYPE)
         counts = np.zeros(len(described), np.int64)
         faults: list[tuple[str, ...]] = []
@@ -110,7 +110,7 @@ class Batch:
 
 
 def _row(one: Zones) -> tuple[float, ...]:
-    """Of :data:`FRAME_DTYPE`."""
+    """A row of :data:`FRAME_DTYPE`."""
     return (
         one.time_us,
         *(math.nan if value is None else value for value in (one.host_time_s, one.host_sigma_s, one.arrived_s)),
@@ -127,7 +127,7 @@ _FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT, "motion": 
 
 
 def _describe(run: Run, out: np.ndarray) -> None:
-    """The same of the frames of a run."""
+    """Rows of :data:`FRAME_DTYPE` of a run's frames."""
     out["time_us"] = run.times_us
     line = run.line
     out["host_time_s"] = math.nan if line is None else line.at(run.times_us)
@@ -168,7 +168,7 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
 
 
 def _records(items: Sequence[Zones | Run]) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 3) :attr:`Zones.records`, and (m,) places in :data:`around.WINDINGS` where the ends of the sheet meet."""
+    """(m, 3) :attr:`Zones.records`, and (m,) indexes in :data:`around.WINDINGS` for a sheet whose ends meet."""
     sheet = items[0].sheet
     if not sheet.closed:
         records = np.concatenate([one.carried if isinstance(one, Run) else one.records for one in items])

@@ -1,9 +1,9 @@
-"""Which zones and cells of a sheet without diodes other pressed switches may have made.
+"""Zones and cells of a sheet without diodes that other pressed switches may have made.
 
-Without diodes a current takes every way through pressed switches: a selected row reads pressed in all columns that it
-is joined with, over other rows as well. In a frame during which nothing changes the rows and columns that are joined so
-read pressed in all of their crossings, a *block*; blocks have no row and no column in common. What of a block is really
-pressed cannot be known: it may be any of its crossings that join it. So
+Without diodes a current takes every path through pressed switches: a selected row reads pressed in all columns joined
+with it, also over other rows. In a frame without changes the rows and columns so joined read pressed in all of their
+crossings, a *block*; blocks share no row or column. The really pressed cells of a block are unknown: any of its
+crossings that join it. So
 
 - a cell may be a ghost if its block has another row and another column, that is, if it is a corner of a rectangle whose
   other corners are pressed, too;
@@ -11,14 +11,14 @@ pressed cannot be known: it may be any of its crossings that join it. So
   if the block has another run of rows and another run of columns. Zones of one run of rows have the same y, others
   never do, as two runs with one middle would overlap; likewise columns and x.
 
-Both hold exactly, in both directions. Zones of one block may also have grown, or have been joined, by ghosts; they are
-found by their common x or y. What cannot be seen is a block that is one zone: contacts may hide in it whose rows and
-columns, taken together, have no gap.
+Both hold exactly, in both directions. Zones of one block may also have grown, or been joined, by ghosts; they are found
+by their common x or y. Invisible is a block that is one zone: contacts may hide in it whose rows and columns, taken
+together, have no gap.
 
-If a switch changes during the scan, the rows before it do not show it yet, and
-corners may be hidden in that frame. A row itself is read at once, so that a ghost's own row shows another cell. So in a
-frame that differs from the one received before it all is suspect that may have a neighbor in its row: no ghost is
-missed as long as no switch changes twice between two frames.
+If a switch changes during the scan, the rows before it do not show it yet, and corners may be hidden in that frame. A
+row itself is read at once, so a ghost's own row shows another cell. So in a frame that differs from the previous one,
+everything that may have a neighbor in its row is suspect: no ghost is missed unless a switch changes twice between two
+frames.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from contactfpga.zones import labels
 
 
 def cells(frame: Frame, before: Frame | None = None) -> np.ndarray:
-    """(rows, columns) bool: cells of a frame with ``report = "cells"`` that may be ghosts; ``before``: the frame
-    received before it, None where there is none."""
+    """(rows, columns) bool: cells of a frame with ``report = "cells"`` that may be ghosts; ``before``: the previous
+    frame, or None."""
     assert frame.bitmap is not None
     pressed = frame.bitmap.astype(np.int64)
     in_row = pressed.sum(axis=1, keepdims=True)
@@ -50,7 +50,7 @@ def cells(frame: Frame, before: Frame | None = None) -> np.ndarray:
 def zones(frame: Frame, before: Frame | None = None) -> list[bool]:
     """For each zone of a frame with ``report = "moments"`` and 4-connectivity whether it may be wholly made of ghosts.
 
-    Where zones are missing or wrong (``overflow``, ``mismatch``), each one may be.
+    If zones are missing or wrong (``overflow``, ``mismatch``), each may be.
     """
     moments = frame.moments.tolist()
     if frame.flags & {"overflow", "mismatch"}:
@@ -62,10 +62,10 @@ def zones(frame: Frame, before: Frame | None = None) -> list[bool]:
 
 
 def labelled(frame: Frame, before: Frame | None, numbers: np.ndarray) -> list[bool]:
-    """For each zone of a frame with ``report = "cells"`` whether it may be wholly made of ghosts; ``numbers``: those of
-    the zones, cell by cell, from 1.
+    """For each zone of a frame with ``report = "cells"`` whether it may be wholly made of ghosts; ``numbers``: zone
+    numbers by cell, from 1.
 
-    With 8-connectivity a zone may hold several parts that share no edge, and it may be so made if all of these may.
+    With 8-connectivity a zone may be so made if all its edge-connected parts may.
     """
     assert frame.bitmap is not None
     parts = labels.label(frame.bitmap, 4)
@@ -75,14 +75,14 @@ def labelled(frame: Frame, before: Frame | None, numbers: np.ndarray) -> list[bo
 
 
 def _as_moments(frame: Frame, parts: np.ndarray | None = None) -> Frame:
-    """The same with the zones of 4-connectivity, which its bitmap tells."""
+    """The frame with the 4-connected zones of its bitmap."""
     if frame.bitmap is None:
         return frame
     return dataclasses.replace(frame, moments=labels.moments(labels.label(frame.bitmap, 4) if parts is None else parts))
 
 
 def spread(frame: Frame, before: Frame | None = None) -> bool:
-    """Whether some zones of such a frame may hold ghosts that pressed switches elsewhere made."""
+    """Whether some zones of such a frame may include ghosts made by switches elsewhere."""
     suspects = zones(frame, before)
     return any(suspects) or (
         len(suspects) > 1
@@ -91,11 +91,11 @@ def spread(frame: Frame, before: Frame | None = None) -> bool:
 
 
 def _middles(moments: list[list[int]]) -> list[Counter[tuple[int, int]]]:
-    """How many zones have each x, and each y."""
+    """Number of zones with each x, and each y."""
     return [Counter(_reduced(sums[axis], sums[0]) for sums in moments) for axis in (1, 2)]
 
 
 def _reduced(total: int, area: int) -> tuple[int, int]:
-    """total / area as a fraction that is equal to another one if its value is."""
+    """total / area as a reduced fraction, for exact comparison."""
     shared = math.gcd(total, area)
     return total // shared, area // shared

@@ -49,6 +49,6 @@ def _root(parents: list[int], run: int) -> int:
 
 
 def _join(parents: list[int], one: int, other: int) -> None:
-    """The root of a zone is its first run."""
+    """Join two zones, whose root is the first run."""
     first, second = sorted((_root(parents, one), _root(parents, other)))
     parents[second] = first

@@ -1,4 +1,4 @@
-"""Contacts that move faster than the scan follows, told from two frames."""
+"""Contacts that move too fast for the scan, detected from two frames."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones import around
 
 LIMIT = 1.0
-"""Pitches from one scan to the next that are told: the rows of a frame are sampled one after the other, so that a zone
-may be off by about as much as its contact moves meanwhile."""
+"""Smallest motion in pitches per scan that is reported: a frame's rows are sampled in turn, so a zone may be off by
+about its contact's motion meanwhile."""
 
 _SEQUENCES = 256
 
@@ -18,16 +18,16 @@ Places = list[tuple[float, float]]
 
 
 def adjacent(frame: Frame, before: Frame) -> bool:
-    """Whether no frame was lost or overwritten between these two. With ``send = "on_change"`` the first one holds until
+    """Whether no frame was lost or overwritten between these two. With ``send = "on_change"`` the first is valid until
     the scan before the second."""
     return (frame.sequence - before.sequence) % _SEQUENCES == 1 and frame.overwritten == before.overwritten
 
 
 def moved(records: np.ndarray, earlier: np.ndarray, sheet: Sheet) -> bool:
-    """Whether a zone lies farther than :data:`LIMIT` pitches from each zone of an adjacent frame that has as many.
+    """Whether a zone is farther than :data:`LIMIT` pitches from each zone of an adjacent frame with as many.
 
-    Both as :attr:`contactfpga.Zones.records`, and where the ends of the sheet meet as
-    :attr:`contactfpga.Zones.closed_records`. Zones without an x are compared by y, and only with each other.
+    Both as :attr:`contactfpga.Zones.records`, or for a sheet whose ends meet :attr:`contactfpga.Zones.closed_records`.
+    Zones without an x are compared by y, and only with each other.
     """
     if len(records) != len(earlier) or np.array_equal(records, earlier):
         return False
@@ -42,13 +42,13 @@ def _far(places: Places, old: Places, columns: int | None = None) -> bool:
 
 
 def _around(records: np.ndarray, sheet: Sheet) -> tuple[Places, Places]:
-    """Of the zones with an x, and of those without, whose places then say 0."""
+    """Places of the zones with an x, and of those without, with x = 0."""
     winds = around.windings(records) > 0
     flat = around.flat(records, sheet.columns)
     return _places(flat[~winds], sheet), [(0.0, y) for _, y in _places(flat[winds], sheet)]
 
 
 def _places(records: np.ndarray, sheet: Sheet) -> Places:
-    """x and y in pitches of the zones that lie somewhere."""
+    """x and y in pitches of the zones with a place."""
     steps = 1 << sheet.barycenter_bits if sheet.report == "barycenter" else None
     return [(x / (steps or area), y / (steps or area)) for area, x, y in records.tolist() if area]

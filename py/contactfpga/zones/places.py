@@ -1,7 +1,7 @@
-"""Places of zones by a table: where contacts of a known kind lie, seen from what a zone says of its cells.
+"""Places of zones by a table: where contacts of a known kind are, given their zone.
 
-A zone's barycenter is that of its cells. If only contacts of one kind touch, such as a finger of known size, those that
-close cells of this number and with this barycenter between cells lie elsewhere in the mean. The table says where.
+A zone's barycenter is that of its cells. If only contacts of one kind touch, such as a finger of known size, those with
+cells of this number and this barycenter within the cell have another mean place. The table has it.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ NAMES = ("keys", "offsets_mm", "pitch_mm")
 """Arrays of a table's file."""
 
 MAX_KEYS = 1 << 20
-"""A table holds no more."""
+"""Most entries of a table."""
 
 
 class PlaceTable:
-    """Where contacts lie, seen from a zone's barycenter.
+    """Mean places of contacts, relative to a zone's barycenter.
 
-    ``pitch_mm``: (2,) the sheet's, along columns and rows; ``keys``: (n, 3) int, a zone's area in cells and what is
-    left of its sums of columns and rows after division by it; ``offsets_mm``: (n, 2) from the barycenter to the place.
-    Raises ValueError for arrays of other shapes or values.
+    ``pitch_mm``: (2,) the sheet's, along columns and rows; ``keys``: (n, 3) int, a zone's area in cells and the
+    remainders of its sums of columns and rows after division by it; ``offsets_mm``: (n, 2) from the barycenter to the
+    place. Raises ValueError for arrays of other shapes or values.
     """
 
     def __init__(self, pitch_mm: np.ndarray, keys: np.ndarray, offsets_mm: np.ndarray):
@@ -40,10 +40,10 @@ class PlaceTable:
         }
 
     def place_mm(self, zone: Zone) -> tuple[float, float] | None:
-        """Where in mm the contact lies that this zone is of; None for a zone that has no place.
+        """Place in mm of this zone's contact; None for a zone without a place.
 
-        The barycenter, if the table has no such zone or ``report = "barycenter"`` sends no sums. At an edge of the
-        sheet, where cells are missing, the table does not hold. Raises ValueError for a sheet of another pitch.
+        The barycenter, if the table lacks such a zone or ``report = "barycenter"`` sends no sums. The table does not
+        apply at an edge of the sheet, where cells are missing. Raises ValueError for a sheet of another pitch.
         """
         if zone.x_mm is None or zone.y_mm is None:
             return None
@@ -57,13 +57,13 @@ class PlaceTable:
         return zone.x_mm + x_mm, zone.y_mm + y_mm
 
     def save(self, path: str | Path) -> None:
-        """Write it as a .npz file."""
+        """Write the table as a .npz file."""
         with replaced(Path(path)) as new, open(new, "wb") as file:
             np.savez_compressed(file, keys=self.keys, offsets_mm=self.offsets_mm, pitch_mm=self.pitch_mm)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """The table that :meth:`save` wrote. Raises ValueError for a file that is none, and OSError."""
+        """Read a table of :meth:`save`. Raises ValueError for another file, and OSError."""
         held = array_file.read(path, NAMES, 24 * MAX_KEYS)
         missing = [name for name in NAMES if name not in held]
         if missing:

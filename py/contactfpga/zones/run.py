@@ -1,5 +1,4 @@
-"""Consecutive frames of one sheet as arrays, which become :class:`~contactfpga.Zones` one by one where they are
-wanted."""
+"""Consecutive frames of one sheet as arrays, converted to :class:`~contactfpga.Zones` one by one on demand."""
 
 from __future__ import annotations
 
@@ -18,15 +17,15 @@ from contactfpga.zones.zone import HostLine, HostLines, Zones
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """One frame or more; the sheet has a diode per switch and its report is of zones."""
+    """One frame or more, of a sheet with a diode per switch and a report of zones."""
 
     sheet: Sheet
     packets: np.ndarray
     """(n,) of :data:`contactfpga.wire.many.FIELDS`, all valid."""
     starts: np.ndarray
-    """(n + 1,) where each one's records begin; the first need not be 0."""
+    """(n + 1,) starts of each frame's records; the first need not be 0."""
     records: np.ndarray
-    """(m, 3) int64, or (m, 4) where the ends of the sheet meet, at least up to the last start."""
+    """(m, 3) int64, or (m, 4) for a sheet whose ends meet, at least up to the last start."""
     times_us: np.ndarray
     """(n,) int64, since power-up."""
     line: HostLine | HostLines | None
@@ -34,7 +33,7 @@ class Run:
     before: Frame | None = None
     """The frame before the first one."""
     faults: tuple[str, ...] = (STUCK,)
-    """Of its flagged frames; see :attr:`Zones.faults`."""
+    """Faults of its flagged frames; see :attr:`Zones.faults`."""
     history: UnitHistory | None = None
     """Of the board's pressure units."""
 
@@ -42,7 +41,7 @@ class Run:
         return len(self.packets)
 
     def after(self, index: int) -> Run:
-        """Without the first frames."""
+        """The run without the first frames."""
         return dataclasses.replace(
             self,
             packets=self.packets[index:],
@@ -54,7 +53,7 @@ class Run:
 
     @property
     def carried(self) -> np.ndarray:
-        """(k, 3): the records of its frames alone."""
+        """(k, 3): the records of its own frames."""
         return self.records[self.starts[0] : self.starts[-1]]
 
     def __getitem__(self, index: int) -> Zones:
@@ -80,7 +79,7 @@ class Run:
 
     @functools.cached_property
     def _plain(self) -> tuple[list[tuple[int, ...]], list[int], list[int]]:
-        """The same in Python's own numbers, which numpy would make one by one."""
+        """The fields as Python's numbers, converted at once for speed."""
         return self.packets.tolist(), self.starts.tolist(), self.times_us.tolist()
 
 

@@ -1,4 +1,4 @@
-"""Zones as tables of pandas and Arrow, which are imported when they are asked for."""
+"""Zones as tables of pandas and Arrow, which are imported on demand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VECTORS = {
     "point_mm": ("point_x_mm", "point_y_mm", "point_z_mm"),
     "normal": ("normal_x", "normal_y", "normal_z"),
 }
-"""Fields of three numbers, which become a column for each."""
+"""Fields of three numbers, each with a column of its own."""
 
 
 def columns(records: np.ndarray, **same: int) -> dict[str, np.ndarray]:
@@ -37,7 +37,7 @@ def to_pandas(records: np.ndarray, **same: int) -> pandas.DataFrame:
 
 
 def to_arrow(records: np.ndarray, **same: int) -> pyarrow.Table:
-    """:func:`columns` as a table, with null in the place of NaN. Raises :class:`~contactfpga.MissingExtra`."""
+    """:func:`columns` as a table, with null for NaN. Raises :class:`~contactfpga.MissingExtra`."""
     arrow = _needed("pyarrow", "to_arrow()")
     arrays = {name: arrow.array(values, from_pandas=True) for name, values in columns(records, **same).items()}
     return arrow.table(arrays)

@@ -1,4 +1,4 @@
-"""Readings of pressure units over time, and what they were at the moment of a frame."""
+"""Readings of pressure units over time, interpolated to a frame's moment."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from contactfpga.wire.units import Sweep, UnitFacts
 
 KEPT = 8192
-"""Sweeps of which a frame's moment is looked up, about a second."""
+"""Sweeps stored for a frame's moment, about a second."""
 _ROUNDING = 1 / math.sqrt(12)
 """Standard deviation of a reading that is rounded to whole steps."""
 
@@ -31,11 +31,11 @@ class UnitSamples:
     """Device time since power-up: of a frame's first row, to which the readings are interpolated, or of a sweep's first
     sample."""
     readings: tuple[float, ...]
-    """Of each unit, in steps of its converter."""
+    """Reading of each unit, in steps of its converter."""
     sigma: tuple[float, ...]
-    """Their standard deviations, from rounding and from what is not known between two sweeps; noise is not in it."""
+    """Standard deviations of the readings, from rounding and from changes between two sweeps, without noise."""
     saturated: tuple[bool, ...]
-    """A unit read 0 or full scale, so that its reading may be anything beyond."""
+    """Whether a unit read 0 or full scale, so that its true reading is unknown."""
 
 
 class UnitHistory:
@@ -49,9 +49,9 @@ class UnitHistory:
     def __init__(self, facts: UnitFacts, clock_hz: int):
         self.facts = facts
         self.last: Sweep | None = None
-        """The sweep that came last."""
+        """The last sweep."""
         self.count = 0
-        """Sweeps that came."""
+        """Number of sweeps."""
         self.lows, self.highs = [1 << facts.bits] * facts.count, [-1] * facts.count
         """Least and largest reading of each unit."""
         self._full = (1 << facts.bits) - 1
@@ -61,7 +61,7 @@ class UnitHistory:
         self._lock = threading.Lock()
 
     def add(self, sweep: Sweep, time_us: int) -> UnitSamples | None:
-        """A sweep whose first sample was then, after that of the one before; else it is left out."""
+        """Add a sweep with its first sample's time, unless it is not later than the one before."""
         with self._lock:
             if self._times_us and time_us <= self._times_us[-1]:
                 return None
@@ -76,8 +76,8 @@ class UnitHistory:
         return UnitSamples(time_us, sweep.readings, (_ROUNDING,) * len(saturated), saturated)
 
     def at(self, time_us: int) -> UnitSamples | None:
-        """Each unit's reading at a moment, interpolated between its samples before and after it; None where one of
-        them has not come, or is forgotten."""
+        """Each unit's reading at a moment, interpolated between its neighboring samples; None if one of them is
+        missing, or forgotten."""
         with self._lock:
             found = [self._unit_at(time_us - unit * self._spacing_us, unit) for unit in range(self.facts.count)]
         if None in found:
@@ -97,12 +97,12 @@ class UnitHistory:
 
 
 def _spread(share: float, change: float, gap_us: float) -> float:
-    """All of the change may have happened at one moment between the two samples, and nobody knows at which: then the
-    reading was the one before or the one after. Times are cut to whole microseconds."""
+    """Uncertainty of an interpolated reading: the change may be a step at an unknown moment between the two samples.
+    Times are truncated to whole microseconds."""
     timing = change / gap_us * _ROUNDING
     return math.sqrt(_ROUNDING**2 + share * (1 - share) * change**2 + timing**2)
 
 
 def only(lows: Sequence[int], highs: Sequence[int], value: int) -> list[int]:
-    """Units that never read anything but this."""
+    """Units with no other reading than this."""
     return [unit for unit, (low, high) in enumerate(zip(lows, highs, strict=True)) if low == high == value]

@@ -1,4 +1,4 @@
-"""What a frame says of the sheet: contact zones in cells, in mm, and on the link's surface."""
+"""Zones of a frame: contact zones in cells, in mm, and on the link's surface."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ DTYPE = np.dtype(
         ("winding", np.dtype("U5")),
     ]
 )
-"""Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
+"""Fields of :attr:`Zones.array`, those of :class:`Zone`."""
 
 _UNSENT = ("sum_x", "sum_y")
 DIVIDED_DTYPE = np.dtype([(name, DTYPE[name]) for name in DTYPE.names or () if name not in _UNSENT])
-"""The same with ``report = "barycenter"``, whose boards send no sums."""
+""":data:`DTYPE` without the sums, for ``report = "barycenter"``."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Zone:
 
 
 def order(zone: Zone) -> tuple[bool, float, bool, float, int]:
-    """Zones that lie nowhere come last."""
+    """Sort key of zones; those without a place come last."""
     return zone.y_mm is None, zone.y_mm or 0.0, zone.x_mm is None, zone.x_mm or 0.0, zone.area_cells
 
 
@@ -109,7 +109,7 @@ def records_of(frame: Frame, sheet: Sheet) -> np.ndarray:
 
 
 def closed_records(frame: Frame, sheet: Sheet) -> np.ndarray:
-    """(n, 4) int64: as they came, of a sheet whose ends meet."""
+    """(n, 4) int64 records as received, of a sheet whose ends meet."""
     return frame.moments if frame.bitmap is None else around.label(frame.bitmap, sheet.connectivity)[1]
 
 
@@ -288,7 +288,7 @@ class Zones(Sequence[Zone]):
         return tables.to_pandas(self.array, time_us=self.time_us, sequence=self.sequence)
 
     def to_arrow(self) -> pyarrow.Table:
-        """The same as a table of pyarrow, with null where a zone has None. Raises :class:`MissingExtra`."""
+        """The zones as a table of pyarrow, with null for None. Raises :class:`MissingExtra`."""
         return tables.to_arrow(self.array, time_us=self.time_us, sequence=self.sequence)
 
     @functools.cached_property
@@ -334,21 +334,21 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def records(self) -> np.ndarray:
-        """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
+        """(n, 3) int64: area and sums, or barycenters, of each zone as received, in no particular order."""
         if self.frame.bitmap is None or self.sheet.closed:
             return records_of(self.frame, self.sheet)
         return labels.moments(self._labels)
 
     @functools.cached_property
     def windings(self) -> list[str]:
-        """:attr:`Zone.winding` of each of :attr:`records`; empty where the ends of the sheet do not meet."""
+        """:attr:`Zone.winding` of each of :attr:`records`; empty unless the ends of the sheet meet."""
         if not self.sheet.closed:
             return []
         return [around.WINDINGS[index] for index in around.windings(self.closed_records).tolist()]
 
     @property
     def closed_records(self) -> np.ndarray:
-        """(n, 4) int64, where the ends of the sheet meet: records with the cells past the seam
+        """(n, 4) int64, for a sheet whose ends meet: records with the cells past the seam
         (:mod:`contactfpga.zones.around`)."""
         return closed_records(self.frame, self.sheet)
 
@@ -369,7 +369,7 @@ class Zones(Sequence[Zone]):
         return self.svg()
 
     def svg(self, width_px: int = notebook.WIDTH_PX) -> str:
-        """The same as a picture."""
+        """The sheet's picture as SVG text."""
         sheet = self.sheet
         circles = [
             (zone.x_mm, zone.y_mm, notebook.radius_mm(zone.area_mm2))
@@ -422,11 +422,10 @@ Times = TypeVar("Times", int, np.ndarray)
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class HostLine:
-    """A straight line from device time to the host's clock, as far as it was known when the frames arrived that it is
-    used for, and when they arrived."""
+    """A linear map from device time to the host's clock, as known when its frames arrived, and their arrival."""
 
     arrived_s: float
-    """When their last bytes arrived."""
+    """Arrival of their last bytes."""
     base_us: int
     """A device time."""
     base_s: float
@@ -434,10 +433,10 @@ class HostLine:
     rate: float
     """Seconds of the host's clock per second of device time."""
     sigma_s: float
-    """Standard deviation of what :meth:`at` returns."""
+    """Standard deviation of :meth:`at`'s result."""
 
     def at(self, time_us: Times) -> float | Times:
-        """The host's clock in s at a device time in us, of frames that had arrived by :attr:`arrived_s`."""
+        """The host's clock in s at a device time in us, for frames that arrived by :attr:`arrived_s`."""
         at_s = self.base_s + (time_us - self.base_us) * (self.rate * 1e-6)
         return np.minimum(at_s, self.arrived_s) if isinstance(at_s, np.ndarray) else min(at_s, self.arrived_s)
 

@@ -1,4 +1,4 @@
-"""Makes the tables and pictures of the pages anew: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
+"""Makes the tables and pictures of the pages: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class StudyError(ContactFPGAError):
 
 
 def lacking(needs: Iterable[str]) -> list[str]:
-    """Those of the needs that are absent: programs, and files or folders with a slash in their name."""
+    """The needs that are absent: programs, and paths with a slash."""
     return [one for one in needs if not (Path(one).exists() if "/" in one else shutil.which(one))]
 
 
 def make(study: Study) -> None:
-    """Write all sections of a study, and draw its pictures. Raises :class:`StudyError`, :class:`MissingExtra`."""
+    """Write all sections and pictures of a study. Raises :class:`StudyError`, :class:`MissingExtra`."""
     if absent := lacking(study.needs):
         raise StudyError(f"{study.name} needs {', '.join(absent)}")
     for name in {study.page_of(section) for section in study.sections}:
@@ -62,7 +62,7 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
 
 
 def stale(study: Study) -> Iterator[str]:
-    """A line for each section that stands in its page with another fingerprint than it would have now."""
+    """A line for each section whose stored fingerprint is out of date."""
     for name in study.sections:
         page = study.page_of(name)
         written = writer.sections((DOCS / page).read_text(encoding="utf-8"))[name]
@@ -71,13 +71,13 @@ def stale(study: Study) -> Iterator[str]:
 
 
 def listed(study: Study) -> str:
-    """A study's line."""
+    """A study's line in the list."""
     needs = f"; needs {', '.join(study.needs)}" if study.needs else ""
     return f"{study.name:<12} {study.page:<16} {study.minutes:>4g} min  {study.title}{needs}"
 
 
 def main() -> int:
-    """The command; its status."""
+    """Run the command and return its exit status."""
     args = _parser().parse_args()
     names = flags.known("study", args.name, list(studies.STUDIES))
     chosen = [studies.STUDIES[name] for name in names]
@@ -98,7 +98,7 @@ def main() -> int:
 
 
 def _make_all(chosen: Iterable[Study], strict: bool) -> int:
-    """Make each; ``strict``: what cannot be made here is an error, and not just left out."""
+    """Make each study; with ``strict`` one that cannot be made here is an error."""
     for study in chosen:
         try:
             make(study)
@@ -111,7 +111,7 @@ def _make_all(chosen: Iterable[Study], strict: bool) -> int:
 
 @contextlib.contextmanager
 def _settings(args: argparse.Namespace) -> Iterator[None]:
-    """Processes that studies use, and where they look for results of before."""
+    """Configure the studies' worker processes and their cache of earlier results."""
     with contextlib.ExitStack() as stack:
         stack.callback(setattr, pool, "usual_jobs", pool.usual_jobs)
         pool.usual_jobs = args.jobs

@@ -1,4 +1,4 @@
-"""Long tables of pages: a page keeps the rows that matter, and a file beside it has all, as comma-separated values."""
+"""Long tables of pages: a page keeps the rows that matter, a CSV file has all."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
 
 FOLDER = "tables"
-"""In the folder of the pages."""
+"""Folder of the CSV files within the pages."""
 _TABLE = re.compile(r"(?:^\|.*\|(?:\n|\Z))+", re.MULTILINE)
 _HEAD = 2
 """Lines of a table above its rows."""
-_PARTED = re.compile(rf"^(?:\|.*\n)+\nAll \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE)
+_PARTED = re.compile(rf"^(?:(?:\|.*\n)+\n)?All \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE)
 
 
 def part(text: str, kept: str, file: Path) -> str:
-    """A section with those rows of its longest table that the regular expression ``kept`` finds something in, and a
-    link to all of them, which are written to the file."""
+    """A section with only the rows of its longest table that match the regular expression ``kept``, and a link to the
+    file with all. If no row matches, only the link stays."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]
@@ -28,11 +28,11 @@ def part(text: str, kept: str, file: Path) -> str:
     file.parent.mkdir(exist_ok=True)
     write_text(file, _csv(lines))
     link = f"All [{len(rows)} rows]({FOLDER}/{file.name})."
-    return text.replace(table, "\n".join([*lines[:_HEAD], *shown, "", link]), 1)
+    return text.replace(table, "\n".join([*lines[:_HEAD], *shown, "", link] if shown else [link]), 1)
 
 
 def whole(page: Path, name: str) -> str:
-    """A section of a page as its study made it, with all rows of its tables."""
+    """A section of a page with all rows, as its study made it."""
     text = writer.sections(page.read_text(encoding="utf-8"))[name].text
     return _PARTED.sub(lambda found: _table((page.parent / found[1]).read_text(encoding="utf-8")), text)
 

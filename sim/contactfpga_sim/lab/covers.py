@@ -1,6 +1,6 @@
-"""What lies over the switches in the studies: one cover for each idea of how a touch reaches a switch.
+"""Covers of the switches in the studies: one for each idea of how a touch reaches a switch.
 
-Switches, foam and gaps are parts that one can buy or cut; that they are these is an assumption, nothing was built.
+Switches, foam and gaps are parts that one can buy or cut; the choice is an assumption, nothing was built.
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ from collections.abc import Callable
 from contactfpga.design.cover import Cap, Cover, Switch
 
 GAP_MM = 0.6
-"""Between two caps."""
+"""Gap between two caps."""
 
 FOAM_M = 2e-3
 """Thickness of the foam on caps."""
 
 DOME = Switch(force_n=0.4, travel_m=0.2e-3, spread=0.1, hysteresis=0.2)
-"""A light metal dome."""
+"""A light metal dome switch."""
 
 
 def bare(pitch_mm: float) -> Cover | None:
-    """No cover and no force: a switch closes when its middle lies under the contact."""
+    """No cover and no force: a switch closes when its middle is under the contact."""
     return None
 
 
 def paper(pitch_mm: float) -> Cover:
-    """The paper's switch, 1 N on a face of 12.6 mm2, flush under 5 mm of foam that is glued on a rigid base."""
+    """The paper's switch, 1 N on a face of 12.6 mm2, flush under 5 mm of foam glued on a rigid base."""
     return Cover("bonded", 5e-3, Switch())
 
 
@@ -45,4 +45,4 @@ COVERS: dict[str, Callable[[float], Cover | None]] = {
     "caps": capped,
     "tiles": tiled,
 }
-"""By name: the cover of a sheet with this pitch in mm."""
+"""Covers by name, as functions of the pitch in mm."""

@@ -1,4 +1,4 @@
-"""Results that are kept by what they were made of, so that nothing is worked out twice."""
+"""A cache of results, keyed by their inputs."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from contactfpga_sim.model.board.cache import cache_folder, put, ready, scratch,
 
 
 def made_by(module: str, *skins: Skin) -> str:
-    """Key of what a module works out of Skins, as far as code decides it: the module with all that it imports, and the
-    Skins with what they choose from elsewhere."""
+    """Key of a module's results for Skins, as far as code decides: the module with its imports, and the Skins with
+    their choices."""
     code = (sources.digest(module), *((skin.to_toml(), sources.own(own_files(skin))) for skin in skins))
     return hashlib.sha256(repr(code).encode()).hexdigest()
 
 
 def found(kind: str, key: str) -> Any:
-    """What is kept for a key, None if nothing is."""
+    """The cached value, or None."""
     path = _path(kind, key)
     return json.loads(path.read_text()) if whole(path, tell=True) else None
 
@@ -32,7 +32,7 @@ def _path(kind: str, key: str) -> Path:
 
 
 def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
-    """What ``new()`` gives, or what it gave before for the same key; it must be plain JSON."""
+    """The value of ``new()``, cached under the key; it must be plain JSON."""
     if (before := found(kind, key)) is not None:
         return before
     path = _path(kind, key)

@@ -1,4 +1,4 @@
-"""From a touch of a sheet at rest to the last byte and to the contact pin, on the compiled gateware."""
+"""From a touch of a resting sheet to the last byte and to the contact pin, on the compiled gateware."""
 
 from __future__ import annotations
 
@@ -16,52 +16,52 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import ReceivedFrame, Receiver
 
 GOLDEN = 0.6180339887498949
-"""Its multiples lie evenly between two instants, whatever their number."""
+"""Golden ratio: its multiples sample an interval evenly, whatever their number."""
 
 SCANS = 40
-"""In which a touch must be reported, beside twice the time of its debounce."""
+"""Scans within which a touch must be reported, beyond twice its debounce time."""
 
 TRIES = 50
-"""Of a touch that meets a hello or a keep-alive."""
+"""Attempts if a touch meets a hello or a keep-alive."""
 
 CHANGES = 100
-"""Of a contact that moves."""
+"""Changes of a moving contact."""
 
 MOVING_FRAMES = 300
-"""For which the rate is counted, about."""
+"""Approximate frames for the rate."""
 
 
 class RecordedTouch(NamedTuple):
-    """A touch, and what was on the wire around it; all times in clocks from the touch on."""
+    """A touch and the bytes around it; times in clocks from the touch."""
 
     last: int
-    """To the end of the last byte of the frame that shows all of it."""
+    """End of the last byte of its complete frame."""
     pin: int
-    """To the contact pin."""
+    """Rise of the contact pin."""
     received: ReceivedFrame
-    """That frame; its times count from the board's power-up."""
+    """The complete frame; its times are from power-up."""
     start: int
-    """The touch itself, from power-up."""
+    """Time of the touch, from power-up."""
     stream: ByteStream
     byte: int
-    """Number of that last byte in the stream."""
+    """Index of that last byte in the stream."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Latency:
-    """What :func:`measure` found."""
+    """Results of :func:`measure`."""
 
     touch_to_last_byte_us: Spread
     touch_to_contact_us: Spread
     change_to_last_byte_us: Spread
-    """Of a contact that moved before, so that frames are on the wire: it loses a corner."""
+    """From the loss of a corner to the last byte, for a contact that moved before, so that the line is busy."""
     frames_per_s: float
-    """Received while the contact moves."""
+    """Frame rate while the contact moves."""
     bytes: int
-    """On the wire, of one frame with the contact; the most."""
+    """Largest frame with the contact, on the wire."""
     touches: int
     recorded: tuple[RecordedTouch, ...] = dataclasses.field(default=(), repr=False)
-    """Each of them."""
+    """The recorded touches."""
 
 
 class Late(ContactFPGAError):
@@ -69,8 +69,8 @@ class Late(ContactFPGAError):
 
 
 def places(skin: Skin, height: int, width: int) -> list[np.ndarray]:
-    """A contact of height x width cells, (R, C) bool, at every place of the sheet, without the switches that are
-    masked; left out where all are."""
+    """A contact of height x width cells, (R, C) bool, at every place of the sheet, without masked switches; omitted if
+    all are masked."""
     if not (1 <= height <= skin.rows and 1 <= width <= skin.columns):
         raise ValueError(f"the contact has {height}x{width} cells; the sheet has {skin.rows}x{skin.columns}")
     found = []
@@ -91,11 +91,11 @@ def measure(
     step: Callable[[str, int], None] = lambda name, of: None,
     around_us: tuple[int, int] = (0, 0),
 ) -> Latency:
-    """A contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
+    """Latency of a contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
 
-    Each comes when the sheet has been reported untouched, at instants spread evenly over a scan. Touches that meet a
-    hello or a keep-alive on the wire are repeated. ``step`` is called after each, with its kind and how many there are.
-    ``around_us``: how long before a touch, and after its frame, all bytes are recorded, in us.
+    Each touch follows a report of an empty sheet, at phases spread evenly over a scan. Touches that meet a hello or a
+    keep-alive are repeated. ``step(kind, number of them)`` is called after each. ``around_us``: time in us before a
+    touch, and after its frame, in which all bytes are recorded.
 
     Raises ValueError for a contact that does not fit, and :class:`Late`.
     """
@@ -132,12 +132,11 @@ def _spread(clocks: list[int], skin: Skin) -> Spread:
 
 
 class Bench:
-    """A compiled board that is touched and let go again and again."""
+    """A compiled board that is touched and released repeatedly."""
 
     def __init__(self, skin: Skin):
         self.line: list[tuple[int, int]] = []
-        """Each byte that was seen: the board's clock in which its stop bit ended, and the byte. Whoever reads it may
-        clear it."""
+        """The bytes seen: clock at the end of the stop bit, and the byte. Readers may clear it."""
         self._cells: int | None = None  # in the last frame that was seen
         self._skin = skin
         self._derived = skin.derived
@@ -168,8 +167,8 @@ class Bench:
         self._drop()
 
     def touch(self, cells: np.ndarray, share: float, before: int = 0, after: int = 0) -> RecordedTouch:
-        """Touch the sheet at this share of a scan; ``before`` and ``after``: clocks that are recorded, from before the
-        touch until after the frame that shows all of it."""
+        """Touch the sheet at this share of a scan; ``before`` and ``after``: recorded clocks before the touch and after
+        its complete frame."""
         rest = max(3, before // self._scan + 2)
         for _ in range(TRIES):
             self._let_go()
@@ -196,8 +195,7 @@ class Bench:
         return RecordedTouch(last, pin - start, one, start, ByteStream(times, values, -before, until), byte)
 
     def change(self, contacts: list[np.ndarray], number: int, size: int) -> int:
-        """Clocks from a change to the last byte of the frame that shows it: the contact has moved on by some places,
-        and then loses a corner."""
+        """Clocks from a change to the last byte of its frame: the contact moves by some places, then loses a corner."""
         hold = max(1, size * 10 * self._derived.bit_clocks // 2)
         places = [contacts[(11 * number + place) % len(contacts)] for place in range(8)]
         for cells in places:
@@ -211,8 +209,7 @@ class Bench:
         return one.last + self._byte - start
 
     def moving(self, contacts: list[np.ndarray], size: int) -> float:
-        """Frames received per second while the contact moves by one place, twice in the time that a frame's bits
-        take."""
+        """Frames per second while the contact moves by one place, twice per frame time."""
         hold = max(1, size * 10 * self._derived.bit_clocks // 2)
         clocks = max(MOVING_FRAMES * 2 * hold, MOVING_FRAMES // 4 * self._scan)
         self._drop()
@@ -229,7 +226,7 @@ class Bench:
             self._wait(0)
 
     def _wait(self, cells: int) -> tuple[ReceivedFrame, bool]:
-        """The first frame with this many cells, and whether a keep-alive was on the wire before."""
+        """The first frame with this many cells, and whether a keep-alive preceded it."""
         until = self._board.cycle + self._patience
         kept_alive = False
         while self._board.cycle < until:

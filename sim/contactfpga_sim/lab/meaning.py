@@ -1,7 +1,6 @@
-"""Fingerprints of what makes a section of a page. They stay when code is only moved, or explained otherwise.
+"""Fingerprints of the code behind a section of a page. Moving or documenting code does not change them.
 
-The statements of all modules that are reached are taken as a set: without imports, comments and docstrings, and without
-the place where they stand.
+They cover the set of statements of all reached modules, without imports, comments, docstrings and positions.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.model.board import sources
 
 LENGTH = 8
-"""Hexadecimal digits of a fingerprint."""
+"""Hexadecimal digits in a fingerprint."""
 
 
 def fingerprint(study: Study, section: str) -> str:
-    """Of what makes a section."""
+    """Fingerprint of a section's code."""
     declared = study.sections[section]
     if declared.of_netlists:
         return _hashed("\n".join((*_netlists(study, section), *_marks(_file(study.module(declared.makes))))))
@@ -66,7 +65,7 @@ def _marks(file: Path) -> tuple[str, ...]:
 
 
 def _says_nothing(statement: ast.AST) -> bool:
-    """Whether it is an import, a docstring, or what only types need."""
+    """Whether a statement is an import, a docstring, or for type checkers only."""
     if isinstance(statement, ast.If):
         return isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
     if isinstance(statement, ast.Expr):
@@ -75,7 +74,7 @@ def _says_nothing(statement: ast.AST) -> bool:
 
 
 def _plain(node: object) -> object:
-    """A syntax tree as plain values, the same in each version of Python that has this syntax."""
+    """A syntax tree as plain values, equal in all Python versions with this syntax."""
     if isinstance(node, ast.AST):
         return type(node).__name__, *_fields(node)
     if isinstance(node, list):

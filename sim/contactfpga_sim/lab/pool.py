@@ -1,4 +1,4 @@
-"""What works out the pieces of a chart, a fit or a sweep, and how far it is."""
+"""Workers for the pieces of a chart, a fit or a sweep, and their progress."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from contactfpga import terminal
 from contactfpga.tools.console.interrupt import silence_amaranth
 
 GRACE_S = 0.5
-"""What a worker that is told to end has to tidy up, until it is ended."""
+"""Time for a worker to clean up before it is killed."""
 
 usual_jobs: int | None = None
-"""Processes where a study does not say how many; None: one per core."""
+"""Default number of processes; None: one per core."""
 
 LINE_S = 5.0
-"""Between two lines of progress where none can be written over."""
+"""Interval of progress lines if they cannot be overwritten."""
 
 
 @contextlib.contextmanager
 def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Executor]:
-    """This many processes on this machine, :data:`usual_jobs` for None; or the cluster with this scheduler.
+    """An executor of this many processes, :data:`usual_jobs` for None, or of the cluster with this scheduler.
 
-    When the block ends by an error or by Ctrl-C, what is left to do is dropped, and no process stays.
+    If the block ends by an error or Ctrl-C, remaining work is dropped, and no process stays.
     """
     if dask is not None:
         with _cluster(dask) as workers:
@@ -58,8 +58,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 def alone() -> None:
-    """To be called first in a worker: it and all that it starts are one group, which is ended as a whole, and ends with
-    its parent."""
+    """Call first in a worker: it and its children become one group that ends as a whole, and with its parent."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
     signal.signal(signal.SIGTERM, _leave)
@@ -79,7 +78,7 @@ def _outlive_nobody() -> None:
 
 
 def _end_children() -> None:
-    """End all worker processes with all that they have started."""
+    """End all worker processes and their children."""
     children = multiprocessing.active_children()
     _signal(children, signal.SIGTERM)
     until = time.monotonic() + GRACE_S
@@ -99,8 +98,8 @@ def _signal(children: list[multiprocessing.process.BaseProcess], number: signal.
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[str, int], None]]:
-    """How far the work is, on standard error: each call, with a kind of work and how many pieces there are of it,
-    counts a piece. Bars on a terminal, else a line now and then."""
+    """Progress on standard error: each call, with a kind of work and its number of pieces, counts a piece. Bars on a
+    terminal, else occasional lines."""
     with _bars() if terminal.of(sys.stderr).live else contextlib.nullcontext(_Lines()) as step:
         yield step
 
@@ -122,7 +121,7 @@ def _bars() -> Iterator[Callable[[str, int], None]]:
 
 
 class _Lines:
-    """The same as plain lines."""
+    """Progress as plain lines."""
 
     def __init__(self) -> None:
         self._done: dict[str, int] = {}

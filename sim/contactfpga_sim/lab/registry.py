@@ -1,7 +1,8 @@
-"""What a study is. Each has a folder beside this file, unless scripts make all of it, and an entry in ``studies.py``.
+"""The entry of a study. Each study has a folder beside this file, unless scripts make all of it, and an entry in
+``studies.py``.
 
 An entry names functions as ``module:function`` of the study's folder, or ``folder/file.py:function`` of the project's,
-so that it is read without what the study needs.
+so that reading it needs none of the study's imports.
 """
 
 from __future__ import annotations
@@ -15,49 +16,53 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+NO_ROW = "^$"
+"""For :attr:`Section.kept`: the page has a link to the table instead of rows of it."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Section:
-    """A table, or other text, between two markers of a page."""
+    """A table or other text between two markers of a page."""
 
     makes: str
-    """The function that gives its text; it takes what the study computes, or nothing."""
+    """The function of its text; it takes the study's result, or nothing."""
     page: str = ""
-    """In ``docs``; empty for the study's page."""
+    """Page in ``docs``; empty for the study's page."""
     needs: tuple[str, ...] = ()
-    """As :attr:`Study.needs`. Where one is absent, the section stays as it is."""
+    """Needs beyond :attr:`Study.needs`. If one is absent, the section is unchanged."""
     sample: str = ""
-    """A function that gives in less than a minute a part of the text, such as a row; it takes nothing."""
+    """A function without arguments that makes part of the text, such as a row, in less than a minute."""
     kept: str = ""
-    """A regular expression that finds something in the rows of its longest table that a page keeps; empty: in all."""
+    """Regular expression for the rows of its longest table that the page keeps; empty: all."""
     of_netlists: bool = False
-    """It says what :mod:`.size` measures, so netlists decide whether it is out of date, and not all code it reaches."""
+    """Whether it shows measurements by :mod:`.size`, so that netlists, not reached code, decide whether it is out of
+    date."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """What a study makes, and what it takes to make it."""
+    """A study's outputs and needs."""
 
     name: str
-    """That of its folder."""
+    """Name of the study's folder."""
     title: str
     page: str
-    """In ``docs``."""
+    """Page in ``docs``."""
     minutes: float
-    """Two cores are busy with it, when nothing is kept from before."""
+    """Minutes on two cores without cached results."""
     sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
-    """By the name in their markers; they are made in this order."""
+    """Sections by marker name, in the order of making."""
     compute: str = ""
-    """The function whose result sections and pictures share; it is called when the first of them asks for it."""
+    """The function whose result sections and pictures share, called on first use."""
     pictures: str = ""
-    """The function that draws into a folder, that of the pages, and gives the files."""
+    """The function that draws into the pages' folder and returns the files."""
     extra: str = "sim"
-    """The extra of ``pyproject.toml`` that has what it imports."""
+    """The extra of ``pyproject.toml`` with its imports."""
     needs: tuple[str, ...] = ()
-    """Programs, and files or folders whose names have a slash."""
+    """Needed programs, and paths with a slash."""
 
     def page_of(self, section: str) -> str:
-        """The page in ``docs`` that has this section."""
+        """The page in ``docs`` with this section."""
         return self.sections[section].page or self.page
 
     def module(self, place: str) -> str:
@@ -78,7 +83,7 @@ class Study:
 
 
 class StudyRun:
-    """One run of a study: what it computes is computed once, when the first function asks for it."""
+    """One run of a study, which computes its result once, on first use."""
 
     def __init__(self, study: Study):
         self.study = study
@@ -88,7 +93,7 @@ class StudyRun:
         return self.study.function(self.study.compute)()
 
     def call(self, place: str, *given: object) -> Any:
-        """What the function at a place gives."""
+        """Call the function at a place."""
         function = self.study.function(place)
         parameters = inspect.signature(function).parameters.values()
         wanted = sum(one.default is one.empty for one in parameters)

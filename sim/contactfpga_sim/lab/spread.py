@@ -1,4 +1,4 @@
-"""Times that vary, as an exact distribution, and what is said of them."""
+"""Varying times as an exact distribution, and its summary."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 MEDIAN, MOST = 0.5, 0.99
-"""The two shares of which a time is told, beside the worst."""
+"""Shares of a summary, besides the worst."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,21 +22,21 @@ class Spread:
 
 
 class MixedTimes:
-    """A mixture of times in us, each spread evenly from ``low`` to ``high`` (the same: exactly then), with weights
-    whose sum is 1."""
+    """A mixture of times in us, each uniform from ``low`` to ``high`` (or exact if equal), with weights whose sum is
+    1."""
 
     def __init__(self, low: np.ndarray, high: np.ndarray, weight: np.ndarray):
         self.low, self.high, self.weight = low, high, weight
 
     @classmethod
     def of(cls, times: Sequence[float]) -> MixedTimes:
-        """Single times, each as likely as the others."""
+        """Single times, equally likely."""
         found = np.array(times, float)
         return cls(found, found, np.full(len(found), 1 / len(found)))
 
     @classmethod
     def mixed(cls, parts: Iterable[MixedTimes]) -> MixedTimes:
-        """Each of the parts, as likely as the others."""
+        """A mixture of these parts, equally likely."""
         parts = list(parts)
         low, high, weight = (
             np.concatenate([getattr(one, name) for one in parts]) for name in ("low", "high", "weight")
@@ -44,7 +44,7 @@ class MixedTimes:
         return cls(low, high, weight / len(parts))
 
     def later(self, us: float) -> MixedTimes:
-        """The same, all later by this."""
+        """The times delayed by ``us``."""
         return MixedTimes(self.low + us, self.high + us, self.weight)
 
     def share(self, us: np.ndarray) -> np.ndarray:
@@ -58,11 +58,11 @@ class MixedTimes:
         return found
 
     def quantile(self, share: float) -> float:
-        """The time that this share of all are at most; where times leave a gap there, its middle."""
+        """The time that this share is at most; in a gap of the times, its middle."""
         return (self._at(share, 1e-12) + self._at(share, -1e-12)) / 2
 
     def _at(self, share: float, slack: float) -> float:
-        """The shortest time that this share, less ``slack``, are at most. What is summed is off by rounding."""
+        """The shortest time that this share, less ``slack`` for rounding, is at most."""
         edges, left, right = self._shares
         wanted = share - slack
         at = int(np.searchsorted(right, wanted))
@@ -73,7 +73,7 @@ class MixedTimes:
 
     @property
     def worst(self) -> float:
-        """No time is above this."""
+        """The largest time."""
         return float(self.high.max())
 
     def spread(self) -> Spread:
@@ -82,7 +82,7 @@ class MixedTimes:
 
     @functools.cached_property
     def _shares(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where the share changes its slope or jumps, and there the share of times below, and of times up to it."""
+        """Points where the share's slope changes or it jumps, with the share below and up to each."""
         edges, places = np.unique(np.concatenate([self.low, self.high]), return_inverse=True)
         first, last = np.split(places, 2)
         single = first == last
@@ -97,7 +97,7 @@ class MixedTimes:
 
 
 def summed(one: MixedTimes, other: MixedTimes, share: float) -> float:
-    """The quantile of a sum of two times that do not depend on each other; ``other`` are single times."""
+    """The quantile of a sum of two independent times; ``other`` are single times."""
     low, high = float(one.low.min() + other.low.min()), one.worst + other.worst
     while high - low > 1e-6:
         middle = (low + high) / 2

@@ -1,8 +1,8 @@
-"""What each study makes, and what it takes: one entry a study, in the order of their names."""
+"""The studies' outputs and needs, in the order of their names."""
 
 from __future__ import annotations
 
-from contactfpga_sim.lab.registry import Section, Study
+from contactfpga_sim.lab.registry import NO_ROW, Section, Study
 
 _ALL = (
     Study(
@@ -12,15 +12,24 @@ _ALL = (
         minutes=12,
         sections={
             "matters": Section("tables:matters_text"),
-            "places": Section("tables:places_table"),
-            "effects": Section("tables:effects_table"),
-            "set": Section("tables:set_table"),
+            "places": Section(
+                "tables:places_table",
+                kept=r"^\| (flush, .*|buttons|tiles) \| 10 \| 1 \| 5 |^\| tiles \| 6.4 \| 0.4 \| 5 ",
+            ),
+            "effects": Section(
+                "tables:effects_table",
+                kept=NO_ROW,
+            ),
+            "set": Section("tables:set_table", kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)"),
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),
-            "defense": Section("tables:defense_table"),
-            "pushes": Section("tables:push_table", sample="tables:push_table"),
-            "failures": Section("tables:failure_table"),
-            "steps": Section("tables:step_table"),
+            "defense": Section("tables:defense_table", kept="switch"),
+            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit"),
+            "failures": Section(
+                "tables:failure_table",
+                kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
+            ),
+            "steps": Section("tables:step_table", kept=NO_ROW),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -32,8 +41,8 @@ _ALL = (
         minutes=4,
         sections={
             "outages": Section("tables:outages_table"),
-            "registration": Section("tables:registration_table"),
-            "folds": Section("tables:folds_table", sample="tables:folds_sample"),
+            "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6"),
+            "folds": Section("tables:folds_table", kept=r"^\| [25] ", sample="tables:folds_sample"),
         },
         pictures="tables:draw",
         extra="test",
@@ -54,12 +63,15 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section("tables:front_table"),
-            "families": Section("tables:families_table"),
-            "methods": Section("tables:methods_table", kept=r"^\| \*{0,2}\w+, 6.4 mm, \w+(, 0.2 N\*\*)? \|"),
-            "host": Section("tables:host_table"),
-            "floor": Section("limits:floor_table", kept="6.4 mm"),
-            "other_ways": Section("limits:rivals_section"),
+            "front": Section("tables:front_table", kept=r"\*\*"),
+            "families": Section(
+                "tables:families_table",
+                kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
+            ),
+            "methods": Section("tables:methods_table", kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|"),
+            "host": Section("tables:host_table", kept=r"\| (9|10|28|29|91|92) \|"),
+            "floor": Section("limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm"),
+            "other_ways": Section("limits:rivals_section", kept="6.4 mm"),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -91,15 +103,19 @@ _ALL = (
         page="cover.md",
         minutes=3,
         sections={
-            "closes": Section("caps:felt_table", sample="caps:felt_sample"),
-            "elements": Section("caps:elements_table", page="paper.md"),
+            "closes": Section("caps:felt_table", kept="6.4 mm|10 mm.*the paper", sample="caps:felt_sample"),
+            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
-            "rules": Section("tables:rules_table", page="paper.md"),
-            "failing": Section("tables:failing_table", page="paper.md"),
-            "sense": Section("tables:sense_table"),
-            "thinning": Section("tables:thinning_table", sample="tables:thinning_table"),
-            "foams": Section("tables:foam_table", sample="tables:foam_table"),
+            "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
+            "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
+            "sense": Section("tables:sense_table", kept=r"R\* = 2 mm"),
+            "thinning": Section(
+                "tables:thinning_table", kept=r"^\| (6|0.895|0.252) ms", sample="tables:thinning_table"
+            ),
+            "foams": Section(
+                "tables:foam_table", kept=r"^\| (PORON 4701-30, 320|Plastazote|Sylodyn)", sample="tables:foam_table"
+            ),
         },
         pictures="tables:draw",
         extra="test",
@@ -117,9 +133,9 @@ _ALL = (
         page="failures.md",
         minutes=10,
         sections={
-            "failures": Section("tables:table", kept=r"^\| \["),
-            "closed": Section("tables:closed"),
-            "unnoticed": Section("tables:unnoticed"),
+            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed"),
+            "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
+            "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)"),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
@@ -131,10 +147,10 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-            "fingers": Section("tables:fingers_section", kept="12x12|16x16|20x20|23x23|host|answer|runner"),
-            "bumper": Section("tables:bumper_section", kept="10x10|11x11|host|answer|runner"),
-            "hands": Section("tables:hands_section", kept="12x12|14x14|15x15|host|answer|runner"),
-            "sole": Section("tables:sole_section", kept="20x8|22x9|host|answer|runner"),
+            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner"),
+            "bumper": Section("tables:bumper_section", kept="the answer"),
+            "hands": Section("tables:hands_section", kept="the answer"),
+            "sole": Section("tables:sole_section", kept="the answer"),
         },
         extra="chart",
     ),
@@ -145,8 +161,8 @@ _ALL = (
         minutes=30,
         sections={
             "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table"),
-            "modules": Section("tables:modules_table"),
+            "flipped": Section("tables:designs_table", kept="of registers"),
+            "modules": Section("tables:modules_table", kept="(scan|label) .*`"),
             "ways": Section("tables:ways_table", kept="silently wrong"),
         },
         compute="tables:compute",
@@ -159,13 +175,13 @@ _ALL = (
         page="haptics.md",
         minutes=5,
         sections={
-            "layouts": Section("tables:layouts_table", sample="tables:layouts_table"),
-            "places": Section("tables:places_table"),
-            "wrong": Section("tables:wrong_table"),
-            "felt": Section("tables:felt_table"),
-            "pairs": Section("tables:pairs_table"),
+            "layouts": Section("tables:layouts_table", kept="at one end|best of all", sample="tables:layouts_table"),
+            "places": Section("tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)"),
+            "wrong": Section("tables:wrong_table", kept="30 %|drifted"),
+            "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|"),
+            "pairs": Section("tables:pairs_table", kept="60 mm"),
             "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table", page="haptics_limits.md"),
+            "breaks": Section("tables:breaks_table", page="haptics_limits.md", kept=r"^\| \["),
             "breakpictures": Section(
                 "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
             ),
@@ -194,9 +210,13 @@ _ALL = (
             "kits": Section("tables:headline", page="../README.md"),
             "times": Section("tables:times_table"),
             "built": Section("tables:built_table"),
-            "pins": Section("tables:pins_table"),
-            "parts": Section("tables:parts_table", sample="tables:parts_table"),
-            "predictions": Section("tables:predictions_table", sample="tables:predictions_table"),
+            "pins": Section("tables:pins_table", kept="the kit|22 kΩ alone|reversal"),
+            "parts": Section("tables:parts_table", kept=r"^\| fast \| beside", sample="tables:parts_table"),
+            "predictions": Section(
+                "tables:predictions_table",
+                kept=r"`(contact_worst|break_worst|settle)_us|`felt_half_n",
+                sample="tables:predictions_table",
+            ),
         },
         compute="tables:compute",
         extra="boards",
@@ -232,9 +252,9 @@ _ALL = (
         page="mutants.md",
         minutes=90,
         sections={
-            "mutants": Section("tables:mutants_table"),
-            "options": Section("tables:options_table"),
-            "several": Section("tables:several_table"),
+            "mutants": Section("tables:mutants_table", kept=r"^\| all"),
+            "options": Section("tables:options_table", kept=r"^\| all"),
+            "several": Section("tables:several_table", kept=r"^\| all"),
         },
         compute="tables:compute",
     ),
@@ -245,8 +265,8 @@ _ALL = (
         minutes=2,
         sections={
             "batch": Section("tables:batch_table"),
-            "links": Section("tables:links_table"),
-            "thousand": Section("tables:thousand_table"),
+            "links": Section("tables:links_table", kept=r"^\| (1|16|64) "),
+            "thousand": Section("tables:thousand_table", kept="network|readers"),
         },
         pictures="tables:draw",
         extra="test",
@@ -258,10 +278,12 @@ _ALL = (
         minutes=5,
         sections={
             "reference": Section("scans:reference_table", sample="scans:reference_sample"),
-            "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample"),
-            "report": Section("scans:report_table", sample="scans:report_sample"),
+            "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample", kept=NO_ROW),
+            "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
-            "bridges": Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
+            "bridges": Section(
+                "bridges:bridge_table", kept="1 ms, 0", page="boards.md", sample="bridges:bridge_sample"
+            ),
             "sides": Section("scans:sides_table", sample="scans:sides_sample"),
             "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table"),
             "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",)),
@@ -298,10 +320,10 @@ _ALL = (
         page="rivals.md",
         minutes=60,
         sections={
-            "rivals_made_of": Section("scripts/measure_rivals.py:provenance"),
-            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table"),
-            "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md"),
+            "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
+            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16"),
+            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16"),
+            "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md", kept="16x16"),
         },
         compute="scripts/measure_rivals.py:compute",
         extra="boards",
@@ -313,7 +335,7 @@ _ALL = (
         page="ros.md",
         minutes=10,
         sections={
-            "costs": Section("scripts/measure_ros.py:costs_table"),
+            "costs": Section("scripts/measure_ros.py:costs_table", kept="Contacts|Marker"),
             "shown": Section("scripts/measure_ros.py:shown_table"),
         },
         extra="test",
@@ -325,7 +347,10 @@ _ALL = (
         minutes=5,
         sections={
             "coverage": Section("tables:coverage_table"),
-            "faults": Section("tables:faults_table"),
+            "faults": Section(
+                "tables:faults_table",
+                kept="row is broken|stuck closed|does not close|diode is shorted|no supply|wire of",
+            ),
             "times": Section("tables:times_table", sample="tables:times_table"),
         },
     ),
@@ -342,11 +367,15 @@ _ALL = (
         page="settle.md",
         minutes=2,
         sections={
-            "needs": Section("tables:needs_table"),
-            "breaks": Section("tables:breaks_table"),
+            "needs": Section("tables:needs_table", kept="nominal|500|64x64, rows"),
+            "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]"),
             "shorted": Section("tables:shorted_table", sample="tables:shorted_table"),
-            "summary": Section("tables:summary_table", needs=("ngspice",)),
-            "agreement": Section("tables:agreement_table", kept="30, 2, 3", needs=("ngspice",)),
+            "summary": Section("tables:summary_table", kept=r"^\| all", needs=("ngspice",)),
+            "agreement": Section(
+                "tables:agreement_table",
+                kept=r"^\| (settle|project rows) \| 16x16 \| one cell \| 30, 2, 3",
+                needs=("ngspice",),
+            ),
         },
         pictures="pictures:draw",
     ),
@@ -356,7 +385,7 @@ _ALL = (
         page="several.md",
         minutes=3,
         sections={
-            "several_line": Section("tables:line_table", sample="tables:line_sample"),
+            "several_line": Section("tables:line_table", kept=r"000 \| [148] \|", sample="tables:line_sample"),
             "several_size": Section("tables:size_table", of_netlists=True),
         },
         extra="boards",
@@ -367,9 +396,9 @@ _ALL = (
         page="performance.md",
         minutes=60,
         sections={
-            "gateware": Section("tables:gateware_table", of_netlists=True),
+            "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole"),
             "faults": Section("tables:faults_table", of_netlists=True),
-            "units_size": Section("tables:units_table", page="units.md", of_netlists=True),
+            "units_size": Section("tables:units_table", kept=r"^\| (1|6) ", page="units.md", of_netlists=True),
             "boards": Section("tables:boards_table", page="boards.md"),
         },
         extra="boards",
@@ -389,7 +418,7 @@ _ALL = (
         page="mutants.md",
         minutes=60,
         sections={
-            "tested": Section("scripts/tested_mutants.py:table"),
+            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| (units|all)"),
             "left": Section("scripts/tested_mutants.py:left"),
         },
         compute="scripts/tested_mutants.py:compute",
@@ -403,10 +432,12 @@ _ALL = (
         sections={
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
-            "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table", kept=r"\| 100 \||mean"),
-            "ahead": Section("tables:ahead_table", kept=r"\| 100 \|"),
-            "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
+            "breaks": Section(
+                "tables:breaks_table", kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`"
+            ),
+            "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) "),
+            "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
+            "recorded": Section("tables:recorded_table", kept=r"all \| `Tracker`", needs=("../shared/data",)),
         },
         pictures="tables:draw",
         extra="test",
@@ -417,7 +448,7 @@ _ALL = (
         page="units.md",
         minutes=1,
         sections={
-            "units": Section("tables:units_table", sample="tables:units_table"),
+            "units": Section("tables:units_table", kept=r"\| 6 \|", sample="tables:units_table"),
         },
     ),
     Study(
@@ -427,7 +458,7 @@ _ALL = (
         minutes=4,
         sections={
             "view_load": Section("tables:loads_table"),
-            "view_clicks": Section("tables:clicks_table"),
+            "view_clicks": Section("tables:clicks_table", kept="gateware|until it is drawn|^\\| all"),
         },
         compute="tables:compute",
         pictures="tables:draw",

@@ -2,17 +2,16 @@
 
 From FTDI's AN232B-04, "Data Throughput, Latency and Handshaking":
 
-- A packet is closed when it is full, and when the event character comes, unless that is the packet's first byte.
-- The latency timer runs from the last packet that was sent. When it ends, the open packet is sent, even an empty one.
-  It takes 1 to 255 ms, 16 ms by default.
+- A packet is closed when it is full, and at the event character unless that is the packet's first byte.
+- The latency timer of 1 to 255 ms, by default 16 ms, runs from the last sent packet. When it ends, the open packet is
+  sent, even if empty.
 
-From the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and the
-time that a packet takes on the bus (tables 5-9 and 5-10).
+From the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and a
+packet's time on the bus (tables 5-9 and 5-10).
 
-Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip then sends all
-packets that are closed, first in first out. Real controllers ask again within a frame, so bytes may come sooner, by one
-frame at most. The timer counts from frame to frame. Nothing else is on the bus, nothing is repeated, no bits are
-stuffed, and a byte is in the chip when its stop bit ends.
+Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip then sends all closed
+packets in order. Real controllers ask again within a frame, so bytes may be up to one frame earlier. The timer counts
+frames. The bus is otherwise idle, without errors or bit stuffing, and a byte is in the chip when its stop bit ends.
 """
 
 from __future__ import annotations
@@ -29,33 +28,33 @@ from contactfpga.driver.health import EVENT_CHAR, LATENCY_MS
 from contactfpga_sim.lab.spread import MixedTimes
 
 STATUS_BYTES = 2
-"""At the beginning of each packet (AN232B-04)."""
+"""Status bytes at the beginning of each packet (AN232B-04)."""
 
 OVERHEAD_BYTES = {False: 13, True: 55}
-"""Of a bulk packet beside its data: full speed, high speed (USB 2.0, tables 5-9 and 5-10)."""
+"""Bus bytes of a bulk packet besides its data: full speed, high speed (USB 2.0, tables 5-9 and 5-10)."""
 
 BITS_PER_US = {False: 12, True: 480}
 
 DEFAULT_TIMER_MS = 16
-"""Of the chip after power-up, which then has no event character."""
+"""Latency timer after power-up, without an event character."""
 
 LONGEST_TIMER_MS = 255
 
 _TICKS_PER_CLOCK = 16_000
-"""Twice the 8,000 microframes of a second, so that all times, and the middles between two, are whole ticks."""
+"""Twice the 8,000 microframes per second, so that all times, and midpoints, are whole ticks."""
 
 _NEVER = np.iinfo(np.int64).max // 2
 
 
 @dataclasses.dataclass(frozen=True)
 class BridgeSettings:
-    """A bridge as the host has set it; by default as the rule of ``contactfpga doctor`` does."""
+    """A bridge's settings, by default those of ``contactfpga doctor``."""
 
     chip: Bridge
     timer_ms: int = LATENCY_MS
-    """Its latency timer, 1 to 255 ms."""
+    """Latency timer, 1 to 255 ms."""
     event: int | None = EVENT_CHAR & 0xFF
-    """Its event character; None: it has none."""
+    """Event character; None: none."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.timer_ms <= LONGEST_TIMER_MS:
@@ -63,22 +62,22 @@ class BridgeSettings:
 
     @property
     def period_us(self) -> int:
-        """Of the packets that the timer sends while no byte comes, in us."""
+        """Period in us of the timer's packets while no byte arrives."""
         return self.period_frames * self.chip.frame_us
 
     @property
     def period_frames(self) -> int:
-        """The same in frames, or microframes."""
+        """Period of the timer's packets in frames or microframes."""
         return math.ceil(1000 * self.timer_ms / self.chip.frame_us)
 
     def packet_us(self, data_bytes: int) -> float:
-        """Time in us that a packet with this many bytes of the UART takes on the bus."""
+        """Time in us on the bus of a packet with this many UART bytes."""
         high_speed = self.chip.high_speed
         return 8 * (OVERHEAD_BYTES[high_speed] + STATUS_BYTES + data_bytes) / BITS_PER_US[high_speed]
 
 
 class BridgeChip:
-    """The chip, byte by byte; times in any unit, that of ``timer``. ``sent``: when it has sent last."""
+    """The chip, byte by byte, in any time unit, that of ``timer``. ``sent``: time of the last packet."""
 
     def __init__(self, payload_bytes: int, timer: float, event: int | None = None, sent: float = 0.0):
         self._payload_bytes, self._timer, self._event = payload_bytes, timer, event
@@ -88,11 +87,11 @@ class BridgeChip:
         self._sent = sent
 
     def put(self, time: float, value: int) -> None:
-        """A byte whose stop bit ends at this time; in their order."""
+        """Add a byte by the end of its stop bit, in order."""
         self._coming.append((time, value))
 
     def take(self, now: float) -> list[bytes]:
-        """The packets that the host takes now; called at the start of each of its frames."""
+        """The packets that the host reads; call it at the start of each frame."""
         while self._coming and self._coming[0][0] <= now:
             self._receive(self._coming.popleft()[1])
         packets, self._closed = self._closed, []
@@ -111,24 +110,24 @@ class BridgeChip:
 
 
 class ByteStream(NamedTuple):
-    """What was on a UART's line, in clocks from any origin."""
+    """Bytes on a UART's line, in clocks from any origin."""
 
     times: np.ndarray
-    """Of each byte, rising: when its stop bit ended."""
+    """End of each byte's stop bit, rising."""
     values: np.ndarray
     since: int
-    """All bytes are known whose stop bit ended later than this,"""
+    """Time after which all bytes are known."""
     until: int
-    """and not later than this."""
+    """Time up to which all bytes are known."""
 
 
 def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte: int) -> MixedTimes:
-    """When the byte with this number is with the host, in us from the stream's origin, over all phases of the chip
-    against the board, each as likely as the others.
+    """Delivery time of the byte with this number, in us from the stream's origin, over all equally likely phases of the
+    chip against the board.
 
-    In each phase the chip has sent all that it held at one moment in its first period
-    (:attr:`BridgeSettings.period_us`) from ``since`` on. So the byte must come later than that period; where the line
-    never rests, by another one. Raises ValueError where the stream begins too late or ends too soon to tell.
+    In each phase the chip is empty once in its first period (:attr:`BridgeSettings.period_us`) from ``since``. So the
+    byte must be later than that period; on a line without rests, by another one. Raises ValueError if the stream is too
+    short.
     """
     phases = _Phases(settings, clock_hz, stream)
     sent, bus_us = phases.sent(byte)
@@ -138,8 +137,8 @@ def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte:
 
 
 class _Phases:
-    """The chip in all of its phases at once, in ticks. A phase stands for those around it in which each byte comes
-    between the same two frames, all of which go the same way."""
+    """The chip in all of its phases at once, in ticks. A phase stands for its neighborhood in which each byte is
+    between the same two frames."""
 
     def __init__(self, settings: BridgeSettings, clock_hz: int, stream: ByteStream):
         self._settings = settings
@@ -156,8 +155,8 @@ class _Phases:
         self.widths = np.tile(ends - edges, settings.period_frames)
 
     def _closings(self, values: np.ndarray) -> np.ndarray:
-        """By the number of the first byte of a packet that of its last one, unless the timer ends it; one entry more
-        than there are bytes, and the number of bytes where no packet is closed any more."""
+        """Last byte of a packet by its first byte, unless the timer ends it; one entry more than bytes, and the number
+        of bytes if no packet is closed any more."""
         count = len(values)
         found = np.arange(count + 1) + self._settings.chip.payload_bytes - 1
         if self._settings.event is not None:
@@ -167,8 +166,7 @@ class _Phases:
         return np.minimum(found, count)
 
     def sent(self, byte: int) -> tuple[np.ndarray, np.ndarray]:
-        """By phase the tick of the frame in which a byte is sent, and the time on the bus from there to the end of its
-        packet in us."""
+        """By phase the tick of the frame that sends a byte, and the bus time in us to the end of its packet."""
         opened = np.searchsorted(self._times, self._first, "right")
         if (opened > byte).any():
             raise ValueError(f"byte {byte} comes before the chip has sent once; give more of what was sent before it")
@@ -192,8 +190,7 @@ class _Phases:
     def _send(
         self, start: np.ndarray, at: np.ndarray, by_timer: np.ndarray, byte: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What is sent in a frame, up to the packet with the byte: the first byte that is not, and the bus's time in
-        us."""
+        """Bytes sent in a frame, up to the packet with the byte: the first unsent byte, and the bus time in us."""
         start, us = start.copy(), np.zeros(len(start))
         while True:
             closing = self._closing[start]

@@ -1,6 +1,6 @@
 """Markdown tables, and sections of pages: text between ``<!-- figures: NAME of FINGERPRINT -->`` and ``<!-- end -->``.
 
-The fingerprint stands for the code that the text was made by; a section that was never made has none.
+The fingerprint is of the code that made the text; a section that was never made has none.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from contactfpga.inputs.files import write_text
 from contactfpga.tools.console import outputs
 
 Tables = Mapping[str, Callable[[], str]]
-"""What makes each table, by its name."""
+"""The maker of each table, by name."""
 
 _SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end -->", re.DOTALL)
 
 
 class PageSection(NamedTuple):
-    """A section as it stands in a page."""
+    """A section of a page."""
 
     text: str
     fingerprint: str
-    """Empty where none was stated."""
+    """Empty if none is stated."""
 
 
 def sections(page: str) -> dict[str, PageSection]:
@@ -43,13 +43,12 @@ def table(head: Sequence[str], lines: Iterable[str]) -> str:
 
 
 def table_of(rows: Sequence[Sequence[str]]) -> str:
-    """The same from cells; the first row is the head."""
+    """A whole table from cells; the first row is the head."""
     return table(rows[0], map(line, rows[1:]))
 
 
 def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
-    """The text of a page with those of its sections made anew that are among ``tables``, with their fingerprint; for
-    None it stays as it was."""
+    """A page's text with the sections among ``tables`` rewritten, with their fingerprint; None keeps it."""
 
     def made(match: re.Match[str]) -> str:
         name, before = match[1], match[2]
@@ -63,7 +62,7 @@ def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
 
 
 def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
-    """Write the tables into a page, as :func:`update` does; each is there as soon as it is made."""
+    """Write the tables into a page with :func:`update`, each as soon as it is made."""
     for name, measure in tables.items():
         before = path.read_text(encoding="utf-8")
         if name in sections(before):
@@ -71,7 +70,7 @@ def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
 
 
 def page(path: str | Path, option: str = "page") -> Path:
-    """The page, which is there and can be written; looked at before anything is measured for it. Raises
+    """The page, checked to be writable before the measurements. Raises
     :class:`~contactfpga.tools.console.outputs.OutputError`."""
     if not Path(path).is_file():
         raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")

@@ -1,1 +1,1 @@
-"""What the gateware is held against: golden model, simulated sheet, scenes, virtual board."""
+"""References for the gateware: golden model, simulated sheet, scenes, virtual board."""

@@ -1,1 +1,1 @@
-"""What shows that gateware and model agree: lockstep, proofs, mutants, netlists."""
+"""Evidence that gateware and model agree: lockstep, proofs, mutants, netlists."""

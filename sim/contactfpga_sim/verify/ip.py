@@ -26,11 +26,11 @@ from contactfpga_sim.verify.cosim.record import InputDriver
 
 NAME = "contactfpga_core"
 SCANS = 4
-"""That the vectors hold after the hello."""
+"""Scans in the vectors after the hello."""
 RESET = 4
-"""Clocks of reset at the beginning."""
+"""Initial clocks of reset."""
 MOST_CLOCKS = 100_000
-"""Of vectors: a minute or two in Amaranth's simulator."""
+"""Most clocks of vectors: a minute or two in Amaranth's simulator."""
 
 # As Amaranth does for its own Verilog: processes stay processes, so that conditions can be read.
 _VERILOG = f"""read_rtlil core.il
@@ -70,7 +70,7 @@ MEANINGS = {
 
 
 class IpError(ContactFPGAError):
-    """There is no such core; the message says why."""
+    """The Skin has no such core; the message gives the reason."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,12 +84,12 @@ class Port:
 
     @property
     def range(self) -> str:
-        """As Verilog declares it."""
+        """Range in Verilog."""
         return f"[{self.bits - 1}:0] " if self.bits > 1 else ""
 
 
 def ports(skin: Skin, core: Core) -> list[Port]:
-    """Clock, reset and all others in the order of the vectors: inputs, then outputs."""
+    """Clock, reset and all others in the vectors' order: inputs, then outputs."""
     found = [(name, member.flow == In, len(getattr(core, name))) for name, member in core.signature.members.items()]
     every = [("clk", True, 1), ("rst", True, 1), *sorted(found, key=lambda port: not port[1])]
     said = {name: text.format(clock_hz=skin.clock_hz, baud=skin.baud) for name, text in MEANINGS.items()}
@@ -97,7 +97,7 @@ def ports(skin: Skin, core: Core) -> list[Port]:
 
 
 def write(skin: Skin, folder: Path) -> list[Path]:
-    """Write all files of the core into a folder, which is there.
+    """Write all files of the core into an existing folder.
 
     Raises :class:`IpError` if the Skin has no core.
     """
@@ -129,17 +129,17 @@ def verilog(skin: Skin) -> str:
 
 
 def _started(text: str) -> str:
-    """Verilog that a simulator of four states computes from the first clock on.
+    """Verilog that four-state simulators compute correctly from the first clock on.
 
-    It computes a block once something in it changes. Yosys writes into most blocks a signal for that, which here does
-    change once, and comes into all others. What memories give begins with 0.
+    They compute a block once an input changes. Yosys writes into most blocks a signal for that, which here does change
+    once, and is added to all others. Memory outputs begin with 0.
     """
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
     return re.sub(r"^(  reg (?:\[\d+:0\] )?_\d+_);$", r"\1 = 0;", "".join(modules), flags=re.MULTILINE)
 
 
 def _triggered(module: str) -> str:
-    """The same for one module."""
+    """:func:`_started` for one module."""
     alone = re.compile(r"^  always @\*\n    (.*;)$", re.MULTILINE)
     found = re.search(r"^  reg (\\\$auto\$verilog_backend\S+ ) = 0;\n", module, re.MULTILINE)
     if not found and not alone.search(module):
@@ -151,7 +151,7 @@ def _triggered(module: str) -> str:
 
 
 def _head(skin: Skin) -> str:
-    """Says of what the file is made. Yosys writes operands in their own widths, which Verilog extends as it should."""
+    """Header that names the sources. Yosys writes operands in their own widths, which Verilog extends correctly."""
     return (
         f"// contactfpga {__version__}: {skin.rows}x{skin.columns} switches, Skin {skin.fingerprint.hex()}. Made by "
         "`contactfpga ip`.\n/* verilator lint_off WIDTHEXPAND */\n/* verilator lint_off WIDTHTRUNC */\n"
@@ -163,7 +163,7 @@ def _head(skin: Skin) -> str:
 def simulated(skin: Skin, core: Core, known: list[Port]) -> list[int]:
     """Inputs and outputs of each clock as a word, inputs lowest, in Amaranth's simulator.
 
-    After the hello two switches close and open again, and the stream's reader stalls in a quarter of the clocks.
+    After the hello two switches close and open, and the stream's reader stalls in a quarter of the clocks.
     """
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[0, 0] = cells[-1, -1] = True
@@ -204,7 +204,7 @@ def _signal(core: Core, clock_domain: ClockDomain, port: Port) -> Any:
 
 
 def assertions(skin: Skin, known: list[Port]) -> str:
-    """What holds at the pins in every clock, as immediate assertions that Yosys, Verilator and Icarus take."""
+    """Invariants at the pins, as immediate assertions for Yosys, Verilator and Icarus."""
     declared = ",\n".join(f"    input wire {port.range}{port.name}" for port in known)
     rows = "~rows" if skin.selects_low else "rows"
     one_row = (
@@ -233,7 +233,7 @@ module {NAME}_sva (
 
 
 def testbench(known: list[Port], clocks: int) -> str:
-    """Plays the vectors and compares every output in every clock."""
+    """A testbench that plays the vectors and compares every output in every clock."""
     inside = known[1:]
     takes, gives = ([port for port in inside if port.takes is taken] for taken in (True, False))
     wide, out = (sum(port.bits for port in some) for some in (takes, gives))
@@ -308,7 +308,7 @@ endmodule
 
 
 def constraints(skin: Skin, known: list[Port]) -> str:
-    """The clock, and inputs that come at any time."""
+    """Constraints of the clock and the asynchronous inputs."""
     there = [port.name for port in known if port.name in ("rx", "columns", "column_data", "rows_read")]
     paths = "".join(f"set_false_path -from [get_ports {{{name}*}}]\n" for name in there)
     return f"create_clock -name clk -period {1e9 / skin.clock_hz:.3f} [get_ports clk]\n{paths}"

@@ -23,34 +23,34 @@ from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, ports
 
 MOST_CLOCKS = 400_000
-"""Some minutes in Amaranth's simulator."""
+"""Most clocks, some minutes in Amaranth's simulator."""
 SHEET = ("rows", "columns", "contact")
-"""Pins that are shown first; the others follow in the order in which the data takes them."""
+"""Pins shown first; the others follow in data order."""
 STAGES = ("row", "record", "item", "byte")
 FS = 10**15
-"""Of a second, the unit of time in the file."""
+"""Femtoseconds per second; the file's time unit is 1 fs."""
 
 
 class WaveError(ContactFPGAError):
-    """There is no such waveform; the message says why."""
+    """There is no such waveform; the message gives the reason."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SimulatedTouch:
-    """A touch that was simulated, in clocks from power-up."""
+    """A simulated touch, in clocks from power-up."""
 
     begins: int
-    """Where the waveform begins."""
+    """Start of the waveform."""
     touched: int
     ends: int
     """One bit after the last byte of the frame."""
     zones: Zones
-    """What the host gets."""
+    """Zones that the host receives."""
     trace: Trace
 
 
 def finger(skin: Skin) -> np.ndarray:
-    """(rows, columns) bool: up to 2x2 cells in the middle of the sheet that no mask covers."""
+    """(rows, columns) bool: up to 2x2 unmasked cells in the middle of the sheet."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     row, column = max(skin.rows // 2 - 1, 0), max(skin.columns // 2 - 1, 0)
     cells[row : row + 2, column : column + 2] = True
@@ -60,10 +60,9 @@ def finger(skin: Skin) -> np.ndarray:
 
 
 def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> SimulatedTouch:
-    """Press these (rows, columns) bool cells in the middle of a scan, once the board has said hello; write the
-    waveform.
+    """Press these (rows, columns) bool cells in the middle of a scan, after the hello; write the waveform.
 
-    Raises :class:`WaveError` if no frame of theirs comes within :data:`MOST_CLOCKS`, and
+    Raises :class:`WaveError` without a frame of theirs within :data:`MOST_CLOCKS`, and
     :class:`~contactfpga_sim.verify.cosim.compare.Mismatch` if the gateware differs from the golden model in any clock.
     """
     if cells.shape != (skin.rows, skin.columns) or not cells.any():
@@ -85,7 +84,7 @@ def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> SimulatedTouch:
 
 
 def _hello(skin: Skin) -> int:
-    """Clocks that the hello at power-up may take, with the scan that it waits for."""
+    """Clocks of the hello at power-up, with the scan that it waits for."""
     scan, size = skin.derived.frame_clocks, len(protocol.encode_hello(skin))
     return 2 * scan + 10 * size * skin.derived.bit_clocks
 
@@ -105,7 +104,7 @@ def _sent(skin: Skin, timeline: Timeline, touched: int) -> tuple[int, Zones]:
 
 
 def cut(lines: Iterable[str], begin: int) -> Iterator[str]:
-    """The lines of a VCD file from a time on, which becomes 0. Each signal begins with the value that it has then."""
+    """The lines of a VCD file from a time on, which becomes 0. Each signal begins with its value at that time."""
     lines, last = iter(lines), dict[str, str]()
     for line in lines:
         yield re.sub(r"^(\$var \w+ \d+ \S+ )\$", r"\1", line)  # readers take no name that begins so
@@ -124,18 +123,18 @@ def cut(lines: Iterable[str], begin: int) -> Iterator[str]:
 
 
 def _name(change: str) -> str:
-    """The short name of the signal that changes: after the space, or after a single bit."""
+    """The short name of the changing signal: after the space, or after a single bit."""
     return change.split()[1] if change[0] in "bBrRsS" else change[1:].strip()
 
 
 def shown(skin: Skin) -> list[str]:
-    """Ports of the gateware that a viewer is to show: pins of the sheet, what each stage hands over, the line."""
+    """Ports to show in a viewer: pins of the sheet, transfers between stages, the line."""
     stages = [name for stage in STAGES for name in (*LEVELS, *PAYLOADS) if name.startswith(stage)]
     return [*SHEET, *ports(tuple(stages), skin), "tx"]
 
 
 def layouts(skin: Skin, vcd: Path) -> list[Path]:
-    """Write beside the waveform what viewers are to show: a save file for GTKWave, commands for Surfer."""
+    """Write viewer settings beside the waveform: a save file for GTKWave, commands for Surfer."""
     gtkw, surfer = vcd.with_suffix(".gtkw"), vcd.with_suffix(".sucl")
     with vcd.open(encoding="ascii") as lines:
         bits = _ports(lines)
@@ -147,7 +146,7 @@ def layouts(skin: Skin, vcd: Path) -> list[Path]:
 
 
 def _ports(lines: Iterable[str]) -> dict[str, int]:
-    """Bits of each signal by its name, of the outermost module that has the name."""
+    """Bits of each signal by name, of the outermost module with the name."""
     found: dict[str, int] = {}
     for line in lines:
         match line.split():

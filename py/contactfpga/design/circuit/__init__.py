@@ -1,7 +1,7 @@
-"""The sheet as a circuit: which levels, currents and times its lines, switches, diodes and pins come to.
+"""The sheet as a circuit: levels, currents and times of its lines, switches, diodes and pins.
 
-One model for all that asks: `contactfpga settle`, the check of a Skin that states its circuit, the virtual board, the
-study of failures. SI units; capacitances in pF and times in us where a name says so.
+One model for all users: `contactfpga settle`, the check of a Skin that states its circuit, the virtual board, the study
+of failures. SI units; capacitances in pF and times in us where a name says so.
 """
 
 from contactfpga.design.circuit.static import Problem, check, load_checked, problems

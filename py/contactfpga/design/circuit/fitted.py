@@ -1,10 +1,9 @@
-"""Values of a sheet's circuit from how long its cells took to read pressed (`contactfpga wire --settle`).
+"""Values of a sheet's circuit from the times in which its cells read pressed (`contactfpga wire --settle`).
 
-A cell's time is that of the model for as many pressed switches in its row, times a factor of its row and one of its
-column, which scatter from line to line with a median of 1. What is fitted holds for the sheet as a whole. With one
-number of pressed switches the capacitance of the lines can be told; with two, the resistance of a closed switch as
-well. Resistors of pins and lines are taken from the circuit that is given: with the capacitance they make one product.
-So does VIL, at which a pin is taken to read low.
+A cell's time is the model's for as many pressed switches in its row, times a factor of its row and one of its column,
+which scatter with a median of 1. The fit is for the whole sheet. One number of pressed switches determines the
+capacitance of the lines; two also the resistance of a closed switch. Resistors of pins and lines are taken from the
+given circuit, as they form one product with the capacitance; so is VIL, below which a pin surely reads low.
 """
 
 from __future__ import annotations
@@ -21,34 +20,34 @@ from contactfpga.design.circuit.phases import Levels
 from contactfpga.design.circuit.values import LIMITS, Circuit, CircuitError
 
 NAMES = ("line_pf", "switch_ohm")
-"""Fields of :class:`Circuit` that are fitted, in this order, as many as there are readings that tell something."""
+"""Fields of :class:`Circuit` that are fitted, in order, one per informative reading."""
 PROBABILITY = 0.95
-"""With which intervals hold by default, all at once."""
+"""Default probability that all intervals hold."""
 LEAST_LINES = 3
-"""Rows, and columns, that must have been measured."""
+"""Least number of fully measured rows, and of columns."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
 """Newton's method takes at most this many rounds, ends at this relative change, and differentiates over this relative
-step. The model's times jump by some 1e-4, because it advances in discrete steps."""
+step. The model's times jump by some 1e-4, from its discrete steps."""
 NEARLY = 0.02
-"""The change at which it ends where it does not come to rest; intervals are several times wider."""
+"""Accepted change if it does not converge; intervals are several times wider."""
 DRAWS = 20_000
-"""By which the factor of the intervals is found."""
+"""Random draws that give the factor of the intervals."""
 HARMONICS = 6
 SCATTER = 2.0
-"""Lines scatter if their means vary by this many times what their cells explain."""
+"""Lines count as scattering if their means vary by this many times what their cells explain."""
 MOST_FREEDOM = 1e6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SettleReading:
-    """How long each cell of a sheet took to read pressed, while all rows had the same number of pressed switches."""
+    """Time of each cell of a sheet to read pressed, with the same number of pressed switches in all rows."""
 
     pressed: int
-    """Switches in each row that pull their column, with that of a guard column."""
+    """Pressed switches in each row that pull their column, including a guard column."""
     clocks: np.ndarray
-    """(rows, columns) of the least clocks at which a cell reads pressed; 0 where that is not known."""
+    """(rows, columns) least clocks at which a cell reads pressed; 0 if unknown."""
     first: int
-    """Least clocks at which the board can sample: a cell that shows these may be faster."""
+    """Earliest sampling clock of the board: a cell with this value may be faster."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,21 +58,21 @@ class FittedValue:
     value: float
     low: float
     high: float
-    """All intervals of a fit together cover the true values with its probability."""
+    """Upper end; all intervals of a fit together cover the true values with its probability."""
 
     @property
     def told(self) -> bool:
-        """Whether the interval ends before the limits of what a circuit may have: else the readings do not tell it."""
+        """Whether the interval is within the limits of a circuit; otherwise the readings do not determine the value."""
         least, most, _ = LIMITS[self.name]
         return least < self.low and self.high < most
 
 
 @dataclasses.dataclass(frozen=True)
 class FittedCircuit:
-    """What could be told of a circuit."""
+    """A fitted circuit and its intervals."""
 
     circuit: Circuit
-    """The one that was given, with the fitted values."""
+    """The given circuit with the fitted values."""
     values: tuple[FittedValue, ...]
     rows: int
     """Number of rows whose cells were measured."""
@@ -82,8 +81,8 @@ class FittedCircuit:
 
 
 def settle_s(circuit: Circuit, rows: int, columns: int, diodes: str, pressed: int) -> float:
-    """Seconds from the moment a row is selected until its slowest column reads pressed; infinite if it never does.
-    ``pressed``: the number of pressed switches in each row."""
+    """Seconds from selecting a row until its slowest column reads pressed; infinite if never. ``pressed``: the number
+    of pressed switches in each row."""
     network = Network(circuit, np.tile(np.arange(columns) < pressed, (rows, 1)))
     done = phases.passed(phases.settle(network, Levels.of(circuit, diodes)))
     return float(done.phase.arrived(done.trace.seconds, done.trace.volts)[:pressed].max())
@@ -98,11 +97,12 @@ def fit_circuit(
     diodes: str = "col2row",
     probability: float = PROBABILITY,
 ) -> FittedCircuit:
-    """The circuit of a sheet from one or two readings. ``rows`` and ``columns`` count guard lines, too.
-    ``probability``: the share of sheets in which all intervals are to cover the truth together.
+    """The circuit of a sheet from one or two readings. ``rows`` and ``columns`` include guard lines. ``probability``:
+    the share of sheets in which all intervals together cover the truth.
 
-    Raises :class:`CircuitError` where the readings do not tell: with fewer than three rows or columns that were
-    measured as a whole, with cells that are faster than the board's first sample, or where no values would do."""
+    Raises :class:`CircuitError` for fewer than three fully measured rows or columns, for cells faster than the board's
+    first sample, or if no values fit.
+    """
     readings = sorted(readings, key=lambda one: one.pressed)[: len(NAMES)]
     names = NAMES[: len({one.pressed for one in readings})]
     if not readings or len(names) < len(readings):
@@ -140,7 +140,7 @@ def fit_circuit(
 
 
 def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
-    """Rows and columns between which all cells are known; lines with the most gaps are left out one after the other."""
+    """Rows and columns between which all cells are known, after removing the lines with the most gaps one by one."""
     rows, columns = ([*range(count)] for count in known.shape)
     while rows and columns and not known[np.ix_(rows, columns)].all():
         gaps = ~known[np.ix_(rows, columns)]
@@ -160,7 +160,7 @@ def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
 def _solved(
     times: Callable[[np.ndarray], np.ndarray], start: np.ndarray, goal: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The values whose logarithms of times are those of ``goal``, and how these change with the values."""
+    """The values for which the logarithms of ``times`` equal ``goal``, and their derivatives by the goal."""
     values = start.astype(float)
     low, high = (np.array([LIMITS[name][end] for name in names], float) for end in (0, 1))
     for number in range(ROUNDS):
@@ -187,8 +187,8 @@ def _solved(
 
 
 def _rounding_variance(clocks: np.ndarray) -> float:
-    """The variance that rounding to whole clocks adds to the logarithm of the mean. Where times scatter by less than a
-    clock, all are rounded alike, so the mean is off by up to half a clock. Each offset is taken to be as likely."""
+    """Variance added to the logarithm of the mean by rounding to whole clocks. If times scatter by less than a clock,
+    all are rounded alike, and the mean is off by up to half a clock, uniformly."""
     variance = max(0.0, float(clocks.var()) - 1 / 12)
     harmonics = np.arange(1, HARMONICS + 1)
     off = float(np.sum(np.exp(-4 * np.pi**2 * harmonics**2 * variance) / (2 * np.pi**2 * harmonics**2)))
@@ -196,9 +196,9 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
-    """The variance of the mean of (rows, columns) cells, and its degrees of freedom after Satterthwaite, by a two-way
-    analysis of variance: each row and each column shifts its cells. Lines that scatter no more than their cells explain
-    are taken not to scatter."""
+    """The variance of the mean of (rows, columns) cells, and its degrees of freedom (Satterthwaite), by a two-way
+    analysis of variance with row and column effects. Lines that scatter no more than their cells explain count as
+    equal."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean
@@ -215,7 +215,7 @@ def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
 
 
 def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, n) of the means of (n, rows, columns), with the variances that rounding adds, and (n,) degrees of freedom."""
+    """(n, n) covariance of the means of (n, rows, columns), including rounding, and (n,) degrees of freedom."""
     count = len(cells)
     covariance, degrees = np.empty((count, count)), np.empty(count)
     alone = [_mean_variance(each) for each in cells]
@@ -233,7 +233,7 @@ def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _factor(covariance: np.ndarray, degrees: np.ndarray, probability: float) -> float:
-    """By how many standard deviations all of the values are off at most, with this probability."""
+    """The number of standard deviations that none of the values exceeds with this probability."""
     rng = np.random.default_rng(0)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)

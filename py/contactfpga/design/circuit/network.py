@@ -1,7 +1,7 @@
 """A sheet's circuit as equations: charge and current of every line and of every pressed switch's diode.
 
 Volts are those of a sheet whose selected row is low (``diodes = "col2row"``). The other direction is its mirror image:
-what is high is low, and each level counts from the supply.
+high and low are exchanged, and levels count from the supply.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from contactfpga.design.circuit.values import THERMAL_V, Circuit, Diode, knee_v
 
 PF = 1e-12
 LEAK_S = 1e-12
-"""Of each line, so that one that nothing drives has a level."""
+"""Leakage of each line, which gives undriven lines a level."""
 FORWARD = 0.5
-"""Share of the junction's voltage above which its capacitance goes on as a straight line, as in SPICE."""
+"""Share of the junction voltage above which its capacitance continues linearly, as in SPICE."""
 OFF = float("nan")
-"""In place of a level: the pin does not drive."""
+"""Value for a pin that does not drive."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ class CircuitState:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """What pins do to the lines, columns before rows: (lines,) volts, :data:`OFF` where a pin does not drive."""
+    """Drives of the lines, columns before rows: (lines,) volts, :data:`OFF` where a pin does not drive."""
 
     volts: np.ndarray
 
     @classmethod
     def of(cls, columns: np.ndarray | float, rows: np.ndarray | float, network: Network) -> Drive:
-        """One value stands for all columns or rows."""
+        """A drive of all columns and rows; a single value is for all."""
         parts = np.full(network.columns, columns, float), np.full(network.rows, rows, float)
         return cls(np.concatenate(parts))
 
@@ -45,7 +45,8 @@ class Drive:
 class Network:
     """A sheet with pressed switches.
 
-    ``pressed``: (rows, columns) bool. ``bare``: the same, switches without a diode, which conduct both ways.
+    ``pressed``: (rows, columns) bool. ``bare``: (rows, columns) bool, switches without a diode, which conduct both
+    ways.
     """
 
     def __init__(self, circuit: Circuit, pressed: np.ndarray, bare: np.ndarray | None = None):
@@ -72,20 +73,20 @@ class Network:
         return found
 
     def drive_s(self, drive: Drive) -> np.ndarray:
-        """(lines,) siemens between each line and what its pin drives it to; 0 where it does not."""
+        """(lines,) siemens between each line and its pin's level; 0 where it does not drive."""
         return np.where(np.isnan(drive.volts), 0.0, 1 / self.circuit.drive_ohm)
 
     def pin_amperes(self, lines: np.ndarray, drive: Drive) -> np.ndarray:
-        """(..., lines) out of each pin that drives, for volts of the same shape."""
+        """(..., lines) current out of each driving pin, for volts of the same shape."""
         return np.asarray(self.drive_s(drive) * (np.nan_to_num(drive.volts) - lines))
 
     def unpressed(self) -> CircuitState:
-        """All lines and junctions at 0 V, to begin a search with."""
+        """All lines and junctions at 0 V, to start a search."""
         return CircuitState(np.zeros(self.rows + self.columns), np.zeros(len(self.row_of)))
 
 
 def _capacitances(circuit: Circuit, rows: int, columns: int) -> np.ndarray:
-    """(lines, lines): charge of each line for volts of all."""
+    """(lines, lines): charge of each line per volt of all lines."""
     between = np.zeros((rows + columns, rows + columns))
     between[:columns, columns:] = circuit.crossing_pf
     for start, count in ((0, columns), (columns, rows)):
@@ -96,7 +97,7 @@ def _capacitances(circuit: Circuit, rows: int, columns: int) -> np.ndarray:
 
 
 def charge(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coulombs of a junction and farads."""
+    """Charge of a junction in coulombs, and its capacitance in farads."""
     edge, power = FORWARD * diode.junction_v, 1 - diode.grading
     below = 1 - np.minimum(volts, edge) / diode.junction_v
     slope = below**-diode.grading
@@ -107,15 +108,14 @@ def charge(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def current(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Amperes through a junction and siemens."""
+    """Current through a junction in amperes, and its conductance in siemens."""
     step = diode.emission * THERMAL_V
     grown = diode.saturation_a * np.exp(np.minimum(volts / step, 200.0))
     return grown - diode.saturation_a, grown / step
 
 
 def held_back(diode: Diode, volts: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The next guess of Newton's method where the one ``wanted`` is far up the exponential: as far as the current that
-    it asks for takes the junction."""
+    """A limited Newton guess for one that is ``wanted`` far up the exponential: the junction voltage of its current."""
     step, knee = diode.emission * THERMAL_V, knee_v(diode)
     far = (wanted > knee) & (np.abs(wanted - volts) > 2 * step)
     if not far.any():

@@ -1,4 +1,4 @@
-"""Patterns of pressed switches that are the worst ones for some time or level."""
+"""Patterns of pressed switches that are worst for some time or level."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 
 def named(rows: int, columns: int) -> Mapping[str, np.ndarray]:
-    """(rows, columns) bool each. The row that is selected and the line that is left out are the middle ones, which have
-    a neighbor on each side."""
+    """(rows, columns) bool each. The selected row and the omitted line are the middle ones, with a neighbor on each
+    side."""
     row, column = middle(rows), middle(columns)
     none = np.zeros((rows, columns), bool)
     found = {name: none.copy() for name in ("nothing", "one cell", "one row", "one row but a cell", "one column")}

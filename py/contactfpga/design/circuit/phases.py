@@ -1,4 +1,4 @@
-"""What a scan does to the sheet, step by step, and when the lines that are read have got where they must be."""
+"""The steps of a scan on the sheet, and when the lines that are read have settled."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from contactfpga.design.circuit.values import Circuit
 FULL = 0.95
 """Share of the supply at which a line counts as charged, and a row as released."""
 NEAR_V = 0.05
-"""A line this near to its rest pulls no other one any further."""
+"""Distance from its rest below which a line no longer pulls others."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Volts in the frame of :mod:`contactfpga.design.circuit.network`: what surely reads low, and surely high."""
+    """Volts in the frame of :mod:`contactfpga.design.circuit.network` that surely read low, and surely high."""
 
     low: float
     high: float
 
     @classmethod
     def of(cls, circuit: Circuit, diodes: str = "col2row") -> Levels:
-        """A sheet whose selected row is high is computed as its mirror image."""
+        """Levels of a circuit; a sheet whose selected row is high is computed as its mirror image."""
         if diodes == "row2col":
             return cls(circuit.supply_v - circuit.high_v, circuit.supply_v - circuit.low_v)
         return cls(circuit.low_v, circuit.high_v)
@@ -35,25 +35,25 @@ class Levels:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Phase:
-    """The sheet comes to rest under the first drive; each further one but the last acts for its time; the phase is over
-    when all lines are where they must be under the last."""
+    """The sheet rests under the first drive; each further one but the last acts for its time; the phase ends when all
+    lines are within their limits under the last."""
 
     name: str
     network: Network
     drives: tuple[Drive, ...]
     seconds: tuple[float, ...]
-    """Of the drives between the first and the last."""
+    """Times of the drives between the first and the last."""
     most: np.ndarray
-    """(lines,) volts at which a line has arrived from above; infinite for one that may be anywhere."""
+    """(lines,) upper limits in volts; infinite for a free line."""
     least: np.ndarray
-    """The same from below."""
+    """(lines,) lower limits in volts; negative infinite for a free line."""
 
     def bad(self, volts: np.ndarray) -> np.ndarray:
-        """Bool of the same shape: lines that are not where they must be."""
+        """Lines outside their limits: bool of the same shape."""
         return np.asarray((volts > self.most) | (volts < self.least))
 
     def arrived(self, seconds: np.ndarray, volts: np.ndarray) -> np.ndarray:
-        """(lines,) when each line is where it must be for good, 0 if all the time; infinite if it is not in the end."""
+        """(lines,) time from which each line is within its limits for good, 0 if always; infinite if not at the end."""
         bad = self.bad(volts)
         found = np.zeros(volts.shape[1])
         found[bad[-1]] = math.inf
@@ -67,24 +67,24 @@ class Phase:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PhaseResult:
-    """What happened in the last drive of a phase."""
+    """Result of the last drive of a phase."""
 
     phase: Phase
     trace: transient.Waveform
 
     @property
     def seconds(self) -> float:
-        """From the last change of drive until all lines are where they must be; infinite if they never are."""
+        """From the last change of drive until all lines are within their limits; infinite if never."""
         return float(self.phase.arrived(self.trace.seconds, self.trace.volts).max())
 
 
 def rest_volts(phase: Phase) -> np.ndarray:
-    """(lines,) volts to which the last drive leads."""
+    """(lines,) final volts under the last drive."""
     return transient.at_rest(phase.network, phase.drives[-1]).lines
 
 
 def passed(phase: Phase) -> PhaseResult:
-    """Let the phase pass; the time ends when nothing that matters can happen any more."""
+    """Simulate the phase until nothing relevant can change."""
     network = phase.network
     state = transient.at_rest(network, phase.drives[0])
     for drive, seconds in zip(phase.drives[1:-1], phase.seconds, strict=True):
@@ -105,7 +105,7 @@ def passed(phase: Phase) -> PhaseResult:
 
 
 def longest_s(network: Network) -> float:
-    """No line moves for longer."""
+    """An upper bound on the time for which lines move."""
     circuit = network.circuit
     farads = network.farads.diagonal().max() + 1e-12 * circuit.diode.junction_pf * max(network.pressed.shape) * 3
     ohms = max(circuit.column_pull_ohm, circuit.row_pull_ohm) + circuit.switch_ohm
@@ -118,7 +118,7 @@ def _any(network: Network) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rows(network: Network, row: int | None = None) -> np.ndarray:
-    """All rows at the released level, but the selected one."""
+    """All rows at the released level, except the selected one."""
     volts = np.full(network.rows, network.circuit.supply_v)
     if row is not None:
         volts[row] = 0.0
@@ -126,8 +126,8 @@ def _rows(network: Network, row: int | None = None) -> np.ndarray:
 
 
 def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
-    """All lines released, columns let go, a row selected: pressed columns must be low, others high. Whether columns
-    were precharged or pulled makes no difference."""
+    """All lines released, columns undriven, a row selected: pressed columns must be low, others high. Precharged or
+    pulled columns make no difference."""
     row = middle(network.rows) if row is None else row
     supply, columns = network.circuit.supply_v, network.columns
     most, least = _any(network)
@@ -138,8 +138,8 @@ def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
 
 
 def pulled_release(network: Network, levels: Levels, dip_v: float = 0.0) -> Phase:
-    """A selected row is released, and the resistors pull its columns back: they must be high, and stay so where the
-    next row pulls them down by ``dip_v``."""
+    """A selected row is released, and resistors pull its columns back: they must be high, and stay so when the next row
+    lowers them by ``dip_v``."""
     most, least = _any(network)
     least[: network.columns] = min(levels.high + dip_v, FULL * network.circuit.supply_v)
     selected = Drive.of(OFF, _rows(network, middle(network.rows)), network)
@@ -156,7 +156,7 @@ def row_release(network: Network) -> Phase:
 
 
 def precharge(network: Network, gap_s: float) -> Phase:
-    """This long after the row is released the columns drive: they must be charged."""
+    """``gap_s`` after the row is released the columns drive: they must be charged."""
     supply = network.circuit.supply_v
     most, least = _any(network)
     least[: network.columns] = FULL * supply
@@ -167,10 +167,10 @@ def precharge(network: Network, gap_s: float) -> Phase:
 
 
 def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phase:
-    """Columns drive, rows are let go: touched ones must be high, others low.
+    """Columns drive, rows are undriven: touched ones must be high, others low.
 
-    The rows come from the released level; ``lifted``: all lines come from the other one, and the columns that rise lift
-    the rows.
+    The rows start at the released level; ``lifted``: all lines start at the other one, and the rising columns lift the
+    rows.
     """
     supply, columns = network.circuit.supply_v, network.columns
     touched = network.pressed.any(axis=1)
@@ -183,7 +183,7 @@ def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phas
 
 
 def project_columns(network: Network, levels: Levels) -> Phase:
-    """Columns are let go and all rows selected: touched columns must be low, others high."""
+    """Columns are undriven and all rows selected: touched columns must be low, others high."""
     supply, columns = network.circuit.supply_v, network.columns
     touched = network.pressed.any(axis=0)
     most, least = _any(network)

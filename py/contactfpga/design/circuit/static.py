@@ -1,4 +1,4 @@
-"""What a sheet comes to when it waits: levels and pin currents of the worst patterns, and what cannot work at all."""
+"""A resting sheet: levels and pin currents of the worst patterns, and designs that cannot work."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from contactfpga.design.circuit.values import Circuit, CircuitError, load_circui
 from contactfpga.skin import Skin
 
 NOISE_V = 0.3
-"""Between a level and VIL or VIH at least."""
+"""Required distance of a level from VIL or VIH."""
 LARGEST_OHM = 1e7
-"""Of a pull that is worth a recommendation."""
+"""Largest recommended pull."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """What cannot work, however long one waits, and what would help."""
+    """A design error that no waiting cures, and its remedy."""
 
     what: str
     helps: str
@@ -36,15 +36,15 @@ class Worst:
     """Levels in volts of the real sheet and currents in mA, at rest."""
 
     level_v: float
-    """Of the line that is read."""
+    """Level of the line that is read."""
     margin_v: float
-    """To VIL or VIH; negative on the wrong side."""
+    """Distance from VIL or VIH; negative on the wrong side."""
     pin_ma: float
-    """Of the line that is driven, in or out."""
+    """Current of the driven line, in or out."""
 
 
 def scan(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Worst:
-    """A selected row with all of its columns pressed: its pin carries what all pulls feed."""
+    """A selected row with all of its columns pressed: its pin carries the current of all pulls."""
     network = Network(circuit, patterns.named(rows, columns)["one row"])
     levels = Levels.of(circuit, diodes)
     phase = phases.settle(network, levels)
@@ -71,14 +71,14 @@ def _rest(phase: Phase) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shown_v(circuit: Circuit, diodes: str, volts: float) -> float:
-    """Volts of the real sheet for those of the frame in which it is computed."""
+    """Volts of the real sheet from those of the computing frame."""
     return circuit.supply_v - volts if diodes == "row2col" else volts
 
 
 def problems(
     circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", projects: bool = False
 ) -> list[Problem]:
-    """What cannot work; ``projects``: with projections of all rows, as ``scan = "reversal"`` makes them."""
+    """Design errors of a sheet; ``projects``: with projections of all rows, as in ``scan = "reversal"``."""
     found = _problems(circuit, "column_pull_ohm", lambda one: scan(one, rows, columns, diodes), _SCAN, columns, diodes)
     if projects:
         judge = _problems(
@@ -93,7 +93,7 @@ class _Words:
     level: str
     current: str
     low: bool
-    """The line that is read goes low where the selected row is low."""
+    """Whether the line that is read goes low where the selected row is low."""
 
 
 _SCAN = _Words(
@@ -130,7 +130,7 @@ def _problems(
 
 
 def _helps(circuit: Circuit, pull: str, worst: Callable[[Circuit], Worst]) -> str:
-    """The least pull that would do, or what else is in the way."""
+    """The least sufficient pull, or the remaining obstacle."""
     ohms = getattr(circuit, pull)
     while (ohms := _rounded(ohms * 1.2)) <= LARGEST_OHM:
         one = worst(circuit.replace(**{pull: ohms}))
@@ -143,13 +143,13 @@ def _helps(circuit: Circuit, pull: str, worst: Callable[[Circuit], Worst]) -> st
 
 
 def _rounded(ohms: float) -> float:
-    """Up to two digits."""
+    """Round up to two digits."""
     digits = 10 ** (len(str(int(ohms))) - 2)
     return float(-(-ohms // digits) * digits)
 
 
 def check(circuit: Circuit, skin: Skin) -> None:
-    """Raise :class:`CircuitError` where a Skin's sheet, with its guard lines, cannot work."""
+    """Raise :class:`CircuitError` if a Skin's sheet, with its guard lines, cannot work."""
     if skin.diodes == "none":
         raise CircuitError("diodes is 'none'; [circuit] describes sheets with a diode per switch, leave the table out")
     found: Sequence[Problem] = problems(circuit, skin.row_lines, skin.column_lines, skin.diodes, skin.reads_rows)
@@ -158,8 +158,8 @@ def check(circuit: Circuit, skin: Skin) -> None:
 
 
 def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
-    """The circuit in a Skin's file, if it works with a board of this Skin; None where it has no table. Raises
-    CircuitError for a sheet whose pins would carry more than they may, or whose levels are too near to VIL or VIH."""
+    """The circuit in a Skin's file, if it works with a board of this Skin; None without a table. Raises CircuitError
+    for a sheet whose pins would carry too much, or whose levels are too near to VIL or VIH."""
     circuit = load_circuit(path)
     if circuit is not None:
         try:

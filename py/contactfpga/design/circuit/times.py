@@ -1,4 +1,4 @@
-"""Which times a sheet needs: each phase of the scan with the pattern that takes longest."""
+"""Times that a sheet needs: each phase of the scan with its slowest pattern."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from contactfpga.design.circuit.values import Circuit, CircuitError
 from contactfpga.skin import Skin
 
 MARGIN = 1.3
-"""What is recommended is this many times what the model takes."""
+"""Ratio of recommended to computed times."""
 STEP_US = 0.01
-"""Recommendations are rounded up to this."""
+"""Step to which recommendations are rounded up."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Time:
-    """How long a phase takes with its worst pattern."""
+    """Duration of a phase with its slowest pattern."""
 
     seconds: float
-    """Infinite if it never ends."""
+    """Duration; infinite if it never ends."""
     pattern: str
 
     def us(self, margin: float) -> float | None:
-        """What is recommended; None where no time is enough."""
+        """Recommended time in us; None if no time suffices."""
         if math.isinf(self.seconds):
             return None
         return round(max(1, math.ceil(1e6 * self.seconds * margin / STEP_US - 1e-9)) * STEP_US, 6)
@@ -36,35 +36,35 @@ class Time:
 
 @dataclasses.dataclass(frozen=True)
 class Needs:
-    """What a sheet needs; volts are those of the real sheet."""
+    """Needs of a sheet; volts are those of the real sheet."""
 
     precharge: Time
-    """From columns that drive until they are charged."""
+    """From columns being driven until they are charged."""
     settle: Time
-    """From a selected row until pressed columns read pressed and all others released."""
+    """From selecting a row until pressed columns read pressed and all others released."""
     release: Time
-    """From a row that is not selected any more until columns may drive."""
+    """From deselecting a row until columns may drive."""
     pulled_release: Time
-    """The same until the pulls have lifted the columns, where nothing precharges."""
+    """From deselecting a row until the pulls have lifted the columns, without precharge."""
     project: Time
-    """From rows that are let go until touched ones read touched and all others untouched."""
+    """From undriving the rows until touched ones read touched and all others untouched."""
     project_columns: Time
-    """The same for columns while all rows are selected."""
+    """From selecting all rows until touched columns read touched and all others untouched."""
     pressed: static.Worst
     """A pressed column, and the pin of its row."""
     touched: static.Worst
     """A touched row in a projection, and the pin of the column that feeds it."""
     unpressed_v: float
-    """To which a column without a pressed switch is pulled by its neighbors after a precharge."""
+    """Level to which neighbors pull an unpressed column after a precharge."""
     unpressed_margin_v: float
     row_peak_ma: float
-    """While lines are charged."""
+    """Peak current of a row's pin while lines are charged."""
     column_peak_ma: float
 
 
 @functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
-    """Compute times, levels and currents of a sheet with these lines. A sheet of 64x64 takes some 3 s."""
+    """Compute times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
@@ -73,7 +73,7 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
     release, released = sheet.worst(patterns.RELEASE, phases.row_release)
 
     def precharged(network: Network) -> Phase:
-        """After the gap; a row that is never released is waited for until it does not move any more."""
+        """The precharge after the gap; a row that is never released counts once it is at rest."""
         return phases.precharge(network, min(release.seconds, phases.longest_s(network)))
 
     precharge, charged = sheet.worst(patterns.RELEASE, precharged)
@@ -99,12 +99,12 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
 
 
 def needed_by(skin: Skin, circuit: Circuit) -> Needs:
-    """Compute what the sheet of a Skin needs; guard lines count as lines."""
+    """Compute the needs of a Skin's sheet, including guard lines."""
     return needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
 
 
 def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str, float | None]:
-    """For each time of the Skin that its circuit limits, what is recommended in us; None where no time is enough."""
+    """Recommended us for each time of the Skin that its circuit limits; None if no time suffices."""
     found = {"settle_us": needs.settle.us(margin)}
     if skin.precharge_us:
         found["precharge_us"] = needs.precharge.us(margin)
@@ -116,8 +116,8 @@ def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str
 
 
 def check_times(circuit: Circuit, skin: Skin) -> None:
-    """Raise :class:`CircuitError` where a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`.
-    Takes some 3 seconds at 64x64."""
+    """Raise :class:`CircuitError` if a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`; 64x64
+    needs some 3 s."""
     wanted = recommended_us(skin, needed_by(skin, circuit))
     short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
     if not short:
@@ -141,7 +141,7 @@ class _Sheet:
 
 
 def _lowest(passed: PhaseResult) -> float:
-    """Volts of the column without a pressed switch that is pulled farthest."""
+    """Volts of the unpressed column that is pulled farthest."""
     network, least = passed.phase.network, passed.phase.least[: passed.phase.network.columns]
     unpressed = passed.trace.volts[:, : network.columns][:, least > -math.inf]
     return float(unpressed.min(initial=network.circuit.supply_v))

@@ -1,4 +1,4 @@
-"""A network in time: the implicit method TR-BDF2 with steps as long as its error allows, and what comes to rest."""
+"""A network in time: the implicit method TR-BDF2 with error-controlled steps, and the state at rest."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from contactfpga.design.circuit.network import CircuitState, Drive, Network, cha
 from contactfpga.design.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
-"""Share of a step that its first half takes: both halves then have the same equations."""
+"""Share of the first half in a step, so that both halves have the same equations."""
 SHARE_1, SHARE_0 = 1 / (GAMMA * (2 - GAMMA)), (1 - GAMMA) ** 2 / (GAMMA * (2 - GAMMA))
 ERROR = (-3 * GAMMA**2 + 4 * GAMMA - 2) / (12 * (2 - GAMMA))
 FIRST_S = 1e-12
 ERROR_V = 1e-3
-"""Of a step."""
+"""Allowed error of a step."""
 CLOSE_V = 1e-5
-"""Newton's method ends when no voltage moves by more; what is then left is far less."""
+"""Newton's method ends when no voltage moves by more; the remaining error is far less."""
 DIVERGED_V = 1e3
-"""A line that is to move by more shows that Newton's method is lost."""
+"""A larger move of a line shows that Newton's method diverges."""
 ROUNDS, STEPS = 60, 20_000
 FOREVER_S = 1e6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Waveform:
-    """(n,) seconds from the start and (n, lines) volts then."""
+    """(n,) seconds from the start and (n, lines) volts."""
 
     seconds: np.ndarray
     volts: np.ndarray
@@ -48,8 +48,8 @@ class _Rates:
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
-    """The solution of a symmetric system in two halves: beyond some 100 lines a library may call threads for the whole,
-    which takes longer than to compute it."""
+    """The solution of a symmetric system in two halves: beyond some 100 lines a library may start threads, which is
+    slower."""
     side = matrix[:count, count:]
     both = np.linalg.solve(matrix[:count, :count], np.column_stack([side, right[:count]]))
     across, alone = both[:, :-1], both[:, -1]
@@ -76,7 +76,7 @@ class _DriveEquations:
         return _Rates(net.farads @ state.lines, cell_c, line_a, junction_a - cell_a, cell_f, cell_s)
 
     def _gathered(self, cells: np.ndarray) -> np.ndarray:
-        """Out of the columns and into the rows."""
+        """Sums of the cells' currents, out of the columns and into the rows."""
         out = np.bincount(self.network.column_of, cells, self.count)
         return np.asarray(out - np.bincount(self.network.row_of, cells, self.count))
 
@@ -94,7 +94,7 @@ class _DriveEquations:
         return matrix, own
 
     def correction(self, rates: _Rates, share: float, lines: np.ndarray, cells: np.ndarray) -> CircuitState:
-        """What solves the linear equations with these right sides."""
+        """The solution of the linear equations with these right sides."""
         net = self.network
         matrix, own = self.eliminated(rates, share)
         through = share * net.cell_s
@@ -104,7 +104,7 @@ class _DriveEquations:
     def solved(
         self, guess: CircuitState, share: float, lines: np.ndarray, cells: np.ndarray
     ) -> tuple[CircuitState, _Rates] | None:
-        """The state whose ``charge + share * current`` is this; None if Newton's method does not find it."""
+        """The state with this ``charge + share * current``; None if Newton's method does not converge."""
         for _ in range(ROUNDS):
             rates = self.rates(guess)
             step = self.correction(
@@ -126,7 +126,7 @@ class _DriveEquations:
 
 
 def at_rest(network: Network, drive: Drive) -> CircuitState:
-    """The state that does not change any more."""
+    """The stationary state."""
     equations = _DriveEquations(network, drive)
     start = network.unpressed()
     rates = equations.rates(start)
@@ -143,7 +143,7 @@ def run(
     seconds: float,
     enough: Callable[[np.ndarray], bool] = lambda volts: False,
 ) -> Waveform:
-    """What the lines do for this long, or until ``enough`` says so of their volts."""
+    """The lines for this long, or until ``enough`` accepts their volts."""
     equations = _DriveEquations(network, drive)
     state, rates = start, equations.rates(start)
     times, volts, now, step = [0.0], [start.lines], 0.0, FIRST_S
@@ -177,7 +177,7 @@ def _ahead(diode: Diode, start: CircuitState, middle: CircuitState) -> CircuitSt
 def _step(
     equations: _DriveEquations, state: CircuitState, rates: _Rates, step: float
 ) -> tuple[tuple[CircuitState, _Rates], tuple[CircuitState, _Rates], float] | None:
-    """The middle and the end of a step, and its error in volts."""
+    """Middle and end of a step, and its error in volts."""
     share = GAMMA * step / 2
     middle = equations.solved(state, share, rates.line_c - share * rates.line_a, rates.cell_c - share * rates.cell_a)
     if middle is None:

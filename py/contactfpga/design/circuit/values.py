@@ -1,4 +1,4 @@
-"""The values of a sheet's circuit, and the table `[circuit]` in a Skin's file that holds them; nothing is computed."""
+"""The values of a sheet's circuit, and the table `[circuit]` in a Skin's file; nothing is computed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga.inputs.values import is_finite, shown
 
 
 class CircuitError(ContactFPGAError, ValueError):
-    """A circuit that cannot be or cannot work; the message names the value and the limit."""
+    """An impossible or unworkable circuit; the message names the value and the limit."""
 
 
 def _within(where: str, name: str, value: object, low: float, high: float, unit: str = "") -> None:
@@ -24,8 +24,8 @@ def _within(where: str, name: str, value: object, low: float, high: float, unit:
 
 @dataclasses.dataclass(frozen=True)
 class Diode:
-    """A junction after Shockley with a resistance in series, and the charge of its depletion layer: what SPICE calls
-    IS, N, RS, CJO, VJ and M. It neither breaks down nor stores charge while it conducts."""
+    """A Shockley junction with a series resistance and a depletion charge: SPICE's IS, N, RS, CJO, VJ and M, without
+    breakdown or diffusion charge."""
 
     saturation_a: float
     emission: float
@@ -70,44 +70,44 @@ LIMITS = {
     "high_v": (0.2, 5.5, "V"),
     "pin_ma": (0.1, 100.0, "mA"),
 }
-"""Lowest and highest value, and the unit."""
+"""Lowest and highest value, and unit."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Circuit:
-    """The sheet with its wires and the board's pins. Raises :class:`CircuitError` for values that cannot be.
+    """The sheet with its wires and the board's pins. Raises :class:`CircuitError` for impossible values.
 
-    Each line is one capacitance; its resistance lies between it and its pin, as if all switches were at the far end.
+    Each line is one capacitance; its resistance is between it and its pin, as if all switches were at the far end.
     """
 
     line_pf: float = 30.0
-    """Of a line to ground, with its pin, in pF."""
+    """Capacitance of a line to ground, with its pin, in pF."""
     crossing_pf: float = 2.0
-    """Of a row to a column where they cross, with an open switch, in pF."""
+    """Capacitance of a row to a column at their crossing, with an open switch, in pF."""
     neighbor_pf: float = 3.0
-    """Of a line to each of the two beside it, in pF."""
+    """Capacitance of a line to each neighbor, in pF."""
     pin_ohm: float = 40.0
-    """Of a pin that drives, high or low."""
+    """Resistance of a driving pin, high or low."""
     series_ohm: float = 0.0
-    """Of a resistor between pin and line."""
+    """Resistor between pin and line."""
     line_ohm: float = 0.0
-    """Of a line from end to end."""
+    """Resistance of a line from end to end."""
     switch_ohm: float = 100.0
-    """Of a closed switch."""
+    """Resistance of a closed switch."""
     diode: Diode = SCHOTTKY
-    """In series with each switch; in a file also ``"schottky"`` or ``"silicon"``."""
+    """Diode in series with each switch; in a file also ``"schottky"`` or ``"silicon"``."""
     column_pull_ohm: float = 100_000.0
-    """Of the resistor that pulls or keeps a column at its released level."""
+    """Resistor that pulls or keeps a column at its released level."""
     row_pull_ohm: float = 10_000.0
-    """Of the resistor that pulls a row that is read to its untouched level; used by projections alone."""
+    """Resistor that pulls a row to its untouched level; used by projections alone."""
     supply_v: float = 3.3
     low_v: float = 0.8
-    """VIL: the highest level that is sure to read low."""
+    """VIL: the highest level that surely reads low."""
     high_v: float = 2.0
-    """VIH: the lowest level that is sure to read high."""
+    """VIH: the lowest level that surely reads high."""
     pin_ma: float = 8.0
-    """The most that a pin may carry for good: 8 mA is what an iCE40's pin is specified for at 3.3 V, and an ECP5's
-    with its usual drive strength. Pulses that charge lines may be higher."""
+    """Largest permanent pin current: 8 mA is specified for an iCE40's pin at 3.3 V, and for an ECP5's with its usual
+    drive strength. Charging pulses may be higher."""
 
     def __post_init__(self) -> None:
         for name, (low, high, unit) in LIMITS.items():
@@ -122,7 +122,7 @@ class Circuit:
 
     @property
     def drive_ohm(self) -> float:
-        """Between a line and the supply or ground that its pin drives it to."""
+        """Resistance between a line and the supply or ground of its pin."""
         return self.pin_ohm + self.series_ohm + self.line_ohm
 
     def replace(self, **changes: Any) -> Circuit:
@@ -131,23 +131,23 @@ class Circuit:
 
 
 THERMAL_V = 8.617333e-5 * 300.15
-"""k T / q at 27 degrees Celsius, at which SPICE computes by default."""
+"""k T / q at 27 degrees Celsius, SPICE's default."""
 
 
 def knee_v(diode: Diode) -> float:
-    """Above this Newton's method is held back: the exponential outruns it."""
+    """Voltage above which Newton's method is limited, as the exponential outruns it."""
     step = diode.emission * THERMAL_V
     return step * math.log(step / (math.sqrt(2) * diode.saturation_a))
 
 
 def load_circuit(path: str | Path) -> Circuit | None:
-    """The circuit in a Skin's file; None where it has no table ``[circuit]``. Raises CircuitError."""
+    """The circuit in a Skin's file; None without a table ``[circuit]``. Raises CircuitError."""
     return tomlfile.load_table(path, "circuit", _read, CircuitError)
 
 
 def _read(values: Any) -> Circuit:
-    """The circuit that a TOML table describes; its keys are the fields of :class:`Circuit`. ``diode`` is a name or a
-    table with the fields of :class:`Diode`."""
+    """The circuit of a TOML table, whose keys are the fields of :class:`Circuit`. ``diode`` is a name or a table of the
+    fields of :class:`Diode`."""
     given = dict(tomlfile.fields_of(Circuit, "circuit", values, CircuitError))
     if isinstance(diode := given.get("diode"), str):
         if diode not in DIODES:

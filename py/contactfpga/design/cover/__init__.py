@@ -1,8 +1,7 @@
-"""The soft cover between what touches and the switches: which of them close. SI units throughout, stress positive in
-compression.
+"""The soft cover between a contact and the switches: which of them close. SI units, stress positive in compression.
 
-The paper is Battaglia et al., "Combining Haptic Sensing with Safe Interaction"; its equations are cited by number, as
-corrected where they are misprinted. K. L. Johnson, "Contact mechanics" (1985), is cited by name.
+The paper is Battaglia et al., "Combining Haptic Sensing with Safe Interaction"; its equations are cited by number, with
+misprints corrected. K. L. Johnson, "Contact mechanics" (1985), is cited by name.
 """
 
 from contactfpga.design.cover.answer import CoverError, NoSolution

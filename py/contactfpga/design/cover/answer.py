@@ -1,4 +1,4 @@
-"""Answers that are no number, and input that cannot be."""
+"""Answers without a number, and invalid input."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from contactfpga.inputs.values import is_finite, shown
 Floats = NDArray[np.float64]
 
 MAX_LENGTH_M = 1.0
-"""No thickness, pitch, offset or radius of a cover on a robot is longer: who writes 5 means mm."""
+"""Upper limit of a cover's lengths on a robot: whoever writes 5 means mm."""
 
 
 SMALLEST, LARGEST = 1e-12, 1e12
-"""Of what a file says in SI units, 0 aside; powers of it are still numbers."""
+"""Limits of nonzero SI values in a file, whose powers are still finite."""
 
 
 TINIEST, HUGEST = 1e-25, 1e25
-"""Of any number in SI units, 0 aside: the powers and products of such numbers that occur here are still numbers."""
+"""Limits of any nonzero SI number, whose products here are still finite."""
 
 
 class CoverError(ContactFPGAError, ValueError):
-    """A value that no cover can have; the message names it and the limit."""
+    """An impossible value of a cover; the message names it and the limit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class NoSolution:
-    """The question has no answer, and why."""
+    """The question has no answer, and the reason."""
 
     reason: str
 
@@ -39,7 +39,7 @@ class NoSolution:
 
 
 def positive(name: str, value: float, unit: str) -> float:
-    """``value`` if it is a number above 0 with which one can compute; raises :class:`CoverError` otherwise."""
+    """``value`` if it is a usable number above 0; raises :class:`CoverError` otherwise."""
     if not is_finite(value) or value <= 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number above 0 {unit}".rstrip())
     if value < TINIEST:
@@ -48,14 +48,14 @@ def positive(name: str, value: float, unit: str) -> float:
 
 
 def not_negative(name: str, value: float, unit: str) -> float:
-    """``value`` if it is 0 or a number above with which one can compute; raises :class:`CoverError` otherwise."""
+    """``value`` if it is a usable number of at least 0; raises :class:`CoverError` otherwise."""
     if not is_finite(value) or value < 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number, 0 {unit} or above".replace("  ", " "))
     return _below_hugest(name, value, unit)
 
 
 def finite(name: str, value: float) -> float:
-    """``value`` if it is a number with which one can compute; raises :class:`CoverError` otherwise."""
+    """``value`` if it is a usable number; raises :class:`CoverError` otherwise."""
     if not is_finite(value):
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number")
     return _below_hugest(name, value, "")
@@ -68,7 +68,7 @@ def _below_hugest(name: str, value: float, unit: str) -> float:
 
 
 def numbers(name: str, values: Floats | float, unit: str) -> Floats:
-    """An array of such numbers; raises :class:`CoverError` where one is none."""
+    """An array of usable numbers; raises :class:`CoverError` otherwise."""
     try:
         found = np.asarray(values, float)
     except OverflowError:  # one of Python's whole numbers

@@ -1,18 +1,18 @@
 """An arm that runs into an obstacle, and the energy balance by which the foam slows it.
 
-One joint, constant motor torque u, gravity if wanted, the foam a spring F = K_s delta^1.5 (Hertz). With
-theta - theta0 = delta/d, delta(0) = 0 and +v0 at the touch, (3) as corrected is
+One joint, constant motor torque u, optional gravity, the foam a spring F = K_s delta^1.5 (Hertz). With theta - theta0 =
+delta/d, delta(0) = 0 and +v0 at the touch, (3) as corrected is
 
     J/(2 d^2) (v^2 - v0^2) = u delta/d - M g l [cos theta0 - cos(theta0 + delta/d)] - 2/5 K_s delta^(5/2).
 
 The paper prints -v0 and drops cos theta0.
 
-The same as motion over time is the reference for :mod:`contactfpga.design.cover.impact`: (2) as corrected,
+The motion over time is the reference for :mod:`contactfpga.design.cover.impact`: (2) as corrected,
 
     J/d^2 d^2 delta/dt^2 = (u - M g l sin(theta0 + delta/d))/d - K_s delta^(3/2),
 
-by Dormand and Prince's method of order 5 with step control. The step in which v becomes negative is made once more with
-v as the independent variable (Henon), which ends at v = 0 exactly. Its time course follows by quadrature as well.
+by Dormand and Prince's method of order 5 with step control. The step in which v becomes negative is repeated with v as
+the independent variable (Henon), which ends at v = 0 exactly. The time course also follows by quadrature.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ GRAVITY = 9.81
 
 @dataclasses.dataclass(frozen=True)
 class Arm:
-    """A link that turns about one joint, and what drives it."""
+    """A link that turns about one joint, and its drive."""
 
     inertia_kgm2: float
     """J about the joint, in kg m2."""
@@ -70,7 +70,7 @@ class Arm:
     ) -> Arm:
         """A cylinder of that radius and length whose center of mass is ``com_m`` from the joint.
 
-        J = m/12 (3 R^2 + L^2) + m l^2, a thin tube 6 R^2; without ``length_m`` L is the lever, as printed.
+        J = m/12 (3 R^2 + L^2) + m l^2, a thin tube 6 R^2; by default L is the lever, as printed.
         """
         positive("mass_kg", mass_kg, "kg")
         positive("lever_m", lever_m, "m")
@@ -83,29 +83,29 @@ class Arm:
 
     @property
     def mass_kg(self) -> float:
-        """J/d^2, the mass that the contact feels, in kg."""
+        """J/d^2, the effective mass at the contact, in kg."""
         return self.inertia_kgm2 / self.lever_m**2
 
     @property
     def free(self) -> bool:
-        """Neither torque nor gravity, so that there is a closed form."""
+        """Whether there is neither torque nor gravity, hence a closed form."""
         return self.torque_nm == 0 and self.weight_nm == 0
 
     def push_n(self, indentation_m: float) -> float:
-        """What motor and gravity press with at the contact, in N."""
+        """Force of motor and gravity at the contact, in N."""
         finite("indentation_m", indentation_m)
         angle = self.angle_rad + indentation_m / self.lever_m
         return (self.torque_nm - self.weight_nm * math.sin(angle)) / self.lever_m
 
     def work_j(self, indentation_m: Floats | float) -> Floats:
-        """What motor and gravity have done since the touch, in J."""
+        """Work of motor and gravity since the touch, in J."""
         half = numbers("indentation_m", indentation_m, "m") / (2 * self.lever_m)
         lifted = 2 * self.weight_nm * np.sin(self.angle_rad + half) * np.sin(half)
         return np.asarray(2 * self.torque_nm * half - lifted)
 
 
 def speed2(arm: Arm, speed_m_s: float, stiffness: float, indentation_m: Floats | float) -> Floats:
-    """v^2 in m2/s2 at an indentation, (3) solved for it; negative where the arm does not come."""
+    """v^2 in m2/s2 at an indentation, from (3); negative where the arm does not arrive."""
     gained = arm.work_j(indentation_m) - 0.4 * stiffness * np.asarray(indentation_m, float) ** 2.5
     return np.asarray(speed_m_s**2 + 2 / arm.mass_kg * gained)
 
@@ -131,7 +131,7 @@ def slowness(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, phi: 
 State = tuple[float, float]
 
 RTOL = 1e-10
-"""Error a step, relative to each of depth, speed and time."""
+"""Allowed error per step, relative to each of depth, speed and time."""
 
 _A = (
     (),
@@ -155,7 +155,7 @@ class CompressionStep(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Touch to separation; arrays of the same length."""
+    """The motion from touch to separation; arrays of the same length."""
 
     time_s: Floats
     indentation_m: Floats
@@ -171,7 +171,7 @@ def compress(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -
 
 
 def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> list[CompressionStep]:
-    """Every accepted step from the touch to the end of the compression, where the speed is 0."""
+    """Every accepted step from the touch to the end of the compression at speed 0."""
     positive("stiffness", stiffness, "N/m^1.5")
     if not 1e-13 <= rtol <= 1e-2:
         raise CoverError(f"rtol is {rtol!r}; it must lie between 1e-13 and 0.01")
@@ -216,9 +216,9 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
 
 
 def course(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, count: int = 64) -> Course:
-    """The whole contact in 2 ``count`` + 1 moments by quadrature; ``depth_m``: where the compression ends.
+    """The whole contact in 2 ``count`` + 1 moments by quadrature; ``depth_m``: the end of the compression.
 
-    Nothing is lost in this model, so that the way out mirrors the way in.
+    The model is lossless, so the way out mirrors the way in.
     """
     not_negative("speed_m_s", speed_m_s, "m/s")
     positive("stiffness", stiffness, "N/m^1.5")
@@ -250,7 +250,7 @@ Slope = Callable[[float, State], State]
 def _walk(
     slope: Slope, x: float, y: State, step: float, rtol: float, scale: State, end: float | None = None
 ) -> Iterator[tuple[float, State]]:
-    """(x, y) after each accepted step, to ``end`` or forever. ``step``'s sign is the direction."""
+    """(x, y) after each accepted step, to ``end`` or forever. The sign of ``step`` is the direction."""
     while end is None or x != end:
         if end is not None and abs(step) >= abs(end - x):
             step = end - x
@@ -264,7 +264,7 @@ def _walk(
 
 
 def _one(slope: Slope, x: float, y: State, step: float) -> tuple[State, State]:
-    """One step: where it leads, and by how much that of order 4 differs."""
+    """One step: its result, and the difference of order 4."""
     slopes: list[State] = []
     at = y
     for row, share in zip(_A, _C):

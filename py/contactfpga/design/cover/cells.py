@@ -1,19 +1,17 @@
-"""Which force comes to each switch of a sheet, and which switches close: faces and caps under foam.
+"""The force on each switch of a sheet, and the closed ones: faces and caps under foam.
 
 Foam presses the sheet with the normal stress that spreads through it (:mod:`contactfpga.design.cover.medium`). A switch
-takes the part of it that lies on its face or on its *cap*, a rigid square plate on the switch. Caps are *flush* with
-what lies between them, which carries its own share, or they stand *proud* of it: then the foam rests on the caps alone,
-and each takes what lies on its *tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from
-tile to tile.
+takes the part on its face or on its *cap*, a rigid square plate on the switch. Caps are *flush* with their
+surroundings, which carry their own share, or *proud*: then the foam rests on the caps alone, and each takes the part on
+its *tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from tile to tile.
 
-A proud cap gives way by the switch's travel and takes the foam down with it, which the foam between the caps passes on
-to the neighbors. The foam there is a strip as long as the gap plus the foam's thickness, as wide as the pitch across,
-that shears and bends (Timoshenko). The forces Q on the caps are those on rigid caps, T, spread by
-(1 + L/k) Q = T: k the switch's stiffness, L the strips' stiffness as a discrete Laplacian.
+A proud cap yields by the switch's travel and takes the foam along, which loads the neighbors. The foam between is a
+strip as long as the gap plus the foam's thickness, as wide as the pitch across, that shears and bends (Timoshenko). The
+forces Q on the caps are those on rigid caps, T, spread by (1 + L/k) Q = T: k the switch's stiffness, L the strips'
+stiffness as a discrete Laplacian.
 
-What this leaves out: what presses keeps its pressure whatever gives way; caps do not tilt; nothing carries the foam
-that sags between proud caps. Boundary elements say by how much that is off, on
-the page on the cover.
+Simplifications: the pressure on top is independent of the yield; caps do not tilt; foam that sags between proud caps is
+unsupported. Boundary elements give the error, on the page on the cover.
 """
 
 from __future__ import annotations
@@ -30,19 +28,19 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.press import Cover, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
-"""Least and most grid steps per pitch; between them, two steps per foam thickness and six per face."""
+"""Limits of grid steps per pitch; between them, two steps per foam thickness and six per face."""
 
 MOST_PITCHES = 20
-"""Thickness of the foam in pitches up to which forces are computed; they are the same for all switches long before."""
+"""Largest computed thickness of the foam in pitches; forces are equal on all switches long before."""
 
 BEYOND = 4.0
-"""Thicknesses of foam beyond the sheet that are looked at."""
+"""Computed foam beyond the sheet, in thicknesses."""
 
 
 class Cells:
     """The switches of a sheet of ``rows`` by ``columns`` under a cover, the first one at (0, 0) m.
 
-    ``seed`` draws the closing force of each switch where the cover's switch has a ``spread``. Raises CoverError for the
+    ``seed`` draws the closing force of each switch if the cover's switch has a ``spread``. Raises CoverError for the
     model ``patch``, which knows no force, for caps wider than the pitch, and for foam of more than
     :data:`MOST_PITCHES`.
     """
@@ -63,22 +61,21 @@ class Cells:
         self._x, self._y = np.arange(columns) * pitch_x_m, np.arange(rows) * pitch_y_m
         self._axes = [_Axis(count, pitch, cover) for count, pitch in ((rows, pitch_y_m), (columns, pitch_x_m))]
         self.thresholds_n = self.drawn(seed)
-        """(rows, columns) closing force of each switch in N, its preload taken off."""
+        """(rows, columns) closing force of each switch in N, less its preload."""
 
     @property
     def parts(self) -> int:
-        """Steps per pitch of the grid on which pressure is resolved, along the columns."""
+        """Steps per pitch of the pressure grid, along the columns."""
         return self._axes[1].parts
 
     def drawn(self, seed: int) -> Floats:
-        """(rows, columns) closing force in N of each switch of a sheet whose switches are drawn with this seed, its
-        preload taken off."""
+        """(rows, columns) closing force in N of each switch of the sheet drawn with this seed, less its preload."""
         switch = self.cover.switch
         drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
         return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
     def forces_n(self, loads: Sequence[Load]) -> Floats:
-        """(rows, columns) force on each switch in N, the loads' forces added up; below 0 where foam is pulled off."""
+        """(rows, columns) force on each switch in N, summed over loads; below 0 where foam is pulled off."""
         if self.cover.model == "point":
             return self._of_points(loads)
         down, across = self._axes
@@ -87,8 +84,8 @@ class Cells:
         return self._given_way(taken) if self.cover.gives_way else taken
 
     def closed(self, loads: Sequence[Load], before: np.ndarray | None = None) -> np.ndarray:
-        """(rows, columns) bool: the switches that are closed; ``before``: those that were until now, which open only
-        when the force falls below the closing force by the switch's hysteresis."""
+        """(rows, columns) bool: the closed switches; ``before``: those closed so far, which open only when the force is
+        below the closing force by the hysteresis."""
         return self.closed_by(self.forces_n(loads), before)
 
     def closed_by(self, forces_n: Floats, before: np.ndarray | None = None) -> np.ndarray:
@@ -100,8 +97,8 @@ class Cells:
         return found
 
     def false_presses(self, acceleration_m_s2: float = 0.0, foam_kg_m3: float = 0.0) -> float:
-        """Expected number of switches that close though nothing touches: preload and the weight of cap and foam, while
-        the link is accelerated toward the sheet's outside, reach a closing force drawn from the normal distribution."""
+        """Expected number of switches that close without a touch: preload and the inertia of cap and foam, when the
+        link accelerates toward the sheet's outside, exceed a normally distributed closing force."""
         finite("acceleration_m_s2", acceleration_m_s2)
         not_negative("foam_kg_m3", foam_kg_m3, "kg/m3")
         cap = self.cover.cap
@@ -114,7 +111,7 @@ class Cells:
         return share * math.prod(self.shape)
 
     def _of_points(self, loads: Sequence[Load]) -> Floats:
-        """The paper's (9): the stress in the middle of each face, times its area."""
+        """The paper's (9): the stress at the middle of each face, times its area."""
         forces = np.zeros(self.shape)
         for part, force in (share for load in loads for share in load.shares()):
             away = np.hypot(self._x - part.x_m, self._y[:, None] - part.y_m)
@@ -142,8 +139,7 @@ class Cells:
         return found
 
     def _spread(self, pressure: Floats) -> Floats:
-        """The force on each part of the grid below the foam. The sheet repeats itself beyond its edge there, far enough
-        away."""
+        """The force on each part of the grid below the foam, which repeats periodically far beyond the sheet's edge."""
         if self.cover.cut:
             return pressure
         return np.fft.irfft2(np.fft.rfft2(pressure) * self._transfer, s=pressure.shape)
@@ -169,7 +165,7 @@ class Cells:
 
 
 class _Axis:
-    """One direction of a sheet: the grid on which stress is resolved, and how much of it each switch takes."""
+    """One direction of a sheet: the stress grid, and each switch's share of it."""
 
     def __init__(self, count: int, pitch_m: float, cover: Cover):
         self.count, self.pitch_m = count, pitch_m
@@ -182,22 +178,22 @@ class _Axis:
         self.taken = self._taken(cover.width_m(pitch_m))
 
     def near(self, middle_m: float, reach_m: float) -> slice:
-        """The places that something of this middle and reach covers."""
+        """The grid places within ``reach_m`` of a middle."""
         first, last = ((middle_m + end * reach_m - self.places_m[0]) / self.step_m for end in (-1, 1))
         return slice(max(0, math.floor(first)), max(0, min(len(self.places_m), math.ceil(last) + 1)))
 
     def holds(self, middle_m: float, reach_m: float) -> bool:
-        """Whether all of it lies on the grid."""
+        """Whether all places within ``reach_m`` are on the grid."""
         return bool(self.places_m[0] <= middle_m - reach_m and middle_m + reach_m <= self.places_m[-1])
 
     @functools.cached_property
     def modes(self) -> tuple[Floats, Floats]:
-        """Eigenvalues and eigenvectors of a chain whose neighbors are joined by springs of 1 N/m."""
+        """Eigenvalues and eigenvectors of a chain with springs of 1 N/m."""
         joined = np.eye(self.count, k=1) + np.eye(self.count, k=-1)
         return np.linalg.eigh(np.diag(joined.sum(axis=0)) - joined)
 
     def _taken(self, width_m: float) -> Floats:
-        """(switches, places): the share of each place that lies on a switch's width."""
+        """(switches, places): the share of each place on a switch's width."""
         away = self.places_m - np.arange(self.count)[:, None] * self.pitch_m
         upper, lower = (np.clip(away + side * self.step_m / 2, -width_m / 2, width_m / 2) for side in (1, -1))
         return np.asarray((upper - lower) / self.step_m)
@@ -205,5 +201,5 @@ class _Axis:
 
 @functools.lru_cache(maxsize=32)
 def cells_of(cover: Cover, rows: int, columns: int, pitch_x_m: float, pitch_y_m: float, seed: int = 0) -> Cells:
-    """:class:`Cells`, kept for the next call."""
+    """:class:`Cells`, cached for the next call."""
     return Cells(cover, rows, columns, pitch_x_m, pitch_y_m, seed)

@@ -1,8 +1,8 @@
-"""The algorithm of the paper's Fig. 3: material, thickness, force and pitch under limits, and which limit binds.
+"""The algorithm of the paper's Fig. 3: material, thickness, force and pitch under limits, and the binding limit.
 
-For each foam, and for the modulus that makes the compression last exactly as long as it has to: the impact, the yield
-check, the thickness, then what the sheet under it detects and the pitch that follows. Every limit is checked with its
-margin; nothing is left out of the answer because it does not fit.
+For each foam, and for the modulus with exactly the required compression time: the impact, the yield check, the
+thickness, then the detected force and the pitch. Every limit is checked with its margin; candidates that fail are part
+of the answer.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ FREE = "free modulus"
 """Name of the candidate whose modulus follows from the time."""
 
 STEPS = 6
-"""Latencies that :func:`thinning` looks at, evenly in the logarithm."""
+"""Latencies for :func:`thinning`, logarithmically spaced."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """A limit, and what it is compared with."""
+    """A limit and the compared value."""
 
     name: str
     value: float
     limit: float
     at_most: bool
     relax: str
-    """What would have to give way, with the value that would do."""
+    """The necessary relaxation, with a sufficient value."""
 
     @property
     def used(self) -> float:
-        """How much of the limit is used up: above 1 it is broken."""
+        """Used share of the limit: above 1 it is broken."""
         value, limit = (self.value, self.limit) if self.at_most else (self.limit, self.value)
         return value / limit if limit else math.inf
 
@@ -52,16 +52,16 @@ class Check:
 
 @dataclasses.dataclass(frozen=True)
 class FoamDesign:
-    """A foam and what follows from it; None where it does not come that far."""
+    """A foam and its results; None for those not reached."""
 
     foam: Foam
     hit: Impact | None = None
     by_energy_m: dict[str, float] | None = None
-    """Thickness by (8), by each rule; None where the foam's yield strength is not known."""
+    """Thickness by (8), by each rule; None if the foam's yield strength is unknown."""
     thickness_m: float | None = None
-    """Of the cover, chosen."""
+    """Chosen thickness of the cover."""
     mass_kg_m2: float | None = None
-    """Of the cover, per area; None where the foam's density is not known."""
+    """Mass of the cover per area; None if the foam's density is unknown."""
     least: Sense | None = None
     """Force in N that closes a switch right below."""
     pitch_m: float | None = None
@@ -79,31 +79,31 @@ class FoamDesign:
 
     @property
     def binding(self) -> Check | None:
-        """The limit that is used up most."""
+        """The limit with the largest used share."""
         return max(self.checks, key=lambda check: check.used, default=None)
 
 
 @dataclasses.dataclass(frozen=True)
 class Thin:
-    """What a reaction after ``latency_s`` asks of a cover."""
+    """A cover for a reaction after ``latency_s``."""
 
     latency_s: float
     modulus_pa: float | None
-    """The free modulus at which the compression lasts as much longer than the latency as in the task."""
+    """The free modulus at which compression time over latency is as in the task."""
     compression_m: float | None
     force_n: float | None
-    """Its peak force."""
+    """Peak force of this modulus."""
     by_energy_m: float | None
     """Thickness of the chosen foam by (8): in proportion to t0/t_c."""
     pressed_m: float | None
-    """How far the chosen foam is pressed in at that moment."""
+    """Indentation of the chosen foam at that moment."""
     stopped_m: float | None
-    """How far it is in the end, when the motor brakes from then on with the task's torque: it must be thicker."""
+    """Final indentation if the motor brakes from then on with the task's torque: the foam must be thicker."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Design:
-    """All candidates, the ones that fit first, lightest and then thinnest in front."""
+    """All candidates: fitting ones first, by mass, then thickness."""
 
     candidates: tuple[FoamDesign, ...]
     thinning: tuple[Thin, ...]
@@ -112,13 +112,13 @@ class Design:
 
     @property
     def best(self) -> FoamDesign | None:
-        """None if nothing fits."""
+        """The first fitting candidate; None if nothing fits."""
         first = self.candidates[0]
         return first if first.fits else None
 
     @property
     def relax(self) -> tuple[str, ...]:
-        """Where nothing fits: what would have to give way for the candidate that comes nearest."""
+        """If nothing fits: the necessary relaxations of the nearest candidate."""
         first = self.candidates[0]
         if first.fits:
             return ()
@@ -138,13 +138,13 @@ def design(task: Task) -> Design:
 
 
 def thinning(task: Task, foam: Foam | None) -> tuple[Thin, ...]:
-    """How thin the cover may become as t0 falls from the task's to what the sheet, host and motor achieve."""
+    """Thinnest covers as t0 falls from the task's to that of the sheet, host and motor."""
     lowest = min(task.latency_s, latency_s(task.skin) + task.other_s)
     return tuple(_thin(task, foam, float(t0)) for t0 in np.geomspace(task.latency_s, lowest, STEPS))
 
 
 def _rank(candidate: FoamDesign) -> tuple[bool, bool, float, float]:
-    """What fits by mass, where it is known, and thickness; what does not by how much it is off."""
+    """Ranking key: fitting candidates by mass, if known, and thickness; others by their excess."""
     if candidate.fits:
         mass = candidate.mass_kg_m2
         return False, mass is None, mass or 0.0, candidate.thickness_m or 0.0
@@ -200,7 +200,7 @@ def _judge(task: Task, foam: Foam, hit: Impact | None) -> FoamDesign:
 
 
 def _regions(task: Task, ball: Ball, deepest_m: float) -> list[RegionLimits]:
-    """Gravity counts at the angle of the touch; what pulls the arm back is left out until it reacts."""
+    """Limits of body regions, with gravity at the angle of the touch; a pull back counts only after the reaction."""
     brake = task.brake_nm / task.arm.lever_m
     pressing = Pressing(task.arm.mass_kg, max(0.0, task.arm.push_n(0.0)), brake, ball, deepest_m)
     return [limits_of(pressing, region, task.speed_m_s, task.latency_s) for region in task.regions]
@@ -214,7 +214,7 @@ def _region_check(task: Task, one: RegionLimits) -> Check:
 
 
 def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> FoamDesign:
-    """The force and the pitch, and the limits on them."""
+    """The force and the pitch, and their limits."""
     checks = list(sofar.checks)
     least = sheet.detects(0.0, task.model, _tolerance(task))
     notes = [*sofar.notes, *(sofar.hit.notes if sofar.hit else ()), *least.notes]
@@ -241,7 +241,7 @@ def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> Fo
 
 
 def _by_energy(task: Task, foam: Foam, ball: Ball, hit: Impact, t0: float | None = None) -> dict[str, float]:
-    """(8) by each rule: as printed with the link's mass, else with the mass that the contact feels."""
+    """Thickness (8) by each rule: as printed with the link's mass, else with the effective mass at the contact."""
     assert foam.yield_pa is not None
     stored = elastic.resilience(foam.yield_pa, foam.modulus_pa)
     share = min(1.0, (task.latency_s if t0 is None else t0) / hit.time_s)
@@ -272,7 +272,7 @@ def _thin(task: Task, foam: Foam | None, t0: float) -> Thin:
 
 
 def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
-    """How far the foam is pressed in this long after the touch, at most delta_c."""
+    """Indentation this long after the touch, at most delta_c."""
     if seconds >= hit.time_s:
         return hit.compression_m
     course = arm.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)
@@ -281,8 +281,8 @@ def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
 
 
 def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
-    """Where the compression ends when the torque changes at ``pressed_m``: from the balance at the touch of an arm
-    that brakes all the way, and had at the touch what it did not lose before."""
+    """End of the compression if the torque changes at ``pressed_m``: from the balance of an arm that brakes all the
+    way, with its initial energy corrected by the loss avoided before."""
     if pressed_m >= hit.compression_m:
         return hit.compression_m
     braking = dataclasses.replace(task.arm, torque_nm=-task.brake_nm)
@@ -291,7 +291,7 @@ def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
 
 
 def _tolerance(task: Task) -> float | None:
-    """A model that the task names is taken as it is, with a note of its error."""
+    """Tolerance of the model choice; a model named by the task is used with a note of its error."""
     return task.tolerance if task.model is None else None
 
 
@@ -300,5 +300,5 @@ def _ball(task: Task, foam: Foam) -> Ball:
 
 
 def margin(check: Check) -> str:
-    """How much of a limit is used, in words."""
+    """The used share of a limit, in words."""
     return "broken" if not check.holds else f"{100 * min(1.0, check.used):.0f} % used"

@@ -1,4 +1,4 @@
-"""Pictures of the cover; needs matplotlib. The same input gives the same file."""
+"""Pictures of the cover, by matplotlib. The same input gives the same file."""
 
 from __future__ import annotations
 
@@ -118,14 +118,14 @@ def design_map(task: Task) -> Figure:
 
 
 def _top(thickness: Floats, pitch: Floats, inside: np.ndarray) -> tuple[float, float]:
-    """Where a contour has room for its name: its highest place, or where it leaves the picture."""
+    """Place of a contour's name: its highest point, or where it leaves the picture."""
     high = np.where(inside.any(axis=0), pitch[len(pitch) - 1 - inside[::-1].argmax(axis=0)], 0.0)
     column = int(np.argmax(np.minimum(high, 0.85 * pitch[-1])))
     return float(thickness[column]), float(high[column])
 
 
 def deformation(force_n: Floats, deformation_m: Floats) -> Figure:
-    """Measured points and their line, as the paper's Fig. 9."""
+    """Measured points and their line, like the paper's Fig. 9."""
     fitted = line.fit(force_n, deformation_m)
     figure = style.new(4.0)
     place = figure.subplots()
@@ -139,7 +139,7 @@ def deformation(force_n: Floats, deformation_m: Floats) -> Figure:
 
 
 def _closing(switch: Switch, offset_m: Floats, thickness_m: Floats, within: str) -> Floats:
-    """The point force in N that closes a switch; NaN, which is not drawn, where none does."""
+    """The point force in N that closes a switch; NaN, which is not drawn, if none does."""
     ratio = offset_m / thickness_m
     spread = medium.spread(within, ratio)
     limit = medium.first_zero(within)

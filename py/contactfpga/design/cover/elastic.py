@@ -1,4 +1,4 @@
-"""What a foam stands: stiffness of the contact, yield (6) and (7), resilience, and thickness by energy (8)."""
+"""Foam under load: stiffness of the contact, yield (6) and (7), resilience, and thickness by energy (8)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contactfpga.inputs.values import is_finite, shown
 
 BETWEEN_SPHERES = 1.1
 CYLINDER_ON_PLANE = 1.5
-"""nu_Y: mean contact pressure over yield strength where the foam first yields; no unit (paper, III.B)."""
+"""nu_Y: mean contact pressure over yield strength at the foam's first yield; dimensionless (paper, III.B)."""
 
 _OF_WORK: float = (8 / 15) ** 0.4
 """W/delta over (E_k^3 E*^2 R*)^(1/5), by W = 8/15 E* sqrt(R*) delta^(5/2): 0.7777. The paper takes it for the force;
@@ -25,8 +25,8 @@ THICKNESS_RULES = {
     "peak_force": _SHARE * 1.3 * (2.5 * _OF_WORK) ** (2 / 3),
     "hertz": _SHARE * 0.75 ** (2 / 3) * (2.5 * _OF_WORK) ** (2 / 3),
 }
-"""The constant in (8): as printed; the same unrounded (83.7589); with the peak force where the paper has W/delta
-(154.285); with that and the area of Hertz's circle on R*, 0.8255 pi (F R*/E*)^(2/3), in place of 1.3 pi (97.969)."""
+"""The constant in (8): as printed; unrounded (83.7589); with the peak force for the paper's W/delta (154.285); and also
+with the area of Hertz's circle on R*, 0.8255 pi (F R*/E*)^(2/3), for 1.3 pi (97.969)."""
 
 
 def effective_modulus_pa(modulus_pa: float, poisson: float, other_pa: float = math.inf, other: float = 0.0) -> float:
@@ -43,12 +43,12 @@ def young_pa(effective_pa: float, poisson: float) -> float:
 
 
 def stiffness(ball: Ball) -> float:
-    """K_s in N/m^1.5, by which F = K_s delta^1.5: 4/3 E* sqrt(R*) (paper, III.A)."""
+    """K_s in N/m^1.5 of F = K_s delta^1.5: 4/3 E* sqrt(R*) (paper, III.A)."""
     return 4 / 3 * ball.modulus_pa * math.sqrt(ball.radius_m)
 
 
 def ball_of(stiffness: float, radius_m: float) -> Ball:
-    """The contact on R* in m that has the stiffness K_s in N/m^1.5; inverse of :func:`stiffness`."""
+    """The contact on R* in m with stiffness K_s in N/m^1.5; inverse of :func:`stiffness`."""
     return Ball(radius_m, 0.75 * positive("stiffness", stiffness, "N/m^1.5") / math.sqrt(positive("R*", radius_m, "m")))
 
 
@@ -59,14 +59,14 @@ def yield_indentation_m(ball: Ball, yield_pa: float, ratio: float = BETWEEN_SPHE
 
 
 def resilience(yield_pa: float, modulus_pa: float) -> float:
-    """U_r in J/m^3, the energy that a volume takes elastically: Y^2/(2 E) (paper, III.C)."""
+    """U_r in J/m^3, the elastic energy capacity per volume: Y^2/(2 E) (paper, III.C)."""
     return positive("yield_pa", yield_pa, "Pa") ** 2 / (2 * positive("modulus_pa", modulus_pa, "Pa"))
 
 
 def thickness_m(
     ball: Ball, mass_kg: float, speed_m_s: float, resilience: float, time_share: float = 1.0, rule: str = "printed"
 ) -> float:
-    """The thickness in m that takes the energy, (8): m^(3/5) v0^(6/5) (t0/t_c) / (84 U_r (R*^2/E*)^(2/5)).
+    """The thickness in m that absorbs the energy, (8): m^(3/5) v0^(6/5) (t0/t_c) / (84 U_r (R*^2/E*)^(2/5)).
 
     ``resilience``: U_r in J/m^3; ``time_share``: t0/t_c; ``rule``: one of :data:`THICKNESS_RULES`, in place of the 84.
     """

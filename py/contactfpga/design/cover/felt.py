@@ -1,8 +1,7 @@
 """Whether a light finger is felt: the force that closes a first switch, over places anywhere on a sheet.
 
-The force on each switch is in proportion to the finger's, so a touch is felt from the least of the closing forces on,
-each divided by the share of the finger's force that its switch takes. The finger is an ellipse with Hertz's pressure
-whose size does not depend on its force.
+Switch forces are proportional to the finger's, so a touch is felt from the least ratio of closing force to force share
+on. The finger is an ellipse with Hertz's pressure of fixed size.
 """
 
 from __future__ import annotations
@@ -20,21 +19,21 @@ from contactfpga.design.cover.patch import Ellipse
 from contactfpga.design.cover.press import Cover, Load
 
 LENGTH_M, WIDTH_M = 12e-3, 10e-3
-"""Of a fingertip's contact that presses lightly."""
+"""Length and width of a light fingertip's contact."""
 
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
-"""Sheets whose closing forces are drawn, where these have a spread: another one lies between the least and the most of
-them with a probability of 39/41, which is 95 %."""
+"""Sheets with drawn closing forces, if these have a spread: another sheet is between the least and the most of them
+with a probability of 39/41 (95 %)."""
 
 LEAST_SHARE = 1e-4
-"""A switch that takes less of a finger's force is not pressed: a layer's linear solution has ripples far away."""
+"""Force share below which a switch counts as unpressed: a layer's linear solution has ripples far away."""
 
 NEIGHBORS = 2
-"""Switches beyond the finger and the reach of the foam that are looked at: caps that give way pass force on to them."""
+"""Computed switches beyond the finger and the reach of the foam: yielding caps pass force on."""
 
 _STEPS = 1 / 1.2207440846057596 ** np.arange(1, 4)
-"""Of a sequence that fills a cube evenly (Roberts): powers of the root of x^4 = x + 1."""
+"""Steps of a sequence that fills a cube evenly (Roberts): powers of the root of x^4 = x + 1."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,49 +43,49 @@ class Sheet:
     rows: int
     columns: int
     pitch_x_m: float
-    """Along the columns."""
+    """Pitch along the columns."""
     pitch_y_m: float
-    """Along the rows."""
+    """Pitch along the rows."""
     mask: Collection[tuple[int, int]] = ()
-    """(row, column) of switches that are absent: caps without one."""
+    """(row, column) of absent switches, whose caps remain."""
     closed: bool = False
-    """The last column is a neighbor of the first."""
+    """Whether the last column is a neighbor of the first."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Force:
-    """A force in N from which on touches are felt."""
+    """A force in N from which touches are felt."""
 
     value_n: float
     """The median over drawn sheets."""
     low_n: float
-    """The least of them."""
+    """The minimum over drawn sheets."""
     high_n: float
-    """The most of them; 95 % of all sheets lie between the two."""
+    """The maximum over drawn sheets; 95 % of all sheets are between the two."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Felt:
-    """How light a touch a sheet feels."""
+    """Sensitivity of a sheet to light touches."""
 
     places: int
-    """Places of the finger's middle, spread evenly over the sheet, each with an angle of its own."""
+    """Places of the finger's middle, evenly spread, each with its own angle."""
     sheets: int
-    """Sheets whose closing forces were drawn; 1 where they have no spread."""
+    """Sheets with drawn closing forces; 1 without a spread."""
     half: Force | NoSolution
-    """Half of all touches are felt from here on."""
+    """Force from which half of all touches are felt."""
     most: Force | NoSolution
-    """99 % of all touches are."""
+    """Force from which 99 % of all touches are felt."""
     worst: Force | NoSolution
-    """A touch at the worst of the places is."""
+    """Force from which a touch at the worst place is felt."""
     worst_m: tuple[float, float]
     """The worst place, x and y from the first switch."""
     least_share: float
-    """Of the finger's force, what the switch that is pressed most takes, at the worst place."""
+    """Force share of the most pressed switch at the worst place."""
     median_share: float
-    """The same in the median over all places."""
+    """Median over all places of the most pressed switch's force share."""
     false_presses: float
-    """Expected number of switches that close though nothing touches."""
+    """Expected number of switches that close without a touch."""
 
 
 def feel(
@@ -99,11 +98,11 @@ def feel(
     foam_kg_m3: float = 0.0,
     seed: int = 0,
 ) -> Felt:
-    """How light a finger this sheet feels, the ellipse ``length_m`` long and ``width_m`` wide.
+    """Sensitivity of a sheet to an elliptic finger, ``length_m`` long and ``width_m`` wide.
 
-    ``seed``: the first of :data:`SHEETS` from which closing forces are drawn, where the cover's switch has a spread;
-    acceleration and density: as :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the
-    model ``patch``, which knows no force.
+    ``seed``: the first of :data:`SHEETS` for drawing closing forces, if they have a spread; acceleration and density:
+    see :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the model ``patch``, which
+    knows no force.
     """
     half = positive("length_m", length_m, "m") / 2, positive("width_m", width_m, "m") / 2
     if not 1 <= places <= MOST_PLACES:
@@ -133,8 +132,8 @@ def feel(
 
 
 def spread_evenly(places: int, sheet: Sheet) -> Floats:
-    """(places, 3) x and y in m, anywhere on the sheet, which ends half a pitch beyond the outermost switches, and
-    angles in rad."""
+    """(places, 3) x and y in m, anywhere on the sheet up to half a pitch beyond the outermost switches, and angles in
+    rad."""
     parts = (0.5 + np.arange(1, places + 1)[:, None] * _STEPS) % 1
     x, y, angle = parts.T
     return np.stack(
@@ -147,7 +146,7 @@ def _cells(cover: Cover, sheet: Sheet, seed: int) -> Cells:
 
 
 def _closing(cover: Cover, sheet: Sheet, first: Cells, seed: int) -> Floats:
-    """(sheets, rows, columns) closing forces in N; inf for a switch that is absent, or closed when nothing touches."""
+    """(sheets, rows, columns) closing forces in N; inf for a switch that is absent, or closed without a touch."""
     drawn = [first.thresholds_n]
     if cover.switch.spread:
         drawn += [_cells(cover, sheet, seed + number).thresholds_n for number in range(1, SHEETS)]
@@ -169,7 +168,7 @@ def _touches(part: float) -> str:
 
 
 class _Window:
-    """The part of a sheet around a finger: what lies farther away takes nothing of its force."""
+    """The part of a sheet around a finger; switches beyond take no force."""
 
     def __init__(self, cover: Cover, sheet: Sheet, reach_m: float):
         self.sheet = sheet
@@ -181,7 +180,7 @@ class _Window:
         self.cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
 
     def taken(self, finger: Ellipse) -> tuple[Floats, tuple[np.ndarray, np.ndarray]]:
-        """The share of its force that each switch of the window takes, and the rows and columns that these have."""
+        """The force share of each switch of the window, and their rows and columns."""
         sheet, (high, wide) = self.sheet, self.cells.shape
         top = self._start(finger.y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
         left = self._start(finger.x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)

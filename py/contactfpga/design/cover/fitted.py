@@ -1,4 +1,4 @@
-"""The closing force of a cover's switches from forces that somebody measured at their closing."""
+"""The closing force of a cover's switches from measured forces."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from contactfpga.design.cover.answer import CoverError
 
 LEAST = 3
-"""Measured forces."""
+"""Least number of measured forces."""
 DRAWS = 200_000
 
 
 @dataclasses.dataclass(frozen=True)
 class FittedForce:
-    """The closing force of a switch in N, the median of all, and its interval."""
+    """Median closing force of a switch in N, and its interval."""
 
     value: float
     low: float
@@ -25,12 +25,12 @@ class FittedForce:
 
 
 def fit_force(force_n: float, pairs: Sequence[tuple[float, float]], probability: float = 0.95) -> FittedForce:
-    """The force that makes predicted closing forces those that were measured.
+    """The switch force that fits predicted to measured closing forces.
 
-    ``force_n``: the force of a switch that the predictions were computed with; ``pairs``: a predicted and a measured
-    force in N each, of switches whose forces scatter by a factor. All forces of a cover go with that of its switches,
-    so the factor between the two is one. Raises :class:`CoverError` for fewer than three pairs, and for forces that are
-    not above 0."""
+    ``force_n``: the switch force behind the predictions; ``pairs``: predicted and measured forces in N of switches
+    whose forces scatter by a factor. All closing forces are proportional to the switch force, so one factor is fitted.
+    Raises :class:`CoverError` for fewer than three pairs, and for forces not above 0.
+    """
     if len(pairs) < LEAST:
         raise CoverError(f"{len(pairs)} closing forces were measured; {LEAST} are needed, each of another switch")
     if not all(value > 0 and math.isfinite(value) for pair in pairs for value in pair):

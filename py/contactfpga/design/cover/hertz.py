@@ -29,13 +29,13 @@ class Ball:
         return math.cbrt(0.75 * positive("force_n", force_n, "N") * self.radius_m / self.modulus_pa)
 
     def indentation_m(self, force_n: float) -> float:
-        """How far the ball sinks in, in m: delta = a^2 / R*."""
+        """Indentation of the ball in m: delta = a^2 / R*."""
         return self.patch_m(force_n) ** 2 / self.radius_m
 
     def closing_n(self, switch: Switch, depth_m: float) -> float:
         """The force in N that closes a switch right below, ``depth_m`` deep in a half-space.
 
-        On the axis sigma = 3 F / (2 pi (a^2 + z^2)), which rises with F without end.
+        On the axis sigma = 3 F / (2 pi (a^2 + z^2)), which is unbounded in F.
         """
         positive("depth_m", depth_m, "m")
         low = 2 * math.pi / 3 * switch.closing_pa * depth_m**2  # that of a point force: the stress below it is highest

@@ -1,4 +1,4 @@
-"""A ball's pressure on a layer: the stress at the switches, and the force that closes one.
+"""A ball's pressure on a layer: the stress at the switches, and the closing force.
 
 The pressure p0 sqrt(1 - r^2/a^2) has the Hankel transform F 3 (sin x - x cos x)/x^3, x = k a. With t = k h
 
@@ -20,19 +20,19 @@ from contactfpga.design.cover.numerics import Floats, legendre, root
 from contactfpga.design.cover.point import Switch
 
 WIDEST = 8.0
-"""Patch radius over thickness up to which stresses are computed; Hertz stops holding at 1."""
+"""Largest patch radius over thickness for stresses; Hertz holds up to 1."""
 
 MOST_WIDE = 1e6
-"""Beyond, a patch has no stress to speak of."""
+"""Patch radius over thickness beyond which the stress is negligible."""
 
 TRIED = 96
-"""Patches that are tried, evenly in the logarithm, for the first one under which the switch closes."""
+"""Patches tried, logarithmically spaced, for the first that closes the switch."""
 
 
 def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: float, within: str) -> float:
     """Normal stress in Pa at ``offset_m`` from the axis of a Hertz patch of radius ``patch_m``, under ``thickness_m``.
 
-    ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`. Right to 1e-8 of F/h^2 up to 8 thicknesses away
+    ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`. Accurate to 1e-8 of F/h^2 up to 8 thicknesses away
     and for patches up to :data:`WIDEST` thicknesses.
     """
     if within == "halfspace":
@@ -45,7 +45,7 @@ def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: floa
 
 
 def closing_n(ball: Ball, switch: Switch, offset_m: float, thickness_m: float, within: str) -> float | NoSolution:
-    """The least force in N under which a switch ``offset_m`` from the ball's axis closes."""
+    """The least force in N that closes a switch ``offset_m`` from the ball's axis."""
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")
     # A quarter of the point force that closes a switch below it in a half-space; a layer does not double the stress.
@@ -71,7 +71,7 @@ def closing_n(ball: Ball, switch: Switch, offset_m: float, thickness_m: float, w
 
 
 def reach_m(ball: Ball, switch: Switch, force_n: float, thickness_m: float, within: str) -> float | NoSolution:
-    """How far in m from the axis a switch still closes under ``force_n``."""
+    """Distance in m from the axis up to which a switch closes under ``force_n``."""
     patch = ball.patch_m(positive("force_n", force_n, "N"))
     if patch > WIDEST * positive("thickness_m", thickness_m, "m"):
         return NoSolution(f"the patch is {1e3 * patch:.4g} mm in radius, the foam {1e3 * thickness_m:.4g} mm thick")

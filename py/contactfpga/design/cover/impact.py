@@ -1,7 +1,7 @@
-"""An arm runs into an obstacle: how far the foam is pressed, for how long, and how hard.
+"""An arm runs into an obstacle: depth, duration and peak force of the compression.
 
-Compression ends where v = 0 in the energy balance (3) of :mod:`contactfpga.design.cover.arm`: :func:`compression_m`
-is (5), :func:`time_s` is (4).
+Compression ends where v = 0 in the energy balance (3) of :mod:`contactfpga.design.cover.arm`: :func:`compression_m` is
+(5), :func:`time_s` is (4).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ COMPRESSION_TIME: float = 0.4 * math.gamma(0.4) * math.gamma(0.5) / math.gamma(0
 """t_c v0/delta_c without torque and gravity: (2/5) B(2/5, 1/2) = 1.471637592."""
 
 METHODS = ("auto", "closed", "quadrature", "ode")
-"""``auto``: the closed form where there is one, else quadrature."""
+"""``auto``: the closed form if there is one, else quadrature."""
 
 WIDE_ANGLE = 0.1
-"""delta/d in rad from which on theta - theta0 = delta/d is said to be rough."""
+"""delta/d in rad from which theta - theta0 = delta/d is noted as inaccurate."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Impact:
     stiffness: float
     """K_s in N/m^1.5."""
     energy_j: float
-    """What the foam then holds, in J."""
+    """Energy in the foam at that moment, in J."""
     method: str
     """``closed``, ``quadrature`` or ``ode``."""
     notes: tuple[str, ...] = ()
-    """Where the model is rough."""
+    """Limits of the model's accuracy."""
 
 
 def strike(
@@ -56,8 +56,8 @@ def strike(
 ) -> Impact | NoSolution:
     """The compression after a touch at ``speed_m_s`` by a contact of ``stiffness`` K_s in N/m^1.5.
 
-    There is no solution where the foam, ``thickness_m`` thick, is pressed flat, where it yields (``yield_m``: the
-    indentation at which it does), where nothing presses, and where the arm would turn further than its own lever.
+    There is no solution if the foam, ``thickness_m`` thick, is pressed flat, if it yields (at the indentation
+    ``yield_m``), if nothing presses, or if the arm would turn further than its own lever.
     """
     _checked(speed_m_s, stiffness)
     if method not in METHODS:
@@ -86,11 +86,11 @@ def strike(
 def stiffness_for(
     arm: Arm, speed_m_s: float, seconds: float, *, thickness_m: float | None = None
 ) -> Impact | NoSolution:
-    """The inverse: the stiffness at which the compression takes ``seconds``.
+    """The inverse: the stiffness at which the compression needs ``seconds``.
 
-    A deeper compression takes longer, so the search is over delta_c, for which (5) gives K_s at once. There is no
-    solution where torque and gravity stop the arm sooner whatever the foam, or where it would have to give in by
-    more than the lever or by ``thickness_m``.
+    A deeper compression is longer, so the search is over delta_c, for which (5) gives K_s at once. There is no solution
+    if torque and gravity stop the arm sooner whatever the foam, or if it would have to yield by more than the lever or
+    ``thickness_m``.
     """
     positive("speed_m_s", speed_m_s, "m/s")
     if positive("seconds", seconds, "s") < SMALLEST:
@@ -119,8 +119,8 @@ def stiffness_for(
 def compression_m(arm: Arm, speed_m_s: float, stiffness: float) -> float:
     """delta_c in m, (5): the first indentation at which v is 0.
 
-    Without gravity the balance is concave and has one root. With it, each step goes to the root of a concave curve
-    that lies below the balance, so that none is jumped over.
+    Without gravity the balance is concave with one root. With it, each step goes to the root of a concave lower bound,
+    so that no root is skipped.
     """
     _checked(speed_m_s, stiffness)
     if arm.free:
@@ -162,10 +162,10 @@ def _checked(speed_m_s: float, stiffness: float) -> None:
 
 
 def time_s(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float) -> float | None:
-    """t_c in s, (4), to about 1e-13 of it: with delta = delta_c sin^2(phi) both ends are smooth. None: not finite.
+    """t_c in s, (4), to about 1e-13: with delta = delta_c sin^2(phi) both ends are smooth. None: not finite.
 
-    In the upper half v^2 is taken as its difference from that at delta_c, 0, with cos^2(phi) divided out by hand, so
-    that nothing cancels and an error of delta_c is passed on once, not as its square root.
+    In the upper half v^2 is its difference from 0 at delta_c, with cos^2(phi) divided out analytically, so that nothing
+    cancels and an error of delta_c enters linearly, not as its square root.
     """
     not_negative("speed_m_s", speed_m_s, "m/s")
     not_negative("stiffness", stiffness, "N/m^1.5")
@@ -184,7 +184,7 @@ def _impact(arm: Arm, stiffness: float, depth: float, seconds: float, method: st
 def refusal(
     arm: Arm, stiffness: float, depth: float, thickness_m: float | None, yield_m: float | None
 ) -> NoSolution | None:
-    """Why a compression to ``depth`` in m cannot be, as :func:`strike` says; None if it can."""
+    """Why a compression to ``depth`` in m is impossible, as in :func:`strike`; None if possible."""
     limit, what = arm.lever_m, "the lever's length"
     if thickness_m is not None:
         limit, what = positive("thickness_m", thickness_m, "m"), "the foam's thickness"
@@ -209,7 +209,7 @@ def refusal(
 
 
 def _stiffness_at(arm: Arm, speed_m_s: float, depth: float) -> float:
-    """K_s at which the compression ends at ``depth``, (5); negative where the arm does not come that far."""
+    """K_s at which the compression ends at ``depth``, (5); negative where the arm does not arrive."""
     energy = arm.mass_kg * speed_m_s**2 / 2 + float(arm.work_j(depth))
     return float(energy / (0.4 * depth**2.5))
 
@@ -219,7 +219,7 @@ def _time_to(arm: Arm, speed_m_s: float, depth: float) -> float | None:
 
 
 def _deepest(arm: Arm, speed_m_s: float, thickness_m: float | None) -> tuple[float, str]:
-    """The deepest compression that any foam can end with, and what is said of a longer one."""
+    """The deepest possible final compression, and the reason why there is none longer."""
     limit = arm.lever_m if thickness_m is None else positive("thickness_m", thickness_m, "m")
     energy = arm.mass_kg * speed_m_s**2 / 2
     grid = np.linspace(0, limit, 257)

@@ -20,13 +20,13 @@ class StraightLine(NamedTuple):
     stiffness_n_m: float
     """In N/m."""
     offset_m: float
-    """Deformation at no force, in m."""
+    """Deformation without force, in m."""
     correlation: float
-    """Of force and deformation, -1 to 1."""
+    """Correlation of force and deformation, -1 to 1."""
 
 
 def read(path: str | Path) -> tuple[Floats, Floats]:
-    """Forces in N and deformations in m from a file with two columns, by comma; names may stand above them."""
+    """Forces in N and deformations in m from a file with two comma-separated columns, with or without a header."""
     rows: list[list[float]] = []
     with open_regular(path) as file:
         lines = file.read().decode(errors="replace").splitlines()
@@ -54,7 +54,7 @@ def _refused(path: str | Path, number: int, text: str) -> CoverError:
 
 
 def fit(force_n: Floats, deformation_m: Floats) -> StraightLine:
-    """The line through them; raises :class:`CoverError` if they do not vary."""
+    """The regression line; raises :class:`CoverError` if the points do not vary."""
     force, depth = force_n - force_n.mean(), deformation_m - deformation_m.mean()
     across = float(force @ depth)
     if across == 0:

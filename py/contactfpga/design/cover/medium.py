@@ -1,4 +1,4 @@
-"""How stress spreads from the cover's face to the switches, by name.
+"""Spread of stress from the cover's face to the switches, by medium.
 
 A point force F on the face gives the normal stress F/h^2 g(rho/h) at the depth h and the distance rho from its line,
 positive in compression. The face around the force is free. With the Hankel transform in the plane, k the wave number
@@ -6,15 +6,15 @@ and t = k h,
 
     g(s) = 1/(2 pi) int_0^inf t G(t) J0(t s) dt.
 
-``halfspace``: the cover goes on forever below the switches (paper (9), Johnson 3.2): G = (1 + t) exp(-t),
-g = 3/(2 pi) (1 + s^2)^(-5/2).
+``halfspace``: the cover continues below the switches (paper (9), Johnson 3.2): G = (1 + t) exp(-t), g = 3/(2 pi) (1 +
+s^2)^(-5/2).
 
-``bonded``: an incompressible cover of thickness h glued to a rigid base, the switches between them. The stream of an
-incompressible elastic body obeys (D^2 - 1)^2 W = 0 over the depth; without shear on the face, with no displacement at
+``bonded``: an incompressible cover of thickness h glued to a rigid base, the switches between them. The stream function
+of an incompressible elastic body obeys (D^2 - 1)^2 W = 0 over the depth; without shear on the face and displacement at
 the base: G = (cosh t + t sinh t) / (cosh^2 t + t^2).
 
-``frictionless``: the same on a rigid base on which it slides, for any Poisson ratio:
-G = (sinh t + t cosh t) / (sinh t cosh t + t).
+``frictionless``: a cover that slides on a rigid base, for any Poisson ratio: G = (sinh t + t cosh t) / (sinh t cosh t +
+t).
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.inputs.values import shown
 
 MEDIA = ("halfspace", "bonded", "frictionless")
-"""The names of :func:`spread` and :func:`transfer`."""
+"""Names for :func:`spread` and :func:`transfer`."""
 
 HIGHEST_T = 30.0
 """Wave number times thickness beyond which nothing passes: 2 t^2 exp(-t) is 2e-10 there."""
 
 FARTHEST = 16.0
-"""Distance over thickness beyond which a layer's stress counts as 0; it is below 1e-7 of that on the axis there."""
+"""Distance over thickness beyond which a layer's stress counts as 0; it is below 1e-7 of the axis value."""
 
 STEP = 0.025
-"""Distance over thickness between two integrals for a layer's table."""
+"""Distance over thickness between two integrals of a layer's table."""
 
 FINER = 32
-"""Parts of a step within which the table is straight: it is off by less than 1e-6 of the stress on the axis."""
+"""Linear pieces per step of the table, with an error below 1e-6 of the stress on the axis."""
 
 
 def transfer(name: str, t: Floats) -> Floats:
-    """G(t) of a medium, for t from 0 to some hundred; no unit."""
+    """G(t) of a medium, for t from 0 to some hundred; dimensionless."""
     t = np.asarray(t, float)
     if name == "halfspace":
         return np.asarray((1 + t) * np.exp(-t))
@@ -59,7 +59,7 @@ def transfer(name: str, t: Floats) -> Floats:
 
 
 def spread(name: str, s: Floats | float) -> Floats:
-    """g(s) of a medium: normal stress at the switches times h^2/F; ``s``: distance over thickness, no unit."""
+    """g(s) of a medium: normal stress at the switches times h^2/F; ``s``: distance over thickness, dimensionless."""
     s = np.abs(np.asarray(s, float))
     if name == "halfspace":
         square = 1 + s * s
@@ -78,9 +78,9 @@ def exact_spread(name: str, s: Floats | float) -> Floats:
 
 @functools.cache
 def first_zero(name: str) -> float | None:
-    """Distance over thickness at which the stress under a point force first becomes a pull; None if it never does.
+    """Distance over thickness at which the stress under a point force first becomes tensile; None if never.
 
-    Beyond 1.9076 a bonded layer presses again, with 0.29 % of the stress on the axis at most.
+    Beyond 1.9076 a bonded layer presses again, with at most 0.29 % of the stress on the axis.
     """
     if name == "halfspace":
         return None
@@ -93,9 +93,9 @@ def first_zero(name: str) -> float | None:
 
 @functools.cache
 def _table(name: str) -> tuple[Floats, Floats]:
-    """g every STEP / FINER and how much it rises to the next one; from FARTHEST on both are 0.
+    """g every STEP / FINER and its increment to the next; from FARTHEST on both are 0.
 
-    The integral is slow and smooth: it is taken every STEP, and between by the cubic through values and slopes.
+    The slow, smooth integral is computed every STEP, and interpolated by the cubic through values and slopes.
     """
     transfer(name, np.zeros(1))
     values, slopes = _integral(name, np.arange(0, FARTHEST + STEP / 2, STEP))
@@ -116,8 +116,8 @@ def _nodes() -> tuple[Floats, Floats]:
 def _integral(name: str, s: Floats) -> tuple[Floats, Floats]:
     """(g, dg/ds) at each of (n,) distances.
 
-    numpy has no J0, which is the mean of cos(x sin a) over the angle; the midpoint rule over a quarter turn converges
-    faster than any power of its number of nodes.
+    J0, which numpy lacks, is the mean of cos(x sin a) over the angle; the midpoint rule over a quarter turn converges
+    exponentially.
     """
     t, weights = _nodes()
     weighted = weights * t * transfer(name, t) / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""Roots and integrals to the last digits, without scipy."""
+"""Roots and integrals to full precision, without scipy."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Floats = NDArray[np.float64]
 
 NODES = 16
 DEEPEST = 60
-"""Halvings of the interval after which an integral is given up."""
+"""Bisections after which an integral is abandoned."""
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where ``function`` is 0 between two places at which its sign differs, to the last digits.
+    """The root of ``function`` between two places of different sign, to full precision.
 
-    Chandrupatla's method: inverse quadratic interpolation where it can be trusted, bisection elsewhere; it never leaves
-    the bracket. Raises ValueError if the signs do not differ.
+    Chandrupatla's method: inverse quadratic interpolation where reliable, else bisection, within the bracket. Raises
+    ValueError if the signs do not differ.
     """
     b, fb = low, function(low)
     a, fa = high, function(high)
@@ -53,9 +53,9 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def integral(function: Callable[[Floats], Floats], low: float, high: float, tolerance: float = 1e-13) -> float | None:
-    """The integral of ``function``, which takes and returns arrays, to ``tolerance`` of it; None if it has none.
+    """The integral of ``function``, vectorized over arrays, to relative ``tolerance``; None if it diverges.
 
-    Gauss-Legendre with 16 nodes; an interval whose halves say something else is halved.
+    Gauss-Legendre with 16 nodes; intervals whose halves disagree are bisected.
     """
     whole = gauss(function, low, high)
     if not math.isfinite(whole):

@@ -1,4 +1,4 @@
-"""Where something touches the cover: convex parts of a patch, and how their pressure is spread.
+"""Contact patches on the cover: convex parts, and their pressure.
 
 Lengths in m, angles in rad from the x axis toward the y axis, all on the sheet laid flat.
 """
@@ -22,7 +22,7 @@ class Part(Protocol):
 
     @property
     def x_m(self) -> float:
-        """Its middle, which is its barycenter, along the columns in m."""
+        """Its middle (barycenter) along the columns in m."""
 
     @property
     def y_m(self) -> float:
@@ -30,7 +30,7 @@ class Part(Protocol):
 
     @property
     def angle_rad(self) -> float:
-        """How far its own x axis is turned."""
+        """Rotation of its own x axis."""
 
     @property
     def half_x_m(self) -> float:
@@ -49,28 +49,27 @@ class Part(Protocol):
         """Half the width and half the height in m of the box around it."""
 
     def reach_m(self, angle_rad: Floats) -> Floats:
-        """How far it reaches from its middle in these directions, in m: its support function."""
+        """Support function: its reach from the middle in these directions, in m."""
 
     def contains(self, x_m: Floats, y_m: Floats) -> Floats:
-        """Bool: which points lie in it, its boundary included; the two broadcast."""
+        """Bool: which points are in it, including the boundary; the two broadcast."""
 
     def span(self, y_m: Floats) -> tuple[Floats, Floats]:
-        """Where lines of constant y enter and leave it, x in m; enters at +inf and leaves at -inf if they miss it."""
+        """x in m where lines of constant y enter and leave it; +inf and -inf if they miss it."""
 
     def kinks_m(self) -> tuple[float, ...]:
-        """Heights y in m at which the span has a corner, its ends left out."""
+        """Heights y in m at which the span has a corner, without its ends."""
 
     def placed(self, x_m: float, y_m: float, angle_rad: float) -> Self:
-        """The same turned about the origin, and then moved."""
+        """The part turned about the origin, then moved."""
 
     def density(self, x_m: Floats, y_m: Floats) -> Floats:
         """Its pressure at these points, which broadcast, for a force of 1 N: in 1/m2, 0 outside."""
 
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
-        """Point forces that stand for its pressure: x, y in m and shares of the force that add up to 1.
+        """Point forces for its pressure: x, y in m and force shares with sum 1.
 
-        They do so ``fineness_m`` and more below the face, to 5e-4 of the peak stress where no half extent is above
-        12 times that.
+        Valid ``fineness_m`` or more below the face, to 5e-4 of the peak stress if no half extent exceeds 12 times that.
         """
 
 
@@ -92,7 +91,7 @@ class _Shape:
     y_m: float = 0.0
     """Its middle along the rows, in m."""
     angle_rad: float = 0.0
-    """How far its own x axis is turned."""
+    """Rotation of its own x axis."""
 
     def __post_init__(self) -> None:
         for name in ("half_x_m", "half_y_m"):
@@ -116,7 +115,7 @@ class _Shape:
         return (cosine * x + sine * y) / self.half_x_m, (cosine * y - sine * x) / self.half_y_m
 
     def _sheet(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The inverse of :meth:`_own`."""
+        """Points in the sheet's frame; inverse of :meth:`_own`."""
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
         x, y = u * self.half_x_m, v * self.half_y_m
         return self.x_m + cosine * x - sine * y, self.y_m + sine * x + cosine * y
@@ -178,7 +177,7 @@ class Ellipse(_Shape):
 
 @dataclasses.dataclass(frozen=True)
 class Rectangle(_Shape):
-    """A flat body's patch: the pressure is the same everywhere."""
+    """A flat body's patch, with uniform pressure."""
 
     @property
     def area_m2(self) -> float:

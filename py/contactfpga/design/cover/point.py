@@ -13,20 +13,20 @@ from contactfpga.design.cover.answer import CoverError, NoSolution, finite, not_
 
 @dataclasses.dataclass(frozen=True)
 class Switch:
-    """A switch and the face on which the cover presses. The defaults are those of the paper's prototype."""
+    """A switch and the face under the cover. The defaults are those of the paper's prototype."""
 
     force_n: float = 1.0
-    """Force that closes it, in N."""
+    """Closing force in N."""
     area_m2: float = 12.6e-6
     """Area of its face in m2."""
     travel_m: float = 0.0
-    """How far it gives way before it closes, in m, evenly with the force; 0: it is rigid."""
+    """Travel until it closes, in m, linear in the force; 0: rigid."""
     spread: float = 0.0
-    """Standard deviation of the closing force from switch to switch, as a share of it; drawn within three of them."""
+    """Relative standard deviation of the closing force, drawn within three of them."""
     hysteresis: float = 0.0
-    """It opens when the force falls by this share below the one that closes it."""
+    """Share by which the opening force is below the closing force."""
     preload_n: float = 0.0
-    """Force in N with which it is pressed though nothing touches."""
+    """Force in N on it without a touch."""
 
     def __post_init__(self) -> None:
         positive("force_n", self.force_n, "N")
@@ -66,8 +66,8 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
     """The point force in N that closes a switch at the horizontal distance ``offset_m``: (9) solved for F; with
     ``offset_m`` = pitch / sqrt(2) it is (10).
 
-    In a layer no force does beyond :func:`contactfpga.design.cover.medium.first_zero`: the cover is pulled off the
-    switch there, and where it presses again farther out, it is by less than 0.3 % of the stress on the axis.
+    In a layer there is none beyond :func:`contactfpga.design.cover.medium.first_zero`: the cover is pulled off the
+    switch there, and where it presses again, it is by less than 0.3 % of the stress on the axis.
     """
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")
@@ -82,7 +82,7 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
 
 
 def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:
-    """How far in m from a point force of ``force`` N a switch still closes: the inverse of :func:`force_n`.
+    """Distance in m from a point force of ``force`` N up to which a switch closes: inverse of :func:`force_n`.
 
     Over a half-space rho = sqrt((3 z^3 F / (2 pi sigma))^0.4 - z^2).
     """
@@ -104,8 +104,8 @@ def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "hal
 
 
 def best_thickness_m(offset_m: float) -> float:
-    """The thickness in m at which the least point force closes a switch this far away, over a half-space: from
-    d/dz of (9), z = sqrt(1.5) rho."""
+    """The thickness in m that minimizes the point force for a switch at this distance, over a half-space: from d/dz of
+    (9), z = sqrt(1.5) rho."""
     return math.sqrt(1.5) * positive("offset_m", offset_m, "m")
 
 

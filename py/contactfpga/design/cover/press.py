@@ -1,4 +1,4 @@
-"""Which switches close: contacts on a cover, by a model chosen by name; and the table `[cover]` of a Skin's file."""
+"""Closed switches under contacts on a cover, by a named model; and the table `[cover]` of a Skin's file."""
 
 from __future__ import annotations
 
@@ -19,28 +19,27 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
-"""``patch``: a switch closes when it lies under the contact's shape, whatever the force.
-``point``: each part's force acts in its middle on a half-space, paper (9).
-``hertz``: each part's pressure acts on a half-space.
-``bonded``, ``frictionless``: each part's pressure acts on a layer on a rigid base, glued or sliding."""
+"""``patch``: a switch closes under the contact's shape, whatever the force. ``point``: each part's force acts at its
+middle on a half-space, paper (9). ``hertz``: each part's pressure acts on a half-space. ``bonded``, ``frictionless``:
+each part's pressure acts on a layer on a rigid base, glued or sliding."""
 
 SHEAR = 6 / 5
-"""Deflection of a strip that shears, over that by its mean shear stress (Timoshenko)."""
+"""Shear deflection of a strip over that by its mean shear stress (Timoshenko)."""
 
 GIVES = 0.75
-"""Thicknesses of foam by which a strip between two caps is longer than the gap, as the foam on the caps gives way, too:
+"""Thicknesses of foam by which a strip between two caps is longer than the gap, as the foam on the caps yields, too:
 fitted to boundary elements for caps of 0.6 to 0.9 of the pitch under 2 and 5 mm."""
 
 GRID = 16
-"""A switch's face is looked at in this many by this many points where a share of it has to be covered."""
+"""Sampling points per side of a switch's face, if a share of it must be covered."""
 
 BLOCK = 1 << 15
-"""Stresses that are added up at once: few enough to stay in the cache."""
+"""Stresses summed at once, few enough for the cache."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Load:
-    """One contact: its parts, and the force in N that they share in proportion to their areas."""
+    """One contact: its parts, and the force in N, shared in proportion to their areas."""
 
     parts: tuple[Part, ...]
     force_n: float
@@ -59,11 +58,11 @@ class Cap:
     """A rigid square plate on each switch."""
 
     side_m: float
-    """In m; at most the pitch."""
+    """Side in m, at most the pitch."""
     proud: bool = True
-    """It stands above what lies between the caps, so that the foam rests on caps alone; False: it is flush with it."""
+    """Whether it stands above its surroundings, so that the foam rests on caps alone; False: flush."""
     mass_kg: float = 0.0
-    """Of one cap."""
+    """Mass of one cap."""
 
     def __post_init__(self) -> None:
         positive("side_m", self.side_m, "m")
@@ -79,19 +78,19 @@ class Cover:
     model: str = "patch"
     """One of :data:`MODELS`."""
     thickness_m: float = 5e-3
-    """Thickness of the cover in m; ``patch`` does not look at it."""
+    """Thickness of the cover in m; irrelevant for ``patch``."""
     switch: Switch = dataclasses.field(default_factory=Switch)
-    """What has to be closed; ``patch`` without ``share`` does not look at it."""
+    """The switch; irrelevant for ``patch`` without ``share``."""
     share: float | None = None
-    """With ``patch``: the part of the switch's face, a square, that must lie under the contact; None: its middle."""
+    """With ``patch``: share of the switch's square face that must be under the contact; None: its middle."""
     cap: Cap | None = None
-    """On each switch; None: the foam presses the switch's own face, flush with what lies around it."""
+    """Cap on each switch; None: the foam presses the switch's own face, flush with its surroundings."""
     cut: bool = False
-    """The foam is cut between the caps."""
+    """Whether the foam is cut between the caps."""
     modulus_pa: float = 3.45e5
-    """Young's modulus of the foam in Pa; what gives way under proud caps depends on it."""
+    """Young's modulus of the foam in Pa, for the yield under proud caps."""
     poisson: float = 0.3
-    """Poisson's ratio of the foam, likewise."""
+    """Poisson's ratio of the foam, for the yield under proud caps."""
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
@@ -132,23 +131,23 @@ class Cover:
 
     @property
     def area_m2(self) -> float:
-        """Of that square."""
+        """Area of that square."""
         return self.side_m**2
 
     @property
     def gives_way(self) -> bool:
-        """Whether a cap that sinks loads its neighbors."""
+        """Whether a sinking cap loads its neighbors."""
         return bool(self.switch.travel_m and not self.cut)
 
     def width_m(self, pitch_m: float) -> float:
-        """Width in m of the foam that one switch carries."""
+        """Width in m of the foam on one switch."""
         return pitch_m if self.cap and self.cap.proud else self.side_m
 
     def strip_pa(self, pitch_m: float) -> float:
         """Stiffness in Pa of the foam between two proud caps ``pitch_m`` apart: N/m per m of the strip's width.
 
-        A strip of the length l = gap + :data:`GIVES` h, clamped at both ends:
-        1/K = 6/5 l/(G h) + l^3 (1 - nu^2)/(E h^3).
+        A strip of the length l = gap + :data:`GIVES` h, clamped at both ends: 1/K = 6/5 l/(G h) + l^3 (1 - nu^2)/(E
+        h^3).
         """
         long = (pitch_m - self.side_m) / self.thickness_m + GIVES
         shear = self.modulus_pa / (2 * (1 + self.poisson))
@@ -156,16 +155,16 @@ class Cover:
         return 1 / (SHEAR * long / shear + long**3 / plate)
 
     def closed(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Bool: which of the switches at these places, in m, are closed; ``x_m`` and ``y_m`` broadcast."""
+        """Bool: which switches at these places, in m, are closed; ``x_m`` and ``y_m`` broadcast."""
         if self.model == "patch":
             return self._covered(loads, x_m, y_m)
         closed: np.ndarray = self.stress_pa(loads, x_m, y_m) >= self.switch.closing_pa
         return closed
 
     def stress_pa(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Normal stress in Pa at these places below the cover, positive in compression; the contacts' stresses add up.
+        """Normal stress in Pa at these places below the cover, positive in compression, summed over contacts.
 
-        Not for the model ``patch``, which knows none.
+        Not for the model ``patch``, which has none.
         """
         if self.model == "patch":
             raise CoverError(f"the model 'patch' knows no stress; take one of {', '.join(MODELS[1:])}")
@@ -218,17 +217,16 @@ def _superposed(
 
 
 MIN_LENGTH_M = 1e-6
-"""Nothing is thinner; integrals over a layer run out of numbers long after."""
+"""Least length; integrals over a layer fail far below it."""
 
 
 def load_cover(path: str | Path) -> Cover | None:
-    """The cover in a Skin's file; None where it has no table ``[cover]``. Raises CoverError."""
+    """The cover in a Skin's file; None without a table ``[cover]``. Raises CoverError."""
     return tomlfile.load_table(path, "cover", read_cover, CoverError)
 
 
 def read_cover(values: Any) -> Cover:
-    """The cover that a TOML table describes; its keys are the fields of :class:`Cover`, with tables ``switch`` and
-    ``cap``."""
+    """The cover of a TOML table, whose keys are the fields of :class:`Cover`, with tables ``switch`` and ``cap``."""
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap)):
         if name in given:

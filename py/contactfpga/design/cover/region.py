@@ -1,17 +1,17 @@
-"""A body region that the arm runs into: which speed and which reaction time keep its limits, after a table that the
-user fills in from the standard.
+"""A body region that the arm runs into: speed and reaction time that keep its limits, from a table that the user fills
+in from the standard.
 
 The quantities are those of ISO/TS 15066:2016, annex A, and ISO 10218-2:2025: a region's effective mass and spring
-constant, and the most force and pressure that it may feel in a transient contact, which it can recoil from, and in a
-quasi-static one, where it is clamped. None of the numbers is ours.
+constant, and its largest force and pressure in a transient contact, from which it can recoil, and in a quasi-static
+one, where it is clamped. None of the numbers is ours.
 
-The foam, F = K_s delta^1.5 (Hertz), lies in series with the region's spring, F = k y. Together they are pressed by
-x(F) = (F/K_s)^(2/3) + F/k, and hold W(F) = 2/5 F (F/K_s)^(2/3) + F^2/(2 k).
+The foam, F = K_s delta^1.5 (Hertz), is in series with the region's spring, F = k y. Together they are pressed by x(F) =
+(F/K_s)^(2/3) + F/k, and store W(F) = 2/5 F (F/K_s)^(2/3) + F^2/(2 k).
 
-*Transient*, as the standard has it: two free masses, mu = 1/(1/m_arm + 1/m_region), no drive: mu v^2/2 = W(F).
+*Transient*, as in the standard: two free masses, mu = 1/(1/m_arm + 1/m_region), no drive: mu v^2/2 = W(F).
 
 *Quasi-static*: the region is clamped on its far side, and the arm presses on with u until it reacts, at x_r, and brakes
-with b from then on: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), which is solved for x_r at the limit's F. The time to x_r
+with b from then on: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), solved for x_r at the limit's F. The time to x_r
 follows by quadrature.
 
 Pressure is the largest under a Hertz patch, 3/2 of its mean: p^3 = 6 F E*^2/(pi^3 R*^2).
@@ -45,13 +45,13 @@ class Region:
     spring_n_m: float
     """Effective spring constant, in N/m."""
     transient_n: float
-    """The most force in a transient contact."""
+    """Largest force in a transient contact."""
     transient_pa: float
-    """The most pressure in it, in Pa: 100 N/cm2 are 1e6."""
+    """Largest pressure in a transient contact, in Pa: 100 N/cm2 are 1e6."""
     quasistatic_n: float
-    """The most force where the region is clamped."""
+    """Largest force on the clamped region."""
     quasistatic_pa: float
-    """The most pressure there, in Pa."""
+    """Largest pressure on the clamped region, in Pa."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
@@ -87,15 +87,15 @@ class Pressing:
     """An arm under its cover."""
 
     mass_kg: float
-    """What the contact feels of it: J/d^2."""
+    """Effective mass at the contact: J/d^2."""
     push_n: float
-    """What drives it on until it reacts."""
+    """Force that drives it on until it reacts."""
     brake_n: float
-    """What slows it from then on."""
+    """Force that slows it after the reaction."""
     ball: Ball
     """R* and E* of the foam on the region."""
     deepest_m: float
-    """How far the foam may be pressed in."""
+    """Largest indentation of the foam."""
 
     def __post_init__(self) -> None:
         positive("mass_kg", self.mass_kg, "kg")
@@ -104,36 +104,36 @@ class Pressing:
         positive("deepest_m", self.deepest_m, "m")
 
     def most_n(self, force_n: float, pressure_pa: float) -> float:
-        """The most force that keeps both limits and does not press the foam flat."""
+        """The largest force that keeps both limits and does not press the foam flat."""
         by_pressure = (math.pi * pressure_pa) ** 3 * self.ball.radius_m**2 / (6 * self.ball.modulus_pa**2)
         return float(min(force_n, by_pressure, stiffness(self.ball) * self.deepest_m**1.5))
 
 
 @dataclasses.dataclass(frozen=True)
 class RegionLimits:
-    """What keeps the limits of one region."""
+    """Limits of one region."""
 
     region: Region
     transient_n: float
-    """The most force in a transient contact: by force, pressure and foam."""
+    """Largest force in a transient contact: by force, pressure and foam."""
     transient_m_s: float
-    """The speed that exerts it."""
+    """The speed with this force."""
     quasistatic_n: float
-    """The most force where the region is clamped: by force, pressure and foam."""
+    """Largest force on the clamped region: by force, pressure and foam."""
     reaction_s: float
-    """The longest time from the touch to the reaction, at the speed that was asked, which keeps it; infinite where the
-    arm stops without any, 0 where even the earliest is too late."""
+    """The longest permissible time from the touch to the reaction, at the requested speed; infinite if the arm stops
+    without one, 0 if even the earliest is too late."""
     clamped_m_s: float | NoSolution
-    """The largest speed that keeps it with the reaction time that was asked."""
+    """The largest permissible speed for the clamped region with the requested reaction time."""
 
     @property
     def speed_m_s(self) -> float:
-        """The largest speed that keeps both, with the reaction time that was asked; 0: none does."""
+        """The largest speed that keeps both limits with the requested reaction time; 0: none does."""
         return 0.0 if isinstance(self.clamped_m_s, NoSolution) else min(self.transient_m_s, self.clamped_m_s)
 
     @property
     def binding(self) -> str:
-        """Which contact allows the smaller speed."""
+        """The contact that allows the smaller speed."""
         return "transient" if self.speed_m_s == self.transient_m_s else "quasi-static"
 
 
@@ -156,7 +156,7 @@ def limits_of(pressing: Pressing, region: Region, speed_m_s: float, reaction_s: 
 
 
 def _speed(pair: _Pair, force_n: float, reaction_s: float) -> float | NoSolution:
-    """The largest at which ``reaction_s`` is soon enough: the more speed the less time."""
+    """The largest speed at which ``reaction_s`` is soon enough: faster needs sooner."""
     fastest = pair.fastest_m_s(force_n)
     if reaction_s == 0:
         return fastest
@@ -190,12 +190,12 @@ class _Pair:
         return float(foam + force_n**2 / (2 * self.region.spring_n_m))
 
     def fastest_m_s(self, force_n: float) -> float:
-        """With which a reaction at the touch itself keeps the force."""
+        """Speed at which a reaction at the touch itself keeps the force."""
         braked = self.stored_j(force_n) + self.pressing.brake_n * self.pressed_m(force_n)
         return math.sqrt(2 * braked / self.pressing.mass_kg)
 
     def reaction_s(self, force_n: float, speed_m_s: float) -> float:
-        """The longest time to the reaction with which the force is never exceeded."""
+        """The longest time to the reaction that never exceeds the force."""
         arm, depth = self.pressing, self.pressed_m(force_n)
         left = self.stored_j(force_n) - arm.mass_kg * speed_m_s**2 / 2
         if left >= arm.push_n * depth:
@@ -209,7 +209,7 @@ class _Pair:
         return seconds
 
     def _slowness(self, share: Floats, force_n: float, speed_m_s: float) -> Floats:
-        """dt/dshare in s at F = ``force_n`` share^3, by which everything is smooth from the touch on."""
+        """dt/dshare in s at F = ``force_n`` share^3, smooth from the touch on."""
         arm, force = self.pressing, force_n * share**3
         foam = (force_n / stiffness(arm.ball)) ** (2 / 3) * share**2
         pressed = foam + force / self.region.spring_n_m

@@ -1,9 +1,9 @@
-"""The smallest force that a sheet under a cover detects, and the pitch it needs, by the simplest model that will do.
+"""The smallest force that a sheet under a cover detects, and the pitch it needs, by the simplest adequate model.
 
 A model is a medium (:mod:`contactfpga.design.cover.medium`) and a contact, ``point`` or ``patch`` (a ball's Hertz
 pressure). The paper's (9) and (10) are the half-space under a point force. The reference is the bonded layer under the
-patch: foam glued on a rigid bumper, touched by something round. Where nothing is known of what touches, it is the
-bonded layer under a point force.
+patch: foam glued on a rigid bumper under a round object. For an unknown object it is the bonded layer under a point
+force.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.point import Switch
 
 TOLERANCE = 0.05
-"""How far the simplest model's answer may be from the reference's, by default."""
+"""Default tolerance of the simplest model's answer against the reference's."""
 
 CONTACTS = ("point", "patch")
 
 
 class Model(NamedTuple):
-    """How stress spreads, and what presses."""
+    """A medium and a contact."""
 
     within: str
     contact: str
@@ -41,35 +41,35 @@ LADDER = (
     Model("halfspace", "patch"),
     Model("bonded", "patch"),
 )
-"""Simplest first: two closed forms and a table, then a patch; the last one is the reference."""
+"""Models, simplest first: two closed forms and a table, then a patch; the last is the reference."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Sense:
-    """An answer, and how far to trust it."""
+    """An answer, and its accuracy."""
 
     value: float | NoSolution
     """A force in N or a reach in m."""
     model: Model
     reference: float | NoSolution
-    """What the reference says."""
+    """The reference's answer."""
     error: float | None
-    """``value`` over ``reference`` minus 1; None where one of them is no number."""
+    """``value`` over ``reference`` minus 1; None if one is no number."""
     dropped: tuple[str, ...]
-    """What this model leaves out that the reference has."""
+    """Effects in the reference that this model omits."""
     notes: tuple[str, ...]
-    """Where a model does not hold."""
+    """Limits of the model's validity."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PaddedSheet:
-    """Foam over switches, and what touches it."""
+    """Foam over switches, and the touching object."""
 
     switch: Switch
     thickness_m: float
-    """Of the foam, in m."""
+    """Thickness of the foam, in m."""
     ball: Ball | None = None
-    """What touches; None: not known, a point force is taken."""
+    """The touching object; None: unknown, a point force is assumed."""
 
     def __post_init__(self) -> None:
         positive("thickness_m", self.thickness_m, "m")
@@ -98,23 +98,23 @@ class PaddedSheet:
         return force
 
     def reach_m(self, model: Model, force_n: float) -> float | NoSolution:
-        """How far in m from the contact's middle a switch still closes; inverse of :meth:`force_n`."""
+        """Distance in m from the contact's middle up to which a switch closes; inverse of :meth:`force_n`."""
         if model.contact == "point":
             return point.reach_m(self.switch, force_n, self.thickness_m, model.within)
         return hertz_layer.reach_m(self._ball(model), self.switch, force_n, self.thickness_m, model.within)
 
     def detects(self, offset_m: float, model: Model | None = None, tolerance: float | None = None) -> Sense:
-        """:meth:`force_n` by a model, or by the simplest one whose force is within ``tolerance`` of the reference's.
+        """:meth:`force_n` by a named model, or by the simplest within ``tolerance`` of the reference.
 
-        Without ``tolerance`` that is :data:`TOLERANCE`, and a model that is named answers whatever its error, which is
-        noted; with it a model that is named and is off by more is refused.
+        By default the tolerance is :data:`TOLERANCE`, and a named model answers with a note of its error; with
+        ``tolerance`` a named model that is off by more is refused.
         """
         found = self._judge(lambda one: self.force_n(one, offset_m), model, tolerance)
         force = found.reference if isinstance(found.value, NoSolution) else found.value
         return self._noted(found, None if isinstance(force, NoSolution) else force)
 
     def reaches(self, force_n: float, model: Model | None = None, tolerance: float | None = None) -> Sense:
-        """:meth:`reach_m` by a model, or by the simplest one that will do, as :meth:`detects` says."""
+        """:meth:`reach_m` by a named or the simplest adequate model, as in :meth:`detects`."""
         return self._noted(self._judge(lambda one: self.reach_m(one, force_n), model, tolerance), force_n)
 
     def _ball(self, model: Model) -> Ball:
@@ -176,20 +176,20 @@ class PaddedSheet:
 
 
 def worst_offset_m(pitch_x_m: float, pitch_y_m: float | None = None) -> float:
-    """The farthest that a point of the sheet lies from a switch: half the diagonal of a cell, p/sqrt(2) if square."""
+    """The largest distance of a point from a switch: half the diagonal of a cell, p/sqrt(2) if square."""
     wide = positive("pitch_x_m", pitch_x_m, "m")
     return math.hypot(wide, wide if pitch_y_m is None else positive("pitch_y_m", pitch_y_m, "m")) / 2
 
 
 def pitch_m(reach_m: float) -> float:
-    """The pitch of a square matrix whose worst place lies ``reach_m`` from a switch: sqrt(2) times it (paper, IV.C)."""
+    """The pitch of a square matrix whose worst place is ``reach_m`` from a switch: sqrt(2) times it (paper, IV.C)."""
     return math.sqrt(2) * reach_m
 
 
 @functools.cache
 def best_ratio(within: str = "halfspace") -> float:
-    """Offset over thickness at which the least point force closes a switch, the offset being given: sqrt(2/3) in a
-    half-space. F = sigma rho^2/(s^2 g(s)), s = rho/h."""
+    """Offset over thickness of the least closing force at a given offset: sqrt(2/3) in a half-space. F = sigma
+    rho^2/(s^2 g(s)), s = rho/h."""
     if within == "halfspace":
         return math.sqrt(2 / 3)
 
@@ -205,6 +205,5 @@ def best_ratio(within: str = "halfspace") -> float:
 
 
 def best_thickness_m(offset_m: float, within: str = "halfspace") -> float:
-    """The thickness in m at which the least point force closes a switch ``offset_m`` away: sqrt(1.5) rho in a
-    half-space."""
+    """The thickness in m with the least point force for a switch at ``offset_m``: sqrt(1.5) rho in a half-space."""
     return positive("offset_m", offset_m, "m") / best_ratio(within)

@@ -1,9 +1,8 @@
-"""What a cover is designed for, read from a TOML file: the arm, the impact, the switch, foams and limits.
+"""The task of a cover, from a TOML file: the arm, the impact, the switch, foams and limits.
 
-Each foam's values have their source; what a source does not give is None, and is not guessed. Data sheets give the
-stress at 25 % compression rather than a modulus: the modulus here is that stress over 0.25, which is a secant and below
-the slope at the start. A soft foam's Poisson ratio falls as it is pressed: 0.5 at 5 %, about 0 at 66 % (doi
-10.1016/j.ijengsci.2007.09.002).
+Each foam's values have their source; missing ones are None, not guessed. Data sheets give the stress at 25 %
+compression rather than a modulus: the modulus here is that stress over 0.25, a secant below the initial slope. A soft
+foam's Poisson ratio falls under compression: 0.5 at 5 %, about 0 at 66 % (doi 10.1016/j.ijengsci.2007.09.002).
 """
 
 from __future__ import annotations
@@ -33,14 +32,13 @@ class Foam:
     modulus_pa: float
     """Young's modulus in Pa."""
     source: str
-    """Where the values are from, and how they follow from it."""
+    """Source of the values, and their derivation."""
     density_kg_m3: float | None = None
     """In kg/m3."""
     yield_pa: float | None = None
-    """Yield strength Y in Pa; with None neither (7) nor (8) can be asked."""
+    """Yield strength Y in Pa; None excludes (7) and (8)."""
     strain: float = 1.0
-    """The part of its thickness by which it may be pressed in: the largest for which the source gives a stress; 1 where
-    it gives none."""
+    """Largest relative compression: the largest for which the source gives a stress, else 1."""
 
     def __post_init__(self) -> None:
         positive("modulus_pa", self.modulus_pa, "Pa")
@@ -121,7 +119,7 @@ def find(name: str, foams: tuple[Foam, ...] = FOAMS) -> Foam:
 _NEEDED = object()
 
 LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
-"""Of cover and link; a value that looks like mm is refused."""
+"""Lengths of cover and link; values that look like mm are refused."""
 
 _KEYS: dict[str, dict[str, Any]] = {
     "arm": {
@@ -160,55 +158,55 @@ _KEYS: dict[str, dict[str, Any]] = {
 
 @dataclasses.dataclass(frozen=True)
 class Task:
-    """What a cover is designed for."""
+    """The task of a cover."""
 
     arm: Arm
     mass_kg: float
-    """Of the link, which (8) as printed takes for the mass that strikes, in kg."""
+    """Mass of the link in kg, the striking mass of (8) as printed."""
     speed_m_s: float
-    """Of the contact point at the touch."""
+    """Speed of the contact point at the touch."""
     radius_m: float
     """Effective radius R* in m."""
     poisson: float
     time_s: float
-    """tau: how long the compression has to last, in s."""
+    """tau: required duration of the compression, in s."""
     latency_s: float
     """t0: from the touch to the reaction, in s."""
     switch: Switch
     pitch_m: float
-    """The pitch at most, in m."""
+    """Largest pitch, in m."""
     force_n: float
     """The force that must be felt everywhere on the sheet, in N."""
     thickness_m: float
-    """The thickness at most, in m."""
+    """Largest thickness, in m."""
     pitch_min_m: float | None = None
-    """The pitch at least, in m."""
+    """Smallest pitch, in m."""
     peak_n: float | None = None
-    """The impact's peak force at most, in N."""
+    """Largest peak force of the impact, in N."""
     mass_kg_m2: float | None = None
-    """The cover's mass per area at most, in kg/m2; a foam of unknown density is not held to it."""
+    """Largest mass of the cover per area, in kg/m2; not checked for a foam of unknown density."""
     regions: tuple[Region, ...] = ()
-    """Of the body, whose limits of force and pressure have to be kept."""
+    """Body regions whose limits of force and pressure must be kept."""
     foams: tuple[Foam, ...] = FOAMS
     free: bool = True
-    """Whether the modulus that gives exactly ``time_s`` is a candidate, too."""
+    """Whether the modulus with exactly ``time_s`` is also a candidate."""
     plates_m: tuple[float, ...] = ()
-    """Thicknesses that can be had, in m; none: any."""
+    """Available thicknesses, in m; none: any."""
     rule: str = "hertz"
     """One of :data:`contactfpga.design.cover.elastic.THICKNESS_RULES`."""
     strain: float | None = None
-    """How far every foam may be pressed in, as a part of its thickness; None: as each foam says."""
+    """Relative compression allowed for every foam; None: each foam's own."""
     model: Model | None = None
     """None: the simplest within ``tolerance``."""
     contact: str = "point"
-    """``patch``: the sheet has to feel the impact's own contact; ``point``: anything."""
+    """``patch``: the sheet must feel the impact's own contact; ``point``: anything."""
     tolerance: float = TOLERANCE
     skin: Skin = dataclasses.field(default_factory=Skin)
-    """The sheet whose latency the cover is compared for."""
+    """The sheet whose latency is compared."""
     other_s: float = 0.0
-    """What host, controller and motor add to it, in s."""
+    """Extra time of host, controller and motor, in s."""
     brake_nm: float = 0.0
-    """The motor's torque against the motion once it reacts, in Nm."""
+    """Motor torque against the motion after the reaction, in Nm."""
 
     def __post_init__(self) -> None:
         for name, unit in (("mass_kg", "kg"), ("speed_m_s", "m/s"), ("radius_m", "m"), ("time_s", "s")):

@@ -1,4 +1,4 @@
-"""A sheet as files to order: the matrix of a Skin laid out on a board, and what its lines come to as a circuit."""
+"""A sheet as files to order: a Skin's matrix laid out on a board, and the circuit of its lines."""
 
 from contactfpga.design.sheet.layout import Layout, lay_out
 from contactfpga.design.sheet.parts import SWITCHES, SheetError

@@ -1,7 +1,7 @@
 """The cap layer: a printed cap on each switch, as one STL file.
 
-A cap is a square plate with a square plunger below, which stands on the switch. Nothing joins the caps: they are
-printed in their places, and the foam that is glued to their tops carries them onto the switches together.
+A cap is a square plate with a square plunger below, which stands on the switch. The caps are separate, printed in
+place; the foam glued to their tops carries them onto the switches together.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from contactfpga.skin import Skin
 PLATE_MM = 1.2
 """Thickness of a cap's plate."""
 GAP_MM = 0.6
-"""Between caps, where the Skin's file states no cap."""
+"""Gap between caps, if the Skin's file states no cap."""
 LEAST_GAP_MM = 0.3
-"""A printer that lays lines of 0.4 mm keeps this."""
+"""Least gap for a printer with lines of 0.4 mm."""
 BELOW_MM = 0.3
-"""Between the plate and the switch's body while the switch is pressed to its end: the plate may tilt by it."""
+"""Gap between the plate and the body of a fully pressed switch, the allowance for tilt."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,24 +28,24 @@ class Caps:
     """The cap layer of a sheet, with its clearances in mm."""
 
     centers: np.ndarray
-    """(caps, 2): x and y of each cap as seen from above, y down."""
+    """(caps, 2): x and y of each cap seen from above, y down."""
     side_mm: float
     plunger_mm: float
     """Side of the plunger."""
     plunger_height_mm: float
     gap_mm: float
-    """The smaller distance between neighbors."""
+    """The smaller gap between neighbors."""
     below_mm: float = BELOW_MM
 
     def triangles(self) -> np.ndarray:
         """(triangles, 3 corners, 3) in mm: x, y up, and z, with the plunger's foot at 0. Each cap is one closed body
-        whose normals point outward."""
+        with outward normals."""
         one = _cap(self.side_mm / 2, self.plunger_mm / 2, self.plunger_height_mm)
         moved = np.column_stack([self.centers[:, 0], -self.centers[:, 1], np.zeros(len(self.centers))])
         return np.asarray(one[None] + moved[:, None, None]).reshape(-1, 3, 3)
 
     def stl(self) -> bytes:
-        """A binary STL file; its unit is the millimeter."""
+        """A binary STL file in millimeters."""
         corners = self.triangles()
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -56,8 +56,8 @@ class Caps:
 
 
 def caps(skin: Skin, switch: SwitchPart, side_mm: float | None = None) -> Caps:
-    """The caps of a Skin. ``side_mm``: of its ``[cover.cap]``; None leaves :data:`GAP_MM` between caps. Raises
-    :class:`SheetError` where caps would touch, or are smaller than their plungers."""
+    """The caps of a Skin. ``side_mm``: from its ``[cover.cap]``; None leaves :data:`GAP_MM` between caps. Raises
+    :class:`SheetError` if caps would touch, or are smaller than their plungers."""
     pitch = min(skin.pitch_x_mm, skin.pitch_y_mm)
     side = pitch - GAP_MM if side_mm is None else side_mm
     gap = pitch - side
@@ -77,7 +77,7 @@ def caps(skin: Skin, switch: SwitchPart, side_mm: float | None = None) -> Caps:
 
 
 def _cap(half: float, inner: float, height: float) -> np.ndarray:
-    """(28, 3, 3): a plate on a plunger, closed, around the z axis."""
+    """(28, 3, 3): a closed plate on a plunger, around the z axis."""
     square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
     foot, neck = _level(inner * square, 0.0), _level(inner * square, height)
     rim, top = _level(half * square, height), _level(half * square, height + PLATE_MM)
@@ -101,7 +101,7 @@ def _ends(square: np.ndarray) -> list[list[np.ndarray]]:
 
 
 def _band(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """Triangles between two squares, seen from outside or from below."""
+    """Triangles between two squares, facing outward or down."""
     found = []
     for k in range(4):
         a, b, c, d = low[k], low[(k + 1) % 4], high[(k + 1) % 4], high[k]

@@ -1,8 +1,8 @@
 """Joins pins above a strip of the board with pins below it: each net on a level of its own across the strip.
 
-This is channel routing with the left-edge rule (Hashimoto and Stevens, 1971). Levels run on the top side, and from
-each pin a track leads to its level on the back. Pins below lie on whole steps of a :class:`Grid`, pins above half a
-step beside them, so that no two of these tracks ever meet and no rule about their order is needed.
+This is channel routing with the left-edge rule (Hashimoto and Stevens, 1971). Levels run on the top side; from each pin
+a track leads to its level on the back. Pins below are on whole steps of a :class:`Grid`, pins above half a step aside,
+so that no two of these tracks meet and their order is free.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from contactfpga.design.sheet.drawn import CLEARANCE_MM, GND, POWER_MM, SUPPLY, 
 
 GRID_MM = 1.27
 LEVEL_MM = VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
-"""From level to level: a via beside a track."""
+"""Distance of levels: a via beside a track."""
 APART_MM = VIA_MM + CLEARANCE_MM
-"""Between the ends of two nets on one level."""
+"""Distance between the ends of two nets on one level."""
 POWERED = (GND, SUPPLY)
-"""Nets whose levels are wider and first."""
+"""Power nets, whose levels are wider and first."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pin:
-    """Where a net comes to the channel; ``y`` is the place on the back from which its track starts."""
+    """A net's end at the channel; ``y`` is the start of its track on the back."""
 
     net: str
     x: float
@@ -33,18 +33,18 @@ class Pin:
 
 @dataclasses.dataclass(frozen=True)
 class Grid:
-    """Places along the channel, :data:`GRID_MM` apart; ``origin`` is a place of pins below."""
+    """Places along the channel, :data:`GRID_MM` apart; ``origin`` is a place for pins below."""
 
     origin: float
 
     def near(self, x: float, below: bool) -> float:
-        """The place nearest to x for a pin below, or for one above."""
+        """The place nearest to x for a pin below, or above."""
         shift = self.origin if below else self.origin + GRID_MM / 2
         return round((x - shift) / GRID_MM) * GRID_MM + shift
 
 
 def levels(pins: Iterable[Pin]) -> dict[str, int]:
-    """The level of each net with two pins or more, 0 at the bottom; nets that share one are apart."""
+    """The level of each net with two or more pins, 0 at the bottom; nets on one level do not overlap."""
     ends: dict[str, tuple[float, float, int]] = {}
     for pin in pins:
         low, high, count = ends.get(pin.net, (math.inf, -math.inf, 0))
@@ -64,13 +64,13 @@ def levels(pins: Iterable[Pin]) -> dict[str, int]:
 
 
 def height(pins: Iterable[Pin]) -> float:
-    """Of the channel that joins these pins, in mm."""
+    """Height of the channel for these pins, in mm."""
     found = levels(pins)
     return LEVEL_MM * (max((level + (net in POWERED) for net, level in found.items()), default=0) + 2)
 
 
 def join(drawing: Drawing, pins: list[Pin], bottom: float) -> None:
-    """Draw the tracks; the channel reaches from ``bottom`` up by its :func:`height`."""
+    """Draw the tracks; the channel extends from ``bottom`` up by its :func:`height`."""
     for net, level in levels(pins).items():
         powered = net in POWERED
         y = bottom - LEVEL_MM * (level + 1 + powered / 2)

@@ -1,6 +1,6 @@
-"""What a board consists of, whatever file it is written to: parts in their places, tracks, vias, holes, print.
+"""The items of a board, for any file format: parts, tracks, vias, holes, print.
 
-Lengths are in mm as seen from the top side, x to the right and y down; cell (row 0, column 0) lies at (0, 0).
+Lengths are in mm seen from the top side, x to the right and y down; cell (row 0, column 0) is at (0, 0).
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ from typing import Literal
 from contactfpga.design.sheet.parts import Pad, Part
 
 Layer = Literal["F", "B"]
-"""Copper on the top side, or on the back."""
+"""Copper layer: top side or back."""
 
 TRACK_MM = 0.2
 """Width of a track."""
 POWER_MM = 0.5
 """Width of the long tracks of 3.3 V and ground."""
 CLEARANCE_MM = 0.2
-"""Between copper of two nets."""
+"""Clearance between copper of two nets."""
 VIA_MM = 0.6
 VIA_DRILL_MM = 0.3
 EDGE_MM = 0.3
-"""Between copper and the edge of the board."""
+"""Clearance between copper and the board's edge."""
 PRINT_MM = 0.12
 """Width of a printed line."""
 MASK_MM = 0.05
-"""By how much the opening of the solder mask is larger than its pad, on each side."""
+"""Excess of a solder mask opening over its pad, on each side."""
 
 BOARDS = {"plane": (1.6, 1.53, 4.4), "cylinder": (0.2, 0.1, 3.4)}
-"""By the Skin's surface: thickness of the board and distance of its two copper layers in mm, and permittivity. A plane
-is FR-4, a cylinder a polyimide flex."""
+"""By the Skin's surface: thickness of the board and distance of its copper layers in mm, and permittivity. A plane is
+FR-4, a cylinder a polyimide flex."""
 
 GND = "GND"
 SUPPLY = "3V3"
 
 
 def rounded(value: float) -> float:
-    """To a nanometer, which is what boards' files count in; never -0."""
+    """Rounded to a nanometer, the unit of board files; never -0."""
     return round(value, 6) + 0.0
 
 
@@ -48,26 +48,26 @@ class PlacedPart:
     """A part on the board."""
 
     reference: str
-    """Such as ``R7``."""
+    """Reference such as ``R7``."""
     part: Part
     value: str
     x: float
     y: float
     turn: int
-    """Degrees counterclockwise, in quarters, after the part is mirrored for the back."""
+    """Rotation in degrees counterclockwise, in quarters, after mirroring for the back."""
     back: bool
     nets: dict[str, str]
-    """Net of each pad's number; pads that are not in it are not connected."""
+    """Net of each connected pad by number."""
 
     def spot(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point of the part's own drawing lies on the board."""
+        """Board position of a point of the part's drawing."""
         if self.back:
             y = -y
         c, s = round(math.cos(math.radians(self.turn))), round(math.sin(math.radians(self.turn)))
         return rounded(self.x + x * c + y * s), rounded(self.y - x * s + y * c)
 
     def size(self, pad: Pad) -> tuple[float, float]:
-        """Width and height of a pad as it lies on the board."""
+        """Width and height of a pad on the board."""
         return (pad.height, pad.width) if self.turn % 180 else (pad.width, pad.height)
 
 
@@ -119,8 +119,7 @@ class Hole:
 
 
 class Drawing:
-    """A board as it grows. Its lists are in the order in which things were added, so that the same calls give the same
-    files."""
+    """A board under construction. Its lists are in order of addition, so that the same calls give the same files."""
 
     def __init__(self) -> None:
         self.placed: list[PlacedPart] = []
@@ -129,7 +128,7 @@ class Drawing:
         self.strokes: list[Stroke] = []
         self.holes: list[Hole] = []
         self.outline: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-        """Left, top, right and bottom edge."""
+        """Left, top, right and bottom edges."""
         self._counts: dict[str, int] = {}
 
     def place(
@@ -151,7 +150,7 @@ class Drawing:
         return one
 
     def run(self, net: str, layer: Layer, *points: tuple[float, float], width: float = TRACK_MM) -> None:
-        """Add tracks from point to point; a point that repeats the one before it adds none."""
+        """Add tracks between successive points, skipping repeated points."""
         spots = [(rounded(x), rounded(y)) for x, y in points]
         for a, b in itertools.pairwise(spots):
             if a != b:
@@ -166,8 +165,8 @@ class Drawing:
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
     def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
-        """Print a number on the top side with its middle at (x, y), in strokes as on a seven-segment display; not
-        upright, it reads from below to above."""
+        """Print a number on the top side, centered at (x, y), in seven-segment strokes; if not upright, it reads
+        upward."""
         digits = str(value)
         step, tall = 0.8 * height, height / 2
         corners = {0: (0, -1), 1: (1, -1), 2: (0, 0), 3: (1, 0), 4: (0, 1), 5: (1, 1)}
@@ -181,7 +180,7 @@ class Drawing:
                 self.stroke(x + u1, y + v1, x + u2, y + v2)
 
     def nets(self) -> list[str]:
-        """Names of all nets, in the order of the alphabet."""
+        """Names of all nets in alphabetical order."""
         found = {net for one in self.placed for net in one.nets.values()}
         return sorted(found | {track.net for track in self.tracks} | {via.net for via in self.vias})
 

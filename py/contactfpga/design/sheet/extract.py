@@ -1,5 +1,4 @@
-"""What the lines of a layout come to as a circuit: resistance from their copper, capacitance from what is beside and
-across them.
+"""The circuit of a layout's lines: resistance from their copper, capacitance from neighbors and crossings.
 
 Each formula is for copper of no thickness on or in one dielectric, so capacitances are good to some ten percent:
 
@@ -11,8 +10,8 @@ Each formula is for copper of no thickness on or in one dielectric, so capacitan
   1991, section 3.4);
 - resistance: sheet resistance of copper times length over width, with all branches of a line solved as a network.
 
-The charge of the diodes is not in these values: the circuit model has it at each pressed switch. An open switch has its
-contacts' capacitance in series with its diode's.
+Diode charge is excluded: the circuit model has it at each pressed switch. An open switch has its contacts' capacitance
+in series with its diode's.
 """
 
 from __future__ import annotations
@@ -30,33 +29,33 @@ from contactfpga.skin import Skin
 
 EPS0_PF_MM = 8.8541878e-3
 SHEET_OHM = 4.9e-4
-"""Of a square of copper of 35 um, 1 oz per square foot, at 20 degrees Celsius: 1.72e-8 ohm m over 35 um."""
+"""Sheet resistance of 35 um copper, 1 oz per square foot, at 20 degrees Celsius: 1.72e-8 ohm m over 35 um."""
 VIA_SIEMENS = 1e3
-"""A via: 1 mohm."""
+"""Conductance of a via: 1 mohm."""
 PIN_PF = 10.0
-"""Of a pin of an FPGA, a 74HC595 or a 74HC165 with its pads."""
+"""Capacitance of a pin of an FPGA, a 74HC595 or a 74HC165 with its pads."""
 CABLE_PF_M = 50.0
-"""Of a meter of ribbon cable (docs/maker.md)."""
+"""Capacitance of a meter of ribbon cable (docs/maker.md)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Extracted:
-    """What a layout's lines come to; capacitances in pF."""
+    """Values of a layout's lines; capacitances in pF."""
 
     circuit: Circuit
-    """The layout's circuit with these values in it: what the model takes, one value for all lines."""
+    """The layout's circuit with these values, one for all lines."""
     row_ohm: tuple[float, float]
-    """The lowest and the highest of all rows, from the resistor to the far end."""
+    """Lowest and highest resistance of all rows, from the resistor to the far end."""
     column_ohm: tuple[float, float]
     crossing_pf: tuple[float, float]
-    """Of a row to a column, the lowest and the highest; the circuit has the mean."""
+    """Lowest and highest capacitance of a row to a column; the circuit has the mean."""
     row_neighbor_pf: float
-    """Of a row to the next; the circuit has the larger one of this and the columns'."""
+    """Capacitance of a row to the next; the circuit has the larger of this and the columns'."""
     column_neighbor_pf: float
 
 
 def extracted(layout: Layout, cable_m: float = 0.3) -> Extracted:
-    """The circuit of a layout whose connectors have ``cable_m`` of ribbon cable."""
+    """The circuit of a layout with ``cable_m`` of ribbon cable at its connectors."""
     skin, switch = layout.skin, layout.switch
     _, h, eps = BOARDS[skin.surface]
     e = (eps + 1) / 2
@@ -85,7 +84,7 @@ def extracted(layout: Layout, cable_m: float = 0.3) -> Extracted:
 
 
 def _said(value: float) -> float:
-    """To three digits."""
+    """Round to three digits."""
     return float(f"{value:.3g}")
 
 
@@ -106,7 +105,7 @@ def across_pf(width: float, other: float, height: float, eps: float) -> float:
 
 
 def beside_pf(width: float, other: float, gap: float, eps: float) -> float:
-    """Capacitance per length in pF/mm of two tracks of these widths with a gap between them."""
+    """Capacitance per length in pF/mm of two adjacent tracks of these widths and gap."""
     k = math.sqrt(gap * (gap + width + other) / ((gap + width) * (gap + other)))
     return 2 * EPS0_PF_MM * eps * _mean(1.0, math.sqrt(1 - k * k)) / _mean(1.0, k)
 
@@ -119,8 +118,8 @@ def _mean(a: float, b: float) -> float:
 
 
 def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
-    """(rows, columns) pF: where a row passes under a column, twice where it also comes back to its start; the open
-    switch; and the row's way down beside the columns at its left and right."""
+    """(rows, columns) pF: a row under a column, twice where it also returns to its start; the open switch; and the
+    row's descent beside the columns at its left and right."""
     skin, switch = layout.skin, layout.switch
     wide = 2 * switch.half_width
     once = across_pf(TRACK_MM, wide, h, eps)
@@ -139,9 +138,8 @@ def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
 
 
 def _past_pf(skin: Skin, switch: SwitchPart, track: float | None, eps: float) -> float:
-    """Capacitance in pF over the height of a cell: of a column to a track in the middle between two columns, or to the
-    next column if there is no ``track``. Beside its switches a column counts as wide as they are, between them as a
-    track."""
+    """Capacitance in pF over the height of a cell: of a column to a track midway between two columns, or without
+    ``track`` to the next column. Beside its switches a column is as wide as they are, between them as a track."""
     found, wide = 0.0, 2 * switch.half_width
     for width, length in ((wide, min(wide, skin.pitch_y_mm)), (TRACK_MM, max(0.0, skin.pitch_y_mm - wide))):
         gap = skin.pitch_x_mm - width if track is None else (skin.pitch_x_mm - width - track) / 2
@@ -154,7 +152,7 @@ def _fanned_mm(drawing: Drawing, net: str) -> float:
 
 
 def _line_ohms(layout: Layout, kind: str) -> list[float]:
-    """Of each line of a kind, from where it leaves the matrix to the place on it with the highest resistance."""
+    """Resistance of each line of a kind, from where it leaves the matrix to its most resistive point."""
     return [_ohms(layout.drawing, line.net, line.x) for line in layout.lines if line.kind == kind and line.used]
 
 

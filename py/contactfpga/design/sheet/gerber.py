@@ -1,4 +1,4 @@
-"""Writes a layout as what a board house takes: Gerber layers, drill files, and the netlist for its electrical test.
+"""Writes a layout for a board house: Gerber layers, drill files, and the netlist for its electrical test.
 
 Gerber X2 (Ucamco, The Gerber Layer Format Specification, 2021), Excellon drill files in millimeters, and IPC-D-356A. In
 all of them y points up, and (0, 0) is cell (row 0, column 0).
@@ -44,12 +44,12 @@ def files(drawing: Drawing, name: str) -> dict[str, str]:
 
 
 def on_layer(pad: Pad, one: PlacedPart, layer: Layer) -> bool:
-    """Whether a pad has copper there."""
+    """Whether a pad has copper on this layer."""
     return bool(pad.drill) or one.back == (layer == "B")
 
 
 class _Plot:
-    """One Gerber file: its apertures, and what is drawn with each."""
+    """One Gerber file: its apertures and their drawings."""
 
     def __init__(self, function: str, negative: bool = False):
         self.head = [
@@ -96,7 +96,7 @@ class _Plot:
         return self.text()
 
     def pads(self, drawing: Drawing, layer: Layer, grown: float, pasted: bool = False) -> str:
-        """Openings of the mask, each pad larger by ``grown``, or of the stencil for those that get paste."""
+        """Openings of the mask, each pad enlarged by ``grown``, or of the stencil for pads with paste."""
         for one in drawing.placed:
             for pad in one.part.pads:
                 if on_layer(pad, one, layer) and (one.part.pasted or not pasted):
@@ -106,7 +106,7 @@ class _Plot:
         return self.text()
 
     def print(self, drawing: Drawing, layer: Layer) -> str:
-        """What is printed on a side."""
+        """The print on a side."""
         for stroke in drawing.strokes:
             if stroke.layer == layer:
                 self.line(PRINT_MM, stroke.x1, stroke.y1, stroke.x2, stroke.y2)

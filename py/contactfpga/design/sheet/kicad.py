@@ -1,8 +1,7 @@
 """Writes a layout as a board of KiCad 6, with its project and its netlist.
 
-The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). They are written here, because the
-few forms that a sheet needs are shorter than a library's calls. Each item has a UUID made of what it is, so the same
-sheet gives the same files.
+The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb), written here because a sheet needs
+few forms. Each item's UUID is a hash of its content, so the same sheet gives the same files.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ from contactfpga.design.sheet.drawn import (
 )
 
 SPACE = uuid.UUID("6f3b7d5e-8f0c-5b0e-9b2a-2f6f6a2d7c11")
-"""Of the items' UUIDs."""
+"""Namespace of the items' UUIDs."""
 PAGE_MM = 30.0
-"""From the page's corner to the board's."""
+"""Offset of the board from the page's corner."""
 
 _LAYERS = (
     (0, "F.Cu", "signal"),
@@ -170,7 +169,7 @@ def board(drawing: Drawing, title: str, thickness_mm: float = 1.6) -> str:
 
 
 def project(name: str) -> str:
-    """The text of the .kicad_pro file, which holds the rules that the board is checked by."""
+    """The text of the .kicad_pro file, which has the board's design rules."""
     rules = {
         "min_clearance": CLEARANCE_MM,
         "min_copper_edge_clearance": EDGE_MM,
@@ -197,7 +196,7 @@ def project(name: str) -> str:
 
 
 def netlist(drawing: Drawing) -> str:
-    """The text of the netlist: which pad of which part is on which net."""
+    """The text of the netlist: the net of each pad."""
     parts = [
         _form("comp", _form("ref", _text(one.reference)), _form("value", _text(one.value)),
               _form("footprint", _text(f"contactfpga:{one.part.name}")))

@@ -1,9 +1,9 @@
-"""Where everything on a sheet lies: the matrix of a Skin on two copper layers, with its strip and its outline.
+"""The layout of a sheet: the matrix of a Skin on two copper layers, with its strip and its outline.
 
 Columns run along y on the top side, through the switches. Rows run along x on the back, under the diodes. All lines
-leave at the edge above row 0, so that a sheet around a closed cylinder needs nothing at its seam: a row comes down
-between two columns on the top side, runs on the back to its first switch, and from there past all of them. So the far
-end of each row is at the last column, and the far end of each column at the last row; there the guard lines are.
+leave at the edge above row 0, so that a sheet around a closed cylinder needs nothing at its seam: a row descends
+between two columns on the top side, runs on the back to its first switch, then past all of them. So the far end of each
+row is at the last column, and that of each column at the last row; there the guard lines are.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from contactfpga.design.sheet.strip import PLACE_MM, Line, port
 from contactfpga.skin import Skin
 
 FITTED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5_600.0)
-"""Resistors of a Skin whose file states no circuit (docs/maker.md)."""
+"""Resistors if the Skin's file states no circuit (docs/maker.md)."""
 
 MARGIN_MM = 7.0
-"""Board beyond the parts, with the mounting holes in it."""
+"""Board beyond the parts, with the mounting holes."""
 HOLE_MM = 3.2
-"""For M3."""
+"""Hole for M3."""
 
 _DIODE_AT = -0.2, 0.5
 """Middle of a cell's diode; its pads are 1.1 mm to the left and right."""
 _ROW_Y = 2.0
 _FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
-"""The track that brings a row to its first switch: far enough for a via on it."""
+"""Offset of the track that brings a row to its first switch, far enough for a via on it."""
 _ROW_START = -2.0
 _CELL_HEIGHT = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - DIODE_VIA[1] + VIA_MM / 2
-"""Of what is on the back."""
+"""Height of a cell's parts on the back."""
 _GUARD_ROW_Y = 4.2
-"""From the last row to the guard row."""
+"""Distance from the last row to the guard row."""
 _GUARD_DIODE_X = -0.35
-"""From the guard column to its diodes."""
+"""Distance from the guard column to its diodes."""
 _GUARD_EDGE = 0.7
-"""From the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
+"""Distance from the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """A sheet with everything in its place."""
+    """A sheet with all positions."""
 
     skin: Skin
     circuit: Circuit
@@ -53,14 +53,14 @@ class Layout:
     switch: SwitchPart
     drawing: Drawing
     lines: tuple[Line, ...]
-    """From left to right, as they leave the matrix."""
+    """Lines from left to right, as they leave the matrix."""
 
 
 def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
     """Lay out the sheet of a Skin.
 
-    ``part`` names the switch; ``margin_mm`` is the board beyond its parts. Raises :class:`SheetError` for cells that
-    are finer than their parts, and for lines that find no place around a closed cylinder.
+    ``part`` names the switch; ``margin_mm`` is the board beyond its parts. Raises :class:`SheetError` for cells finer
+    than their parts, and for lines without a place around a closed cylinder.
     """
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
@@ -76,7 +76,7 @@ def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", marg
 
 
 def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
-    """The finest pitch in mm, along x and along y, at which the cells of a Skin hold their parts."""
+    """The finest pitch in mm, along x and y, at which the cells of a Skin hold their parts."""
     wide = switch.part.width + CLEARANCE_MM
     high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, _CELL_HEIGHT)
     if skin.columns > 1:
@@ -99,7 +99,7 @@ def _check(skin: Skin, switch: SwitchPart) -> None:
 
 
 class _Matrix:
-    """The cells and lines of a Skin, and where its rows come down."""
+    """The cells and lines of a Skin, and where its rows descend."""
 
     def __init__(self, skin: Skin, switch: SwitchPart):
         self.skin, self.switch = skin, switch
@@ -111,7 +111,7 @@ class _Matrix:
         self.risers = self._risers()
 
     def row_y(self, row: int) -> float:
-        """Middle of a row's cells; the guard row's is the last."""
+        """Middle of a row's cells; the guard row is the last."""
         return row * self.py if row < self.skin.rows else (self.skin.rows - 1) * self.py + _GUARD_ROW_Y
 
     def row_net(self, row: int) -> str:
@@ -123,7 +123,7 @@ class _Matrix:
         return f"COL{column}" if column < self.skin.columns else "COL_GUARD"
 
     def _risers(self) -> list[float]:
-        """Where each row comes down, from left to right: between columns, and on a plane also left of them."""
+        """x at which each row descends, from left to right: between columns, on a plane also left of them."""
         skin, gaps = self.skin, self.skin.columns - 1
         width = self.px - 2 * self.switch.half_width - VIA_MM - 2 * CLEARANCE_MM
         most = min(math.floor(self.px / PLACE_MM + 1e-9) - 1, math.floor(width / PLACE_MM + 1e-9) + 1) if gaps else 0
@@ -155,13 +155,13 @@ class _Matrix:
         return sorted(found, key=lambda line: line.x)
 
     def _ends(self, row: int) -> list[float]:
-        """Where along x something hangs on a row, from its start on."""
+        """x of the items on a row, from its start on."""
         found = [column for column in range(self.skin.columns) if (row, column) not in self.masked]
         ends = [column * self.px + _DIODE_AT[0] + 1.1 for column in found]
         return [*ends, self.guard_x + _GUARD_DIODE_X] if self.skin.guard and row < self.skin.rows else ends
 
     def _last(self, column: int) -> int:
-        """The last row at which something hangs on a column, the guard row counted; -1 for none."""
+        """The last row with an item on a column, including the guard row; -1 for none."""
         if self.skin.guard:
             return self.skin.rows
         return max((row for row in range(self.skin.rows) if (row, column) not in self.masked), default=-1)
@@ -200,7 +200,7 @@ class _Matrix:
         self._to_row(drawing, x, y, node, self.row_net(row))
 
     def _to_row(self, drawing: Drawing, x: float, y: float, node: str, row: str) -> None:
-        """From the via of a cell through its diode to its row."""
+        """Draw from the via of a cell through its diode to its row."""
         via = x + DIODE_VIA[0], y + DIODE_VIA[1]
         right = x + _DIODE_AT[0] + 1.1
         drawing.via(node, *via)
@@ -213,20 +213,20 @@ class _Matrix:
         drawing.run(row, "B", (right, middle[1]), (right, y + _ROW_Y))
 
     def _diode(self, drawing: Drawing, middle: tuple[float, float], node: str, row: str, turn: int) -> None:
-        """``turn``: with its cathode toward the row."""
+        """Draw a diode, with ``turn`` its cathode toward the row."""
         low = self.skin.diodes == "col2row"
         nets = {"1": row, "2": node} if low else {"1": node, "2": row}
         drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360)
 
     def _guard_cell(self, drawing: Drawing, column: int) -> None:
-        """A column's end, with its diode to the guard row."""
+        """Draw a column's end, with its diode to the guard row."""
         x, y, net = column * self.px, self.row_y(self.skin.rows), self.column_net(column)
         end = (self.skin.rows - 1) * self.py + self.switch.reach
         drawing.run(net, "F", (x, end), (x, y + DIODE_VIA[1]))
         self._to_row(drawing, x, y, net, self.row_net(self.skin.rows))
 
     def _guard_column(self, drawing: Drawing, base: float) -> None:
-        """The guard column, with a diode to the end of each row."""
+        """Draw the guard column, with a diode to the end of each row."""
         x, net = self.guard_x, self.column_net(self.skin.columns)
         drawing.run(net, "F", (x, base), *((x, self.row_y(row)) for row in range(self.skin.rows)))
         for row in range(self.skin.rows):

@@ -1,6 +1,6 @@
-"""The parts of a sheet and the copper that each is soldered to: pads, body, and what to order.
+"""The parts of a sheet and their copper: pads, body, and article.
 
-Lengths are in mm. A part is drawn as seen on its own side of the board, x to the right and y down.
+Lengths are in mm. A part is seen on its own side of the board, x to the right and y down.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from contactfpga.inputs.values import shown
 
 
 class SheetError(ContactFPGAError, ValueError):
-    """A sheet that cannot be made of its parts; the message names the value and the limit."""
+    """An unmakable sheet; the message names the value and the limit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pad:
-    """A pad of a part. If it is ``round``, ``width`` is its diameter; a ``drill`` above 0 is the diameter of a plated
+    """A pad of a part. If ``round``, ``width`` is its diameter; a ``drill`` above 0 is the diameter of a plated
     hole."""
 
     number: str
@@ -33,56 +33,56 @@ class Pad:
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """A part that is placed on the sheet."""
+    """A part on the sheet."""
 
     name: str
-    """Of its footprint, such as ``R_0603``."""
+    """Name of its footprint, such as ``R_0603``."""
     order: str
-    """What to order, in words for the parts list."""
+    """The article to order, for the parts list."""
     pads: tuple[Pad, ...]
     width: float
-    """Of the area that no other part may enter."""
+    """Width of the area without other parts."""
     height: float
     pasted: bool = True
-    """Its pads get solder paste; not so for holes and for the contacts of a dome."""
+    """Whether its pads get solder paste; not for holes and the contacts of a dome."""
     marks: tuple[tuple[float, float, float, float], ...] = ()
-    """Printed lines (x, y, x, y) that show the first pin, or a cathode."""
+    """Printed lines (x, y, x, y) that mark the first pin, or a cathode."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SwitchPart:
-    """A switch of the matrix, with the top-side copper that joins its pads.
+    """A switch of the matrix, with the top-side copper between its pads.
 
-    The column comes in at (0, -reach) and leaves at (0, reach). Pads numbered 1 belong to the column, pads numbered 2
-    to the diode, whose via lies at :data:`DIODE_VIA`.
+    The column enters at (0, -reach) and leaves at (0, reach). Pads numbered 1 belong to the column, pads numbered 2 to
+    the diode, whose via is at :data:`DIODE_VIA`.
     """
 
     part: Part
     force_n: float
-    """At which it closes."""
+    """Closing force."""
     travel_mm: float
     height_mm: float
-    """Of the free switch above the board."""
+    """Height of the free switch above the board."""
     closed_by: float
-    """Side or diameter of the plunger that presses it."""
+    """Side or diameter of its plunger."""
     column: tuple[tuple[float, float, float, float], ...]
-    """Tracks (x, y, x, y) from one end of the column to the other; pieces meet at their ends."""
+    """Tracks (x, y, x, y) from one end of the column to the other, with common ends."""
     diode: tuple[tuple[float, float, float, float], ...]
     """Tracks from pads numbered 2 to the via of the diode."""
     tail: int
-    """Of the column's tracks, so many at the end only lead on to the next cell."""
+    """Number of final column tracks that only lead to the next cell."""
     reach: float
     half_width: float
-    """The copper of the cell reaches this far to the left and right of its middle."""
+    """Extent of the cell's copper to the left and right of its middle."""
     open_pf: float
-    """Between its two contacts while it is open."""
+    """Capacitance of its open contacts."""
 
 
 DIODE_VIA = 0.0, -0.6
-"""In a cell: where the diode's track changes to the back."""
+"""Position in a cell of the via from the diode's track to the back."""
 
 _LEG = 1.66
-"""The legs of a dome whose legs span 5 mm stand on a circle of 2.35 mm radius."""
+"""Legs of a dome with 5 mm span are on a circle of 2.35 mm radius."""
 _SIDES = [(-_LEG, -_LEG), (0.0, -_LEG), (_LEG, -_LEG), (_LEG, _LEG), (0.0, _LEG), (-_LEG, _LEG), (-_LEG, -_LEG)]
 
 DOME = SwitchPart(
@@ -134,11 +134,11 @@ TACT = SwitchPart(
 )
 
 SWITCHES = {"dome": DOME, "tact": TACT}
-"""The switches that a sheet can be laid out for, by the name that the command takes."""
+"""The available switches, by the command's name."""
 
 
 def find_switch(name: str) -> SwitchPart:
-    """The switch of this name. Raises :class:`SheetError` for a name that is not registered."""
+    """The switch of this name. Raises :class:`SheetError` for an unregistered name."""
     if name not in SWITCHES:
         raise SheetError(f"part is {shown(name)}; it must be one of {', '.join(SWITCHES)}")
     return SWITCHES[name]
@@ -171,7 +171,7 @@ HC595 = _soic16("74HC595, SOIC-16")
 HC165 = _soic16("74HC165, SOIC-16")
 
 HEADER_PINS = 10, 14, 16, 20, 26, 34, 40
-"""Pins of the shrouded headers that there are."""
+"""Pin counts of available shrouded headers."""
 
 
 def header(pins: int) -> Part:
@@ -186,5 +186,5 @@ def header(pins: int) -> Part:
 
 
 def smallest_header(pins: int, sizes: Iterable[int] = HEADER_PINS) -> int:
-    """Pins of the smallest header that has as many."""
+    """Pins of the smallest header with at least this many."""
     return min(size for size in sizes if size >= pins)

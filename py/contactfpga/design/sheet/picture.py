@@ -58,7 +58,7 @@ def _copper(drawing: Drawing, layer: Layer, color: str) -> Iterator[str]:
 
 
 def _holes(drawing: Drawing) -> Iterator[tuple[float, float, float]]:
-    """Diameter and place of each."""
+    """Diameter and place of each hole."""
     yield from ((VIA_DRILL_MM, via.x, via.y) for via in drawing.vias)
     for one in drawing.placed:
         yield from ((pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill)
@@ -75,7 +75,7 @@ def _dots(dots: Iterable[tuple[float, float, float]], color: str) -> Iterator[st
 
 
 def _path(lines: Sequence[CopperTrack | Stroke]) -> str:
-    """Joins lines that follow on each other."""
+    """A path that joins consecutive lines."""
     words, last = [], None
     for line in lines:
         if (line.x1, line.y1) != last:

@@ -1,7 +1,7 @@
-"""The strip of a sheet that leads its lines to the board: series resistors and pulls, shift registers, connectors.
+"""The strip that leads a sheet's lines to the board: series resistors and pulls, shift registers, connectors.
 
-From the matrix up: a place of :data:`PLACE_MM` for each line with its two resistors, a channel of tracks, the shift
-registers if the Skin has them with a second channel, and the connectors. All parts are on the back.
+From the matrix up: a place of :data:`PLACE_MM` for each line with its two resistors, a channel of tracks, with shift
+registers these and a second channel, and the connectors. All parts are on the back.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ PLACE_MM = 2.6
 _BESIDE = PLACE_MM / 2
 _PAD = RESISTOR.pads[0].height / 2
 LINES_A_GROUND = 4
-"""Of so many neighboring wires of a cable one is ground."""
+"""Number of neighboring cable wires that share a ground."""
 ENABLE_OHM = 10_000
-"""Holds the outputs of the 74HC595 off while the FPGA is configured (docs/boards.md)."""
+"""Resistor that disables the outputs of the 74HC595 while the FPGA is configured (docs/boards.md)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,19 +34,19 @@ class Line:
 
     net: str
     pin: str
-    """Net at the other end of its series resistor, named as the port of the gateware."""
+    """Net beyond its series resistor, named as the gateware's port."""
     x: float
     kind: str
     """``row`` or ``column``."""
     pull: str
-    """``up``, ``down`` or nothing."""
+    """``up``, ``down`` or empty."""
     used: bool = True
-    """It has copper in the matrix: something hangs on it."""
+    """Whether it has copper, hence items, in the matrix."""
 
 
 @dataclasses.dataclass(frozen=True)
 class _Unit:
-    """A part of the strip before its height is known."""
+    """A part of the strip whose height is not yet known."""
 
     letter: str
     part: Part
@@ -56,7 +56,7 @@ class _Unit:
     nets: dict[str, str]
 
     def place(self, drawing: Drawing, y: float) -> list[Pin]:
-        """Put it into the drawing; returns its pins."""
+        """Add it to the drawing; returns its pins."""
         one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn)
         return [
             Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets
@@ -64,7 +64,7 @@ class _Unit:
 
 
 def port(name: str, bit: int, bits: int) -> str:
-    """Name of a wire as the wiring table has it: with its bit where the port has several."""
+    """Name of a wire as in the wiring table: with its bit if the port has several."""
     return name if bits == 1 else f"{name}[{bit}]"
 
 
@@ -90,7 +90,7 @@ def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], 
 
 
 def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Grid) -> Iterator[Pin]:
-    """A line's resistors, and their tracks up to the channel."""
+    """Draw a line's resistors, and their tracks up to the channel."""
     x, middle = line.x, base - 1.9
     if line.used:
         drawing.via(line.net, x, base)
@@ -108,15 +108,15 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
 
 
 def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
-    """A pin of the channel: from the pad up, and aside onto the grid. Pads are more than a step of it apart, so no two
-    of them come to the same place."""
+    """A pin of the channel: from the pad up, and aside onto the grid. Pads are more than a grid step apart, so no two
+    share a place."""
     step = grid.near(x, below=True)
     drawing.run(net, "B", (x, y), (x, y - 0.9), (step, y - 0.9))
     return Pin(net, step, y - 0.9)
 
 
 def _tried(units: Sequence[_Unit]) -> list[Pin]:
-    """Their pins before their height is known."""
+    """Pins of units of unknown height."""
     scratch = Drawing()
     return [pin for unit in units for pin in (_plug if unit.letter == "J" else _placed)(scratch, unit, 0.0)]
 
@@ -126,7 +126,7 @@ def _placed(drawing: Drawing, unit: _Unit, y: float) -> list[Pin]:
 
 
 def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
-    """A connector; the tracks of its upper pins go down between the lower ones."""
+    """Draw a connector; the tracks of its upper pins go down between the lower ones."""
     for pin in unit.place(drawing, y):
         if pin.y > y:
             yield pin
@@ -136,8 +136,8 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
 
 
 def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    """One connector or more for the rows, and the same for the columns. ``below``: there are two channels, and what is
-    above the upper one lies where pins below the lower one do."""
+    """One or more connectors for the rows, and for the columns. ``below``: there are two channels, so the parts above
+    the upper one are on the places of pins below the lower one."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -157,7 +157,7 @@ def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Uni
 
 
 def _with_grounds(ports: Sequence[str]) -> list[str]:
-    """Nets of a connector's pins: the ports in their order, the last one on the last pin, and grounds between them."""
+    """Nets of a connector's pins: the ports in order, the last on the last pin, and grounds between them."""
     nets = [*ports[:1]]
     for index, name in enumerate(ports[1:], 1):
         nets += [GND] * (index % LINES_A_GROUND == 0) + [name]
@@ -166,9 +166,9 @@ def _with_grounds(ports: Sequence[str]) -> list[str]:
 
 
 SLOTS = 8, 10, 11, 12, 13, 14
-"""Steps of the grid, from a chip's first pin on, at which tracks pass it."""
+"""Grid steps, from a chip's first pin on, at which tracks pass it."""
 CHIP_STEPS = 15
-"""From chip to chip. Its capacitor is at step 9."""
+"""Grid steps from chip to chip; its capacitor is at step 9."""
 
 
 def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
@@ -217,8 +217,8 @@ def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
 def _registers(
     drawing: Drawing, chips: Sequence[_Unit], plugs: Sequence[_Unit], below: list[Pin], bottom: float
 ) -> tuple[list[Pin], float, list[float]]:
-    """The channel below the chips, the chips, and the tracks that pass them. Returns the pins at the bottom of the
-    channel above, where that begins, and the ends of what was drawn."""
+    """Draw the channel below the chips, the chips, and the tracks that pass them. Returns the pins at the bottom of the
+    channel above, its beginning, and the ends of the drawing."""
     tried = _tried(chips)
     lower = [pin for pin in tried if pin.y > 0]
     upper = [pin for pin in tried if pin.y < 0]
@@ -237,7 +237,7 @@ def _registers(
 
 
 def _slots(passing: set[str], pins: Sequence[Pin], chips: Sequence[_Unit]) -> dict[str, float]:
-    """Where each net passes the chips: the free place nearest to its pins below them."""
+    """Where each net passes the chips: the free place nearest to its pins below."""
     firsts = [unit.x - 3.5 * GRID_MM for unit in chips if unit.letter == "U"]
     free = [first + step * GRID_MM for first in firsts for step in SLOTS]
     beyond = itertools.count(round((max(firsts) - firsts[0]) / GRID_MM) + CHIP_STEPS + 1)

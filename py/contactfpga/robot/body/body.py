@@ -1,4 +1,4 @@
-"""A robot with a sheet on each of several links, as `robot.toml` has it; and open: a thread per link, and snapshots of
+"""A robot with a sheet on each of several links, by `robot.toml`; open, it has a thread per link, and snapshots of
 all."""
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ KEYS = ("urdf", "links")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Body:
-    """The links that have a sheet, and how they are connected."""
+    """The links with a sheet, and their kinematics."""
 
     links: dict[str, Plan]
     kinematics: Kinematics | None = None
-    """How the links move; None without a URDF, and then there is no base frame."""
+    """Kinematics of the links; None without a URDF, and then there is no base frame."""
     urdf: Path | None = None
-    """The file that says how the links are connected."""
+    """The URDF file of the kinematics."""
 
     @classmethod
     def load(cls, path: str | Path, trust: bool = False) -> Body:
-        """Read `robot.toml`; the paths in it count from its folder. ``trust`` as for :meth:`contactfpga.Skin.load`.
+        """Read `robot.toml`, whose paths are relative to its folder. ``trust`` as for :meth:`contactfpga.Skin.load`.
         Raises :class:`BodyError`, OSError."""
         path = Path(path)
         values = tomlfile.load(path, BodyError)
@@ -56,7 +56,8 @@ class Body:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], folder: Path) -> Body:
-        """What such a file says; paths in it count from ``folder``. Raises :class:`BodyError`, OSError."""
+        """A body from the values of such a file; paths are relative to ``folder``. Raises :class:`BodyError`,
+        OSError."""
         for key in values:
             if key not in KEYS:
                 raise BodyError(f"unknown key {shown(key)}; {suggestion(key, KEYS)}")
@@ -71,13 +72,13 @@ class Body:
 
     def open(self, joints: Joints | None = None, *, timeout: float = 1.0, period_s: float = 0.002) -> OpenBody:
         """Open every link's board, each in its own thread, and return when each was tried once. A board that does not
-        answer is tried again until it does.
+        answer is retried.
 
         Args:
-            joints: a function from a time on the host's clock to the joint angles then, for instance a
-                :class:`JointHistory`; without it there are only contacts in the links' frames.
-            timeout: seconds for a board's hello.
-            period_s: how often at most a link's newest frame is taken.
+         joints: a function from a time on the host's clock to the joint angles, for instance a
+         :class:`JointHistory`; without it there are only contacts in the links' frames.
+         timeout: seconds for a board's hello.
+         period_s: shortest interval of reading a link's newest frame.
         """
         if joints is not None and not callable(joints):
             raise TypeError(f"joints is {shown(joints)}; it must be a function of a time, such as a JointHistory")
@@ -106,8 +107,8 @@ def _by_name(plans: list[Plan], kinematics: Kinematics | None) -> dict[str, Plan
 class OpenBody:
     """Every link's board, read until it is closed: a context manager that iterates snapshots.
 
-    Made by :meth:`Body.open`. No link's failure raises: its state says so, the others go on, and it is opened again as
-    soon as it can be.
+    Made by :meth:`Body.open`. No link's failure raises: it is in the link's state, the others go on, and the link is
+    reopened as soon as possible.
     """
 
     def __init__(
@@ -162,14 +163,14 @@ class OpenBody:
     # ---- snapshots
 
     def latest(self, timeout: float = 1.0) -> Snapshot:
-        """All links as they are now; waits for nothing."""
+        """All links as they are now, without waiting."""
         checked(timeout)
         self._changes.check_open()
         return self._snapshot()
 
     def read(self, timeout: float = 1.0) -> Snapshot:
-        """All links, each with a frame that was scanned after this call; those of which none came within ``timeout``
-        seconds as they are then, which their state and age say."""
+        """All links, each with a frame scanned after this call; a link without one within ``timeout`` seconds is
+        returned as it is then, as its state and age show."""
         timeout = checked(timeout)
         self._changes.check_open()
         asked = {name: reader.ask() for name, reader in self._readers.items()}
@@ -184,9 +185,8 @@ class OpenBody:
         return self.latest()
 
     def next(self, timeout: float = 1.0) -> Snapshot:
-        """The newest snapshot in which a link has a newer frame or another state than in the last one that this method
-        returned. Raises :class:`ReadTimeout` where nothing changes for ``timeout`` seconds, as when every link is
-        lost."""
+        """The newest snapshot in which a link has a newer frame or another state than in the last one returned here.
+        Raises :class:`ReadTimeout` if nothing changes for ``timeout`` seconds, for instance when every link is lost."""
         timeout = checked(timeout)
         with self._changes.condition:
             if not self._changes.wait_for(lambda: self._changes.count > self._given, timeout):
@@ -195,8 +195,8 @@ class OpenBody:
         return self.latest()
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> SnapshotBatch:
-        """All snapshots of the next ``max_s`` seconds, with their frames as arrays; the first one is waited for, for
-        ``timeout`` seconds."""
+        """All snapshots of the next ``max_s`` seconds, with their frames as arrays, after waiting up to ``timeout``
+        seconds for the first."""
         max_s = checked_span(max_s)
         with self.subscribe() as queue:
             found = [queue.next(timeout)]
@@ -209,16 +209,16 @@ class OpenBody:
         return SnapshotBatch(found)
 
     def subscribe(self, maxsize: int = 1024) -> SnapshotQueue:
-        """A queue of its own for the snapshot at each change from now on."""
+        """A separate queue for the snapshot at each change from now on."""
         return self._changes.subscribe(maxsize)
 
     def __iter__(self) -> Iterator[Snapshot]:
-        """The newest snapshot again and again, forever, at every change or once per second."""
+        """The newest snapshot, forever, at every change or once per second."""
         while True:
             yield self._newest()
 
     async def __aiter__(self) -> AsyncIterator[Snapshot]:
-        """The same in ``async for``."""
+        """The newest snapshot in ``async for``, forever, at every change or once per second."""
         while True:
             yield await asyncio.to_thread(self._newest)
 
@@ -234,7 +234,7 @@ class OpenBody:
         return BodyStats.of({name: reader.stats for name, reader in self._readers.items()})
 
     def forked(self) -> None:
-        """In a child process all ports are closed; its parent goes on."""
+        """Close all ports in a child process; the parent goes on."""
         self._changes.forked()
         self._threads, self._readers = [], {}
 
@@ -249,7 +249,7 @@ class OpenBody:
         self.close()
 
     def close(self) -> None:
-        """Give all ports back; may be called twice."""
+        """Release all ports; may be called twice."""
         self._changes.close()
         for thread in self._threads:
             thread.join()
@@ -258,7 +258,7 @@ class OpenBody:
 
 
 class SnapshotQueue:
-    """Snapshots from a moment on; at most ``maxsize`` wait, beyond, the oldest are dropped and counted."""
+    """Snapshots from a moment on; at most ``maxsize`` wait, then the oldest are dropped and counted."""
 
     def __init__(self, changes: _Changes, maxsize: int):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
@@ -266,21 +266,21 @@ class SnapshotQueue:
         self._changes = changes
         self._waiting: collections.deque[Snapshot] = collections.deque(maxlen=maxsize)
         self.dropped = 0
-        """Snapshots that were not taken in time."""
+        """Snapshots dropped because they were not read in time."""
 
     def put(self, snapshot: Snapshot) -> None:
-        """Add one; the condition of the body's changes is held."""
+        """Add a snapshot; the caller holds the condition of the body's changes."""
         self.dropped += len(self._waiting) == self._waiting.maxlen
         self._waiting.append(snapshot)
 
     def next(self, timeout: float = 1.0) -> Snapshot:
-        """The next one, in order. Raises :class:`ReadTimeout`, :class:`BoardClosed`."""
+        """The next snapshot, in order. Raises :class:`ReadTimeout`, :class:`BoardClosed`."""
         with self._changes.condition:
             self._wait(checked(timeout))
             return self._waiting.popleft()
 
     def _wait(self, timeout: float) -> None:
-        """Until one waits."""
+        """Wait for a snapshot."""
         with self._changes.condition:
             self._changes.wait_for(lambda: self._waiting, timeout)
             self._changes.check_open()
@@ -288,7 +288,7 @@ class SnapshotQueue:
                 raise ReadTimeout(f"no link has changed within {timeout:g} s")
 
     def close(self) -> None:
-        """Take no more."""
+        """Accept no more snapshots."""
         self._changes.unsubscribe(self)
 
     def __enter__(self) -> SnapshotQueue:
@@ -308,7 +308,7 @@ class SnapshotQueue:
 
 
 class _Changes:
-    """Changes of an open body, for the threads that wait for one; after its end nothing is waited for."""
+    """Changes of an open body, for waiting threads; after its end nothing waits."""
 
     def __init__(self) -> None:
         self.condition = threading.Condition()
@@ -319,7 +319,7 @@ class _Changes:
         self._inherited = False
 
     def announce(self, snapshot: Callable[[], Snapshot]) -> None:
-        """Count a change; every queue gets the snapshot, which is taken only where there is one."""
+        """Count a change; the snapshot is made only if there is a queue for it."""
         with self.condition:
             self.count += 1
             taken = snapshot() if self._queues else None
@@ -329,7 +329,7 @@ class _Changes:
             self.condition.notify_all()
 
     def wait_for(self, happened: Callable[[], object], timeout: float | None = None) -> bool:
-        """Wait until this has happened or the body is closed; False after ``timeout`` seconds without either."""
+        """Wait until this has happened or the body is closed; False after ``timeout`` seconds."""
         with self.condition:
             return bool(self.condition.wait_for(lambda: self.closed.is_set() or happened(), timeout))
 
@@ -341,7 +341,7 @@ class _Changes:
             raise BoardClosed("this body was closed; open it again")
 
     def subscribe(self, maxsize: int) -> SnapshotQueue:
-        """A new queue. Raises :class:`BoardClosed`."""
+        """Add a queue. Raises :class:`BoardClosed`."""
         self.check_open()
         queue = SnapshotQueue(self, maxsize)
         with self.condition:
@@ -349,19 +349,19 @@ class _Changes:
         return queue
 
     def unsubscribe(self, queue: SnapshotQueue) -> None:
-        """Give this queue no more snapshots."""
+        """Remove a queue."""
         with self.condition:
             if queue in self._queues:
                 self._queues.remove(queue)
 
     def close(self) -> None:
-        """The body's end."""
+        """End the body."""
         with self.condition:
             self.closed.set()
             self.condition.notify_all()
 
     def forked(self) -> None:
-        """In a child process: closed, with locks that no thread of the parent holds."""
+        """Close it in a child process, with fresh locks."""
         self.condition, self.closed = threading.Condition(), threading.Event()
         self.closed.set()
         self._inherited = True

@@ -1,7 +1,7 @@
 """Cells that the folding cover presses at a joint: learned with nobody near, per joint angle, then marked.
 
-Cells and not zones: a finger beside a crease makes one zone with it, which area and barycenter hardly tell from the
-crease alone.
+By cells, not zones: a finger beside a crease makes one zone with it, whose area and barycenter differ little from the
+crease's.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zone, Zones
 
 STEP_RAD = 0.05
-"""Angles are told apart this finely."""
+"""Resolution of angles."""
 MAX_BYTES = 20_000_000
 MAX_STEPS = 10_000
-"""Most steps of an angle, each with a sheet of cells; a full turn takes 126."""
+"""Most steps of an angle, each with a sheet of cells; a full turn needs 126."""
 
 Cells = NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Folds:
-    """What was learned of one joint and one sheet."""
+    """The folds learned for one joint and one sheet."""
 
     joint: str
     step_rad: float
     lines: tuple[int, int]
     """Rows and columns."""
     frames: dict[int, int]
-    """By the number of the step: how many frames were seen there."""
+    """Frames seen, by the number of the step."""
     cells: dict[int, Cells]
-    """(rows, columns): which cells were pressed in any of them."""
+    """(rows, columns) cells pressed in any of them, by the number of the step."""
 
     def step_of(self, angle_rad: float) -> int:
-        """The number of the step that an angle lies in."""
+        """The number of an angle's step."""
         return math.floor(angle_rad / self.step_rad)
 
     def share(self, angle_rad: float, zone: Cells) -> float | None:
-        """Which share of a zone's cells the fold presses at this angle as it was learned. None: nothing was learned at
-        this angle, or the zone has no cells."""
+        """The share of a zone's cells that the fold presses at this angle. None: nothing was learned at this angle, or
+        the zone has no cells."""
         # The steps beside it count nothing: with them twice as many fingers that touch a crease pass for it.
         step = self.step_of(angle_rad)
         if not self.frames.get(step) or not zone.any():
@@ -68,7 +68,7 @@ class Folds:
 
     @classmethod
     def load(cls, path: str | Path) -> Folds:
-        """Read what :meth:`save` wrote. Raises :class:`BodyError`, OSError."""
+        """Read a file of :meth:`save`. Raises :class:`BodyError`, OSError."""
         data = read_small(path, MAX_BYTES, "a file of `contactfpga body learn`", BodyError)
         try:
             return _read(json.loads(data))
@@ -78,8 +78,8 @@ class Folds:
 
 
 def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = STEP_RAD) -> Folds:
-    """From angles in rad and the frames that came at them, while nobody was near. Raises :class:`BodyError` for frames
-    without cells."""
+    """Folds from angles in rad and their frames, taken with nobody near. Raises :class:`BodyError` for frames without
+    cells."""
     if not is_finite(step_rad) or not 1e-4 <= step_rad <= 1:
         raise BodyError(f"step_rad is {shown(step_rad)}; it must be a number from 0.0001 to 1")
     counts: dict[int, int] = {}
@@ -99,7 +99,7 @@ def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = S
 
 
 def cells_of(zones: Zones, zone: Zone) -> Cells | None:
-    """(rows, columns) bool of one zone; None where the board sends no cells."""
+    """(rows, columns) bool of one zone; None if the board sends no cells."""
     if zones.cells is None:
         return None
     reach = zones.sheet.connectivity

@@ -1,4 +1,4 @@
-"""Joint angles at a moment, from a short history of what the robot said."""
+"""Joint angles at a moment, from a short history of the robot's reports."""
 
 from __future__ import annotations
 
@@ -11,21 +11,23 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.robot.body.state import BodyError, NoJoints
 
 Joints = Callable[[float], Mapping[str, float]]
-"""From a time on the host's clock, in s, to the angles then, in rad, of prismatic joints in m."""
+"""From a time on the host's clock, in s, to the angles in rad, in m for prismatic joints."""
 
 
 class JointHistory:
-    """The robot's joint angles of the last seconds, interpolated. Safe for several threads.
+    """The robot's joint angles of the last seconds, interpolated. Thread-safe.
 
-    ``history.add(time.monotonic(), {"elbow": 0.3})`` whenever the robot says its angles; ``body.open(history)``.
+    Call ``history.add(time.monotonic(), {"elbow": 0.3})`` for every report of the robot; pass it as
+    ``body.open(history)``.
     """
 
     def __init__(self, kept_s: float = 2.0, gap_s: float = 0.1, ahead_s: float = 0.02, turning: Collection[str] = ()):
-        """
+        """Limits of the history.
+
         Args:
-            kept_s: how long angles are kept.
-            gap_s: between samples farther apart nothing is interpolated.
-            ahead_s: how long after the newest sample its speed is taken to go on.
+            kept_s: time for which angles are stored.
+            gap_s: largest gap of samples that is interpolated.
+            ahead_s: how long the newest speed is extrapolated.
             turning: joints whose angle jumps by a whole turn.
         """
         for name, value in (("kept_s", kept_s), ("gap_s", gap_s)):
@@ -40,7 +42,7 @@ class JointHistory:
         self._lock = threading.Lock()
 
     def add(self, host_time_s: float, angles: Mapping[str, float]) -> None:
-        """What the angles were then; later than all before."""
+        """Add the angles at a time later than all before."""
         for name, value in angles.items():
             if not is_finite(value):
                 raise BodyError(f"the angle of joint {shown(name)} is {shown(value)}; it must be a finite number")
@@ -54,7 +56,7 @@ class JointHistory:
                 del self._times[:old], self._angles[:old]
 
     def __call__(self, host_time_s: float) -> dict[str, float]:
-        """The angles then. Raises :class:`NoJoints` where they are not known."""
+        """The angles at a time. Raises :class:`NoJoints` if they are unknown."""
         with self._lock:
             times = self._times
             if not times:

@@ -1,4 +1,4 @@
-"""A robot's links and joints, and from joint angles to poses of links and to Jacobians."""
+"""A robot's links and joints; poses of links and Jacobians from joint angles."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from contactfpga.surfaces.shapes import Floats, Vector
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Pose:
-    """A rotation, then a shift: ``apply`` takes points of the inner frame to the outer one."""
+    """A rotation, then a shift: ``apply`` maps points of the inner frame to the outer one."""
 
     rotation: Floats
     """(3, 3)."""
     point_m: Floats
-    """(3,): the inner frame's origin."""
+    """(3,): origin of the inner frame."""
 
     @classmethod
     def of(cls, point_m: Vector = (0.0, 0.0, 0.0), rpy_rad: Vector = (0.0, 0.0, 0.0)) -> Pose:
-        """From an origin, and roll, pitch and yaw about the outer frame's x, y and z axes, as in URDF."""
+        """A pose from an origin, and roll, pitch and yaw about the outer frame's x, y and z axes, as in URDF."""
         roll, pitch, yaw = rpy_rad
         rotation = rotation_about((0, 0, 1), yaw) @ rotation_about((0, 1, 0), pitch) @ rotation_about((1, 0, 0), roll)
         return cls(rotation, np.array(point_m, float))
@@ -39,7 +39,7 @@ class Pose:
         return math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0])
 
     def __matmul__(self, inner: Pose) -> Pose:
-        """The pose of what lies at ``inner`` in this one's frame."""
+        """The composed pose of a frame with pose ``inner`` in this one."""
         return Pose(self.rotation @ inner.rotation, self.apply(inner.point_m))
 
     def apply(self, points_m: Floats) -> Floats:
@@ -67,20 +67,20 @@ class Joint:
 
     name: str
     kind: str
-    """One of :data:`MOVING`, or ``fixed``."""
+    """Kind of joint: one of :data:`MOVING`, or ``fixed``."""
     parent: str
     child: str
     origin: Pose
-    """Of the child's frame in the parent's, at an angle of 0."""
+    """Pose of the child's frame in the parent's, at angle 0."""
     axis: Floats
-    """(3,): unit vector in the child's frame; 0 where it is fixed."""
+    """(3,): unit vector in the child's frame; 0 if fixed."""
     mimic: tuple[str, float, float] | None = None
-    """The joint that it follows, by which factor, and from which offset on."""
+    """The joint that it follows, with factor and offset."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Robot:
-    """What a URDF says of frames."""
+    """The frames of a URDF."""
 
     name: str
     links: tuple[str, ...]
@@ -90,14 +90,14 @@ class Robot:
 
 
 class Kinematics:
-    """A tree of links and joints. Angles are in rad, of prismatic joints in m."""
+    """A tree of links and joints. Angles are in rad, in m for prismatic joints."""
 
     def __init__(self, robot: Robot):
         self.robot = robot
         self._to = {joint.child: joint for joint in robot.joints.values()}
         moving = [joint for joint in robot.joints.values() if joint.kind in MOVING]
         self.joint_names: tuple[str, ...] = tuple(joint.name for joint in moving if joint.mimic is None)
-        """Joints that follow no other one, in the order of the URDF: the columns of a Jacobian."""
+        """Independent joints, in URDF order: the columns of a Jacobian."""
         self._follows = {joint.name: self._master(joint) for joint in moving}
         self._order = self._from_root()
         self._chains: dict[str, list[Joint]] = {robot.root: []}
@@ -105,7 +105,7 @@ class Kinematics:
             self._chains[joint.child] = [*self._chains[joint.parent], joint]
 
     def _master(self, joint: Joint) -> tuple[str, float, float]:
-        """The joint whose angle moves this one, with factor and offset."""
+        """The joint that moves this one, with factor and offset."""
         factor, offset, seen = 1.0, 0.0, {joint.name}
         while joint.mimic is not None:
             name, times, plus = joint.mimic
@@ -117,7 +117,7 @@ class Kinematics:
         return joint.name, factor, offset
 
     def _from_root(self) -> list[Joint]:
-        """All joints, each after the one that its parent hangs on."""
+        """All joints, each after its parent's."""
         hanging: dict[str, list[Joint]] = {}
         for joint in self.robot.joints.values():
             hanging.setdefault(joint.parent, []).append(joint)
@@ -131,27 +131,27 @@ class Kinematics:
         return found
 
     def needed(self, link: str) -> tuple[str, ...]:
-        """The joints on whose angles the pose of this link depends."""
+        """The joints that determine the pose of this link."""
         names = (self._follows[joint.name][0] for joint in self._chains[link] if joint.kind in MOVING)
         return tuple(dict.fromkeys(names))
 
     def pose(self, link: str, angles: Mapping[str, float]) -> Pose:
-        """Where a link's frame lies in the base frame. Raises :class:`NoJoints` where an angle is missing."""
+        """The pose of a link's frame in the base frame. Raises :class:`NoJoints` if an angle is missing."""
         found = Pose.of()
         for joint in self._chains[link]:
             found = found @ joint.origin @ self._moved(joint, angles)
         return found
 
     def poses(self, angles: Mapping[str, float]) -> dict[str, Pose]:
-        """:meth:`pose` of every link, in the time of one of the farthest."""
+        """The poses of all links, as fast as one of the farthest."""
         found = {self.robot.root: Pose.of()}
         for joint in self._order:
             found[joint.child] = found[joint.parent] @ joint.origin @ self._moved(joint, angles)
         return found
 
     def jacobian(self, link: str, point_m: Floats, angles: Mapping[str, float]) -> Floats:
-        """(6, n): how a point of the link, given in the base frame, moves with each of :attr:`joint_names`, in the base
-        frame: three rows of its velocity, three of the link's angular velocity."""
+        """(6, n): motion in the base frame of a point of the link, given in the base frame, with each of
+        :attr:`joint_names`: three rows of its velocity, three of the link's angular velocity."""
         found = np.zeros((6, len(self.joint_names)))
         columns = {name: number for number, name in enumerate(self.joint_names)}
         pose = Pose.of()

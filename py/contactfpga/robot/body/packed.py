@@ -1,4 +1,4 @@
-"""A `robot.toml` with the files that it names, as texts: to be kept in a recording."""
+"""A `robot.toml` and its files as texts for a recording."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from contactfpga.robot.body.state import BodyError
 ROBOT = "robot"
 """Name of the texts in a recording."""
 TOML = "toml"
-"""The robot's table itself; each other text is named by the place in it that names its file."""
+"""Name of the robot's table; other texts are named by the place of their file's name in it."""
 FILES = ("skin", "units", "folds", "surface")
-"""Of a link."""
+"""Keys of a link's files."""
 
 
 def pack(path: str | Path) -> dict[str, str]:
@@ -33,8 +33,8 @@ def pack(path: str | Path) -> dict[str, str]:
 
 
 def unpack(texts: Mapping[str, str], folder: Path) -> Body:
-    """The body again, with its files in this folder, which must stay as long as the robot's meshes are looked for.
-    Raises :class:`BodyError` where a text is missing, or is none of :func:`pack`."""
+    """The body from its texts, with files in this folder, which must stay while the robot's meshes are needed. Raises
+    :class:`BodyError` if a text is missing, or not from :func:`pack`."""
     try:
         values = tomlfile.parse(texts[TOML].encode(), "robot.toml", BodyError)
         for number, (table, key, name) in enumerate(_files(values)):

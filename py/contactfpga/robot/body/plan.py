@@ -1,4 +1,4 @@
-"""What `robot.toml` says of each link: its board, and where its sheet lies."""
+"""Each link of `robot.toml`: its board, and the place of its sheet."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KEYS = (
     "silent_s", "folds",
 )  # fmt: skip
 MARGIN_S = 0.05
-"""Beyond the longest pause of a board that works, before its link is late."""
+"""Allowance beyond the longest pause of a working board before its link is late."""
 SILENT_S = 0.5
 
 
@@ -46,33 +46,33 @@ class Plan:
     """Name of the link's frame, in the URDF and in contacts."""
     skin: Skin
     port: str | None
-    """None: the board is found by its Skin."""
+    """Address of the port; None: the board is found by its Skin."""
     pose: Pose
-    """Of the surface's frame in the link's."""
+    """Pose of the surface's frame in the link's."""
     mirrored: bool
-    """Columns run the other way: x counts from the last one."""
+    """Whether columns run the other way: x counts from the last one."""
     surface: PlaneSurface | CylinderSurface | Cone | Mesh
     units: LoadCells | None
     friction: float
     late_s: float
-    """Age in s from which on the newest frame is no word on what touches now."""
+    """Age in s from which the newest frame no longer counts as current."""
     silent_s: float
-    """From which on the link is silent."""
+    """Time without a frame, in s, from which the link is silent."""
     folds: Folds | None = None
-    """What the folding cover presses."""
+    """Cells that the folding cover presses."""
     pressed: Pressed | None = None
-    """Places under the Skin's cover; None where that knows no force."""
+    """Places under the Skin's cover; None if it knows no force."""
     trust: bool = False
-    """The Skin files of its port may name modules, as those of :meth:`contactfpga.robot.body.Body.load` could."""
+    """Whether the Skin files of its port may name modules, as those of :meth:`contactfpga.robot.body.Body.load`."""
 
     @property
     def laid(self) -> Surface:
-        """The surface as the sheet lies on it: mirrored or not."""
+        """The surface with the sheet on it, mirrored or not."""
         width_mm = (self.skin.columns - 1) * self.skin.pitch_x_mm
         return MirroredSurface(self.surface, width_mm) if self.mirrored else self.surface
 
     def place(self, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
-        """Point in m and outward normal, in the link's frame, of a place of its sheet."""
+        """Point in m and outward normal, in the link's frame, of a place on its sheet."""
         point_mm, normal = self.laid.place(x_mm, y_mm)
         return vector(self.pose.apply(1e-3 * np.array(point_mm))), vector(self.pose.turn(np.array(normal)))
 
@@ -98,7 +98,7 @@ class Plan:
 
 
 def read(values: Any, folder: Path) -> Plan:
-    """One table of links; paths count from ``folder``. Raises :class:`BodyError`, OSError."""
+    """Read one table of links; paths are relative to ``folder``. Raises :class:`BodyError`, OSError."""
     if not isinstance(values, dict):
         raise BodyError(f"a link is {shown(values)}; it must be a table, [[links]]")
     name = text(values, "name")
@@ -154,7 +154,7 @@ def _pressed(skin: Skin, path: Path) -> Pressed | None:
 
 
 def _port(values: dict[str, Any], skin_path: Path) -> str | None:
-    """A virtual board gets the link's Skin unless its address names one."""
+    """The address of the port; a virtual board without a Skin gets the link's."""
     if "port" not in values:
         return None
     port = text(values, "port")
@@ -189,7 +189,8 @@ def _surface(values: Any, skin: Skin, folder: Path) -> PlaneSurface | CylinderSu
 
 
 def text(values: Mapping[str, Any], key: str, usual: str | None = None) -> str:
-    """The text of this key; raises :class:`BodyError` where it is none, or is missing without a usual one."""
+    """The text of this key, or ``usual``; raises :class:`BodyError` if it is not a text, or missing without a
+    default."""
     found = values.get(key, usual)
     if found is None:
         raise BodyError(f"{key} is missing")

@@ -1,4 +1,4 @@
-"""One link's board: opened, read, and opened again when it was lost; and what is known of the link by then."""
+"""One link's board, opened, read, and reopened after a loss; and the knowledge of the link."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from contactfpga.zones.zone import Zones
 
 
 def open_board(plan: Plan, timeout: float = 1.0) -> Board:
-    """The board of a link; ``timeout``: seconds for its hello. Raises what :func:`contactfpga.open` does."""
+    """The board of a link; ``timeout``: seconds for its hello. Raises the errors of :func:`contactfpga.open`."""
     with _lock(plan.port):
         return driver.open(plan.port, plan.skin, timeout=timeout, trust=plan.trust)
 
@@ -36,7 +36,7 @@ def _lock(port: str | None) -> contextlib.AbstractContextManager[None]:
 
 
 class _PortLock:
-    """A search listens to every port that nobody has: meanwhile no other link can open its own, nor search."""
+    """A lock for searches, which open every free port: meanwhile no other link can open its own, nor search."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -45,7 +45,7 @@ class _PortLock:
 
     @contextlib.contextmanager
     def shared(self) -> Iterator[None]:
-        """For links with a port. A search that waits goes first, or it might wait forever."""
+        """Hold the lock for a link with a port. A waiting search goes first, lest it wait forever."""
         with self._changed:
             self._changed.wait_for(lambda: not self._alone and not self._waiting)
             self._shared += 1
@@ -58,7 +58,7 @@ class _PortLock:
 
     @contextlib.contextmanager
     def exclusive(self) -> Iterator[None]:
-        """For a search."""
+        """Hold the lock for a search."""
         with self._changed:
             self._waiting += 1
             self._changed.wait_for(lambda: not self._alone and not self._shared)
@@ -76,14 +76,13 @@ _PORTS = _PortLock()
 
 
 STEP_S = 0.005
-"""None of them is ahead of another one by more simulated time."""
+"""Largest lead of simulated time between boards."""
 LAG_S = 0.02
-"""Where the computer is too slow for real time, no more than this is made up for."""
+"""Largest lag that a slow computer makes up for."""
 
 
 class SharedClock:
-    """Says how much simulated time may pass for each board: as much as real time does, and no board leaves another one
-    behind. Safe for several threads."""
+    """Distributes simulated time to boards: at the rate of real time, and in step. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float]):
         self._clock = clock
@@ -93,19 +92,19 @@ class SharedClock:
         self._now_s: dict[str, float] = {}  # on the common clock, of each board
 
     def join(self, link: str, board_s: float) -> None:
-        """A board is there whose own clock says this; for it the common time begins where the others are."""
+        """Add a board with this reading of its own clock; it starts at the others' time."""
         with self._lock:
             now_s = min(self._now_s.values(), default=self._clock() - self._began_s)
             self._joined_s[link], self._now_s[link] = now_s - board_s, now_s
 
     def leave(self, link: str) -> None:
-        """Nobody waits for it any more."""
+        """Remove a board, so that nobody waits for it."""
         with self._lock:
             self._joined_s.pop(link, None)
             self._now_s.pop(link, None)
 
     def due_s(self, link: str, board_s: float) -> float:
-        """How many seconds may pass now for this board, whose clock says ``board_s``; 0 or less: none."""
+        """Seconds that may pass now for this board, whose clock reads ``board_s``; at most 0: none."""
         with self._lock:
             mine_s = self._now_s[link] = self._joined_s[link] + board_s
             last_s = min(self._now_s.values())
@@ -122,25 +121,25 @@ NO_TRACKS = Tracks(0, (), ())
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class LinkMemory:
-    """What holds from one event of a link to the next."""
+    """State of a link between events."""
 
     opened: bool = False
-    """There is an open board."""
+    """Whether a board is open."""
     open_s: float = -math.inf
-    """When it was opened."""
+    """Time of opening."""
     zones: Zones | None = None
     tracks: Tracks = NO_TRACKS
     frame_s: float = -math.inf
-    """When the newest frame was scanned that ever came, on the body's clock."""
+    """Scan time of the newest frame ever, on the body's clock."""
     came_s: float = -math.inf
-    """The same on that board's own clock."""
+    """Scan time of the newest frame ever, on that board's own clock."""
     down: str = "lost"
-    """Its status where no board is open."""
+    """Status while no board is open."""
     reason: str = "it was not tried yet"
-    """Why none is."""
+    """Reason why none is open."""
 
     def state(self, plan: Plan, now: float, board_s: float | None) -> LinkState:
-        """The state at that moment; ``board_s``: the same on the clock of a virtual board, None for any other."""
+        """The state at a moment; ``board_s``: the moment on a virtual board's clock, None for others."""
         age_s = None if self.frame_s == -math.inf else now - self.frame_s
         if not self.opened:
             return LinkState(None, age_s, self.down, self.reason)
@@ -157,7 +156,7 @@ class LinkMemory:
 
 
 Observation = tuple[LinkMemory, float | None]
-"""What is known, and what a virtual board's clock said then."""
+"""The knowledge, and a virtual board's clock at that time."""
 
 
 class States(Mapping[str, LinkState]):
@@ -178,13 +177,13 @@ class States(Mapping[str, LinkState]):
 
 
 RETRY_S = 0.5
-"""From a failure to open a board to the next try."""
+"""Delay before another attempt to open a board."""
 WAIT_S = 0.1
-"""How long a board is waited for at a time."""
+"""Longest wait for a board at a time."""
 
 
 class OpenBoard(Protocol):
-    """What a link needs of :class:`contactfpga.Board`."""
+    """The part of :class:`contactfpga.Board` that a link needs."""
 
     def latest(self, timeout: float = 1.0) -> Zones:
         """The newest frame."""
@@ -197,18 +196,18 @@ class OpenBoard(Protocol):
 
     @property
     def name(self) -> str:
-        """What it was named by the Skin that it was built from; "" where it was not."""
+        """Name in the Skin that it was built from; "" if unnamed."""
 
     @property
     def stats(self) -> Stats:
         """Counters since it was opened."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""
 
 
 class LinkReader:
-    """What is known of one link. One thread calls :meth:`step`, any thread :meth:`state`."""
+    """The knowledge of one link. One thread calls :meth:`step`, any thread :meth:`state`."""
 
     def __init__(
         self,
@@ -217,11 +216,11 @@ class LinkReader:
         clock: Callable[[], float],
         shared_clock: SharedClock | None = None,
     ):
-        """``shared_clock``: has virtual boards run on one clock."""
+        """``shared_clock``: keeps virtual boards on one clock."""
         self.plan = plan
         self._shared_clock = shared_clock if plan.virtual else None
         self.tried = False
-        """It was tried to open the board, with or without success."""
+        """Whether opening was attempted, with or without success."""
         self.answered = 0
         """The last call of :meth:`ask` since which a frame was scanned."""
         self._opened, self._clock = opened, clock
@@ -234,13 +233,13 @@ class LinkReader:
         self._before = Stats()  # of all boards that were closed
 
     def ask(self) -> int:
-        """Have the next frame be one that is scanned after this call; its number."""
+        """Request a frame scanned after this call; returns the request's number."""
         with self._lock:
             self._asked += 1
             return self._asked
 
     def step(self) -> float:
-        """Do what is due, for little more than :data:`WAIT_S`; how many seconds nothing is due then."""
+        """Do what is due, for little more than :data:`WAIT_S`; returns the seconds until something is due."""
         if self._board is None:
             wait_s = self._retry_at - self._clock()
             if wait_s > 0:
@@ -269,7 +268,7 @@ class LinkReader:
         return 0.0
 
     def _let_pass(self, seconds: float) -> None:
-        """Simulated time, and take every frame of it."""
+        """Let simulated time pass, and read all its frames."""
         assert self._board is not None
         until_s = self._board.clock() + seconds
         while (left_s := until_s - self._board.clock()) > 0 and self._asked == self.answered:
@@ -313,7 +312,7 @@ class LinkReader:
 
     @property
     def stats(self) -> Stats:
-        """Counters of its boards, of those before as well."""
+        """Counters of its boards, including earlier ones."""
         with self._lock:
             return self._total()
 
@@ -331,17 +330,17 @@ class LinkReader:
             self._retry_at = self._clock() + RETRY_S
 
     def close(self) -> None:
-        """Give the port back; the thread that calls :meth:`step` has ended."""
+        """Release the port; the thread that calls :meth:`step` has ended."""
         self._drop("lost", BoardClosed("the body was closed"))
 
     def observe(self) -> Observation:
-        """What is known now, from which :class:`States` are made."""
+        """The current knowledge, from which :class:`States` are made."""
         if self._shared_clock is None:
             return self._known, None
         with self._lock:  # a board that is open stays so meanwhile
             return self._known, None if self._board is None else self._board.clock()
 
     def state(self) -> LinkState:
-        """The state now."""
+        """The current state."""
         known, board_s = self.observe()
         return known.state(self.plan, self._clock(), board_s)

@@ -1,4 +1,4 @@
-"""Where a sheet sits on its link, from a few known points that were pressed."""
+"""The place of a sheet on its link, from a few known points that were pressed."""
 
 from __future__ import annotations
 
@@ -22,46 +22,46 @@ from contactfpga.zones.zone import Zones
 
 KEYS = ("point_m", "normal", "pressed_mm")
 CLEARER = 2.0
-"""By this factor the residual of the other way of mounting must be larger."""
+"""Required ratio of residuals between the two mounting hypotheses."""
 LARGEST_RAD = 0.35
-"""Of the standard deviation of the angles: more is no registration."""
+"""Largest accepted standard deviation of the angles."""
 HELD_S = 0.3
-"""How long a point must be pressed, with one zone that stays where it is."""
+"""Time for which a point must be pressed, with one constant zone."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Press:
-    """A point of the link, and what was pressed there."""
+    """A known point of the link, and its press."""
 
     point_m: tuple[float, float, float]
-    """In the link's frame."""
+    """Point in the link's frame."""
     normal: tuple[float, float, float] | None = None
-    """Outward there, unit vector; None: not known."""
+    """Outward unit normal; None: unknown."""
     pressed_mm: tuple[float, float] | None = None
     """x and y of the zone; None: not pressed yet."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Registration:
-    """Where the sheet sits."""
+    """The place of the sheet."""
 
     pose: Pose
-    """Of the sheet's own frame in the link's: for `robot.toml`."""
+    """Pose of the sheet's own frame in the link's, for `robot.toml`."""
     mirrored: bool
     residuals_mm: tuple[float, ...]
-    """How far each point lies from where its press says."""
+    """Distance of each point from the place of its press."""
     other_mm: float
-    """Root of the mean square of the residuals if it were mounted the other way."""
+    """RMS residual of the other way of mounting."""
     sigma_mm: float
     """Standard deviation of the sheet's middle, by the cells' size and the number of points."""
     sigma_rad: float
-    """Of the angle that is known worst."""
+    """Standard deviation of the least certain angle."""
     turned_rad: float
-    """By how much the pose is turned against the one in `robot.toml`."""
+    """Rotation against the pose in `robot.toml`."""
 
     @property
     def rms_mm(self) -> float:
-        """Root of the mean square of the residuals."""
+        """RMS of the residuals."""
         return math.sqrt(sum(one * one for one in self.residuals_mm) / len(self.residuals_mm))
 
     def to_toml(self) -> str:
@@ -74,7 +74,7 @@ class Registration:
 
 
 def register(plan: Plan, presses: Sequence[Press]) -> Registration:
-    """The pose and way of mounting that fit best. Raises :class:`BodyError` where the points do not tell."""
+    """The best-fitting pose and way of mounting. Raises :class:`BodyError` if the points are ambiguous."""
     if len(presses) < 3:
         raise BodyError(f"{len(presses)} points were pressed; a pose takes at least 3")
     fits = {mirrored: _fit(plan, presses, mirrored) for mirrored in (False, True)}
@@ -101,7 +101,7 @@ def register(plan: Plan, presses: Sequence[Press]) -> Registration:
 
 
 def _fit(plan: Plan, presses: Sequence[Press], mirrored: bool) -> tuple[Pose, Floats, float]:
-    """Pose, residuals in mm with those of normals as lengths, and by which lever in mm the worst angle is known."""
+    """Pose, residuals in mm with those of normals as lengths, and the lever in mm of the least certain angle."""
     surface = dataclasses.replace(plan, mirrored=mirrored).laid
     places = [_placed(surface, press) for press in presses]
     ours = np.array([place[0] for place in places]) / 1000
@@ -133,7 +133,7 @@ def _rms(residuals: Floats) -> float:
 
 
 def load(path: str | Path) -> list[Press]:
-    """The points in a TOML file, [[point]] each. Raises :class:`BodyError`, OSError."""
+    """The points in a TOML file, a [[point]] each. Raises :class:`BodyError`, OSError."""
     values = tomlfile.load(path, BodyError)
     points = values.get("point")
     if set(values) != {"point"} or not isinstance(points, list):
@@ -164,7 +164,7 @@ def _numbers(values: dict[str, Any], key: str, count: int, where: str) -> Any:
 
 
 def held(frames: Iterable[Zones], skin_pitch_mm: float) -> tuple[float, float]:
-    """Where a single zone has stayed for :data:`HELD_S`, in mm; frames until then are used up."""
+    """The place in mm of a single zone that stayed for :data:`HELD_S`; consumes the frames until then."""
     kept: list[tuple[int, float, float]] = []
     around_mm: float | None = None
     for zones in frames:

@@ -1,5 +1,4 @@
-"""All links of a body at one moment, and their contacts: where, since when, and with units how hard; as arrays, and
-counted."""
+"""All links of a body at one moment, and their contacts: place, age, with units force; as arrays, and counted."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ from contactfpga.zones.zone import Zone, Zones
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinkContact:
-    """One zone of a link, in a frame of the robot."""
+    """A zone of a link, in a frame of the robot."""
 
     link: str
     """Name of the link in `robot.toml`."""
@@ -38,23 +37,23 @@ class LinkContact:
     time_us: int
     """Device time of its frame."""
     host_time_s: float
-    """The same on the body's clock."""
+    """Time of its frame on the body's clock."""
     time_sigma_s: float | None
-    """Standard deviation of ``host_time_s``; None if it is not known."""
+    """Standard deviation of ``host_time_s``; None if unknown."""
     point_m: Vector | None
-    """Where the contact is. None for a zone that has no place because it goes all the way round a closed sheet, or has
-    no cells, which happens only in a frame flagged ``mismatch``."""
+    """Place of the contact. None for a zone that goes all the way round a closed sheet, or has no cells, which happens
+    only in a frame flagged ``mismatch``."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
-    """(3, 3) covariance of the point, from the size of a cell along the surface, and in the base frame also from how
-    far the joints moved the point within ``time_sigma_s``. None as ``point_m``, and if the angles just before and after
-    the frame's time are not known."""
+    """(3, 3) covariance of the point, from the size of a cell along the surface, and in the base frame also from the
+    joints' motion within ``time_sigma_s``. None as ``point_m``, and if the angles around the frame's time are
+    unknown."""
     zone: Zone
     flags: frozenset[str]
     """Flags of its frame."""
     force_n: Vector | None = None
-    """Force on the link; None if there are no units, or their readings at that time have not come yet."""
+    """Force on the link; None without units, or before their readings arrive."""
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
     track: int | None = None
@@ -62,19 +61,19 @@ class LinkContact:
     tracked."""
     fold: float | None = None
     """Share of its cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody touches.
-    None if nothing was learned for this link or at this angle, or the angle is not known."""
+    None if nothing was learned here, or the angle is unknown."""
 
     _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
 
     @property
     def interval_n(self) -> tuple[float, float | None] | None:
-        """Least and largest push, which hold the push in at least 95 of 100 cases; the second is None where there is no
-        largest one. None as ``force_n``. With three contacts or more it may raise :class:`~contactfpga.MissingExtra`
-        without ``haptics``."""
+        """Least and largest push, which contain it in at least 95 of 100 cases; the second is None if unbounded. None
+        as ``force_n``. With three contacts or more it may raise :class:`~contactfpga.MissingExtra` without
+        ``haptics``."""
         return None if self._felt is None else self._felt.interval_n
 
     def moved(self, pose: Pose, frame: str) -> LinkContact:
-        """The same in a frame in which its own one lies at ``pose``."""
+        """The contact in an outer frame in which its own has this ``pose``."""
         return dataclasses.replace(
             self,
             frame=frame,
@@ -85,8 +84,7 @@ class LinkContact:
         )
 
     def less_certain(self, other: Pose | None, pose: Pose) -> LinkContact:
-        """The same with the spread of a point that is at ``pose``, or as far from there as ``other`` puts it; None:
-        nobody knows how far."""
+        """The contact with the uncertainty of a point between ``pose`` and ``other``; None: unknown."""
         if other is None or self.point_m is None or self.covariance_m2 is None:
             return dataclasses.replace(self, covariance_m2=None)
         own = (np.array(self.point_m) - pose.point_m) @ pose.rotation
@@ -94,7 +92,7 @@ class LinkContact:
         return dataclasses.replace(self, covariance_m2=self.covariance_m2 + np.outer(way, way))
 
     def to_dict(self) -> dict[str, object]:
-        """All of it in plain Python values, ready for JSON."""
+        """All fields in plain Python values, ready for JSON."""
         names = [field.name for field in dataclasses.fields(self) if field.name != "_felt"]
         values = {name: getattr(self, name) for name in (*names, "interval_n")}
         spread = None if self.covariance_m2 is None else self.covariance_m2.tolist()
@@ -103,7 +101,7 @@ class LinkContact:
 
 
 def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[LinkContact]:
-    """The contacts in the link's frame, one per zone; with the joints' angles, they say how much of them is a fold."""
+    """The contacts in the link's frame, one per zone; with the joints' angles, including their fold shares."""
     zones = state.zones
     assert zones is not None
     assert state.frame_s is not None
@@ -124,7 +122,7 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
 
 
 def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContact]:
-    """The same with forces, where the units' readings have come, and each contact has a place."""
+    """The contacts with forces, if the units' readings have arrived, and each contact has a place."""
     forces = forces_of(plan, zones) if found else None
     if forces is None:
         return found
@@ -135,8 +133,7 @@ def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContac
 
 
 def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics.Contacts | None:
-    """The forces at the zones of a frame, in the link's frame; None where there are no readings of units, or a zone has
-    no place."""
+    """The forces at the zones of a frame, in the link's frame; None without readings, or if a zone has no place."""
     if plan.units is None or zones.units is None:
         return None
     touches = []
@@ -155,7 +152,7 @@ def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics
 
 
 def _sharper(pressed: Pressed, zone: Zone, found: haptics.Contact) -> haptics.Touch:
-    """The touch, with what the zone's size and the push say of its place."""
+    """The touch with a place refined by the zone's size and the push."""
     sigma_m = pressed.sigma_m(zone.area_cells, found.normal_n or 0.0)
     return found.touch if sigma_m is None else dataclasses.replace(found.touch, point_sigma_m=sigma_m)
 
@@ -170,29 +167,29 @@ def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | No
 BASE, LINK = "base", "link"
 LINK_PX = 200
 Angles = Mapping[str, float] | ContactFPGAError
-"""Joint angles, or why there are none."""
+"""Joint angles, or the reason for their absence."""
 
 
 class Structure(Protocol):
-    """What a snapshot needs of a :class:`~contactfpga.robot.body.Body`."""
+    """The part of a :class:`~contactfpga.robot.body.Body` that a snapshot needs."""
 
     @property
     def links(self) -> Mapping[str, Plan]:
-        """The links that have a sheet."""
+        """The links with a sheet."""
 
     @property
     def kinematics(self) -> Kinematics | None:
-        """How the links move; None without a URDF."""
+        """Kinematics of the links; None without a URDF."""
 
 
 class Snapshot:
-    """Every link's newest frame with its age, and the contacts on them."""
+    """Every link's newest frame with its age, and the contacts."""
 
     def __init__(
         self, body: Structure, host_time_s: float, links: Mapping[str, LinkState], joints: Joints | None = None
     ):
         self.host_time_s = host_time_s
-        """When it was taken, on the body's clock."""
+        """Time of the snapshot, on the body's clock."""
         self._links = links
         self._body = body
         self._angles: dict[str, Angles] = {}
@@ -203,7 +200,7 @@ class Snapshot:
 
     @functools.cached_property
     def links(self) -> dict[str, LinkState]:
-        """The state of each link, by its name."""
+        """The state of each link by name."""
         return dict(self._links)
 
     def _look_up(self, name: str, joints: Joints) -> None:
@@ -219,15 +216,15 @@ class Snapshot:
 
     @property
     def answering(self) -> tuple[str, ...]:
-        """Links that are ok, so that it is known what touches them."""
+        """Links that are ok, whose contacts are known."""
         return tuple(name for name, state in self.links.items() if state.status == "ok")
 
     def contacts(self, frame: str = BASE, links: Collection[str] | None = None) -> list[LinkContact]:
         """The contacts on all links, or on these.
 
         Raises :class:`NoLinkData` if one of them is not ok, because no data is never no contact;
-        ``links=snapshot.answering`` asks only the others. In the base frame it raises :class:`NoJoints` if the angles
-        at a frame's time are not known.
+        ``links=snapshot.answering`` takes only the others. In the base frame it raises :class:`NoJoints` if the angles
+        at a frame's time are unknown.
 
         Args:
             frame: ``base``, or ``link`` for each in the frame of its own link.
@@ -261,7 +258,7 @@ class Snapshot:
         return [one.less_certain(other, pose) for one in moved]
 
     def jacobian(self, one: LinkContact) -> Floats:
-        """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
+        """(6, n): motion of the contact's point, as part of its link, with each of :attr:`joint_names`, in the base
         frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
         if one.point_m is None:
@@ -314,14 +311,14 @@ def _angles(joints: Joints, host_time_s: float) -> Angles:
 
 @dataclasses.dataclass
 class BodyStats(Stats):
-    """Counters of all links together, since the body was opened. A board that came back goes on counting."""
+    """Counters of all links together since opening. They continue over a board's return."""
 
     links: dict[str, Stats] = dataclasses.field(default_factory=dict)
-    """Each link's own."""
+    """Counters of each link."""
 
     @classmethod
     def of(cls, links: Mapping[str, Stats]) -> BodyStats:
-        """The sum of these."""
+        """The sum of these counters."""
         return cls(**vars(total(links.values())), links=dict(links))
 
     def to_dict(self) -> dict[str, object]:
@@ -334,7 +331,7 @@ class SnapshotBatch(Sequence["Snapshot"]):
     def __init__(self, snapshots: Iterable[Snapshot]):
         self._snapshots = tuple(snapshots)
         self.links: dict[str, Batch] = {}
-        """Of each link every frame once, in order, as :class:`~contactfpga.Batch`; a link without one is left out."""
+        """Every frame of each link once, in order, as :class:`~contactfpga.Batch`; links without frames are omitted."""
         for name in self._snapshots[0].links:
             frames = _frames(name, self._snapshots)
             if frames:

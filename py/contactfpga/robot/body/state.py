@@ -1,4 +1,4 @@
-"""The state of a link: its newest frame, and whether it still says what touches the link; and the errors of a body."""
+"""The state of a link: its newest frame, and whether it is current; and the errors of a body."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from contactfpga.zones.zone import Zones
 
 
 class BodyError(ContactFPGAError, ValueError):
-    """A robot, link, joint or place that cannot be; the message names the value and the limit."""
+    """An impossible robot, link, joint or place; the message names the value and the limit."""
 
 
 class NoJoints(ContactFPGAError):
-    """The joint angles at a frame's time are not known, so its contacts have no place in the base frame."""
+    """The joint angles at a frame's time are unknown, so its contacts have no place in the base frame."""
 
 
 class NoLinkData(NoData):
-    """Links that were asked for contacts have no data: nobody knows whether something touches them."""
+    """Links whose contacts were requested have no data: touches are unknown."""
 
     def __init__(self, links: Mapping[str, LinkState]):
         listed = "; ".join(f"{name}: {state}" for name, state in links.items())
@@ -27,27 +27,27 @@ class NoLinkData(NoData):
             f"no data of {listed}; ask for the links that have data: contacts(links=snapshot.answering)", None
         )
         self.links = dict(links)
-        """Those without data."""
+        """The links without data."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LinkState:
-    """What is known about a link at one moment."""
+    """The knowledge of a link at one moment."""
 
     zones: Zones | None
-    """Its newest frame; None unless it is ok or late, because older frames say nothing about the present."""
+    """Its newest frame; None unless it is ok or late, because older frames are not current."""
     age_s: float | None
-    """How long ago, on the body's clock, its newest frame ever was scanned; None if none ever came."""
+    """Time since its newest frame ever was scanned, on the body's clock; None without one."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
     open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
     there."""
     reason: str = ""
-    """Why it is not ok."""
+    """Reason why it is not ok."""
     frame_s: float | None = None
-    """When the frame was scanned, on the body's clock."""
+    """Scan time of the frame, on the body's clock."""
     tracks: Tracks | None = None
-    """Its contacts over the frames that were taken, as :class:`~contactfpga.Tracker` follows them."""
+    """Its contacts over the frames read, as :class:`~contactfpga.Tracker` follows them."""
 
     def __str__(self) -> str:
         age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"

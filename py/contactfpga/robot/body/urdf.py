@@ -1,4 +1,4 @@
-"""Links and joints from a URDF file; masses, meshes and colors are left out."""
+"""Links and joints from a URDF file, without masses, meshes and colors."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 20_000_000
 MAX_LINKS = 1000
-"""And as many joints."""
+"""Most links, and most joints."""
 PACKAGE = "package://"
 
 
 def located(urdf: str, folder: Path) -> Path:
-    """The file that a robot's table names: a path, counted from ``folder``, or ``package://NAME/PATH`` in an installed
+    """The file named in a robot's table: a path, relative to ``folder``, or ``package://NAME/PATH`` in an installed
     Python package. Raises :class:`BodyError`."""
     if not urdf.startswith(PACKAGE):
         return folder / urdf
@@ -53,7 +53,7 @@ def load(path: Path) -> Robot:
 
 
 def tree(path: Path) -> ElementTree.Element:
-    """The outermost element of a URDF file. Raises :class:`BodyError`, OSError."""
+    """The root element of a URDF file. Raises :class:`BodyError`, OSError."""
     data = read_small(path, MAX_BYTES, "a URDF file", BodyError)
     return xmlfile.parse(data, path, "a URDF file", BodyError)
 
@@ -130,7 +130,7 @@ def _text(element: ElementTree.Element, key: str, where: str) -> str:
 
 
 def vector(element: ElementTree.Element | None, key: str, where: str, usual: str = "0 0 0") -> Vector:
-    """Three numbers, ``usual`` where they are not given; ``where``: whose they are. Raises :class:`BodyError`."""
+    """Three numbers, by default ``usual``; ``where``: their owner. Raises :class:`BodyError`."""
     text = usual if element is None else element.get(key, usual)
     parts = text.split()
     if len(parts) != 3:

@@ -1,7 +1,7 @@
-"""How hard, where, and how sure: forces at the zones, from pressure units under the bumper.
+"""Forces at the zones with their uncertainty, from pressure units under the bumper.
 
-SI units, in the link's frame. A wrench is what contacts exert on the link; normals point out of it; no push is
-below 0.
+SI units, in the link's frame. A wrench is exerted by contacts on the link; normals point outward; pushes are at least
+0.
 """
 
 from contactfpga.robot.haptics.calibrate import Calibration, Drift, DriftWatch, calibrate

@@ -1,4 +1,4 @@
-"""Many frames at once: the same answers as for one, as arrays. Needs numpy alone."""
+"""Answers for many frames at once, as arrays. Needs numpy alone."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from contactfpga.surfaces.shapes import Floats
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:
-    """Centers of pressure (m, 3) in m, in the link's frame, of (m, 6) wrenches in N and Nm. A wrench that does not push
-    has NaN."""
+    """Centers of pressure (m, 3) in m, in the link's frame, of (m, 6) wrenches in N and Nm; NaN for a wrench that does
+    not push."""
     fx, fy, fz, mx, my, mz = np.asarray(wrenches, float).T
     with np.errstate(invalid="ignore", divide="ignore"):
         if isinstance(surface, Plane):
@@ -32,7 +32,7 @@ def _on_cylinder(surface: Cylinder, fx: Floats, fy: Floats, fz: Floats, mx: Floa
 
 
 def one(wrenches: Floats, points: Floats, noise: Noise | None = None) -> Floats:
-    """Forces (m, 3) in N, one contact for each of (m, 6) wrenches, at known points (m, 3) in m."""
+    """Forces (m, 3) in N of one contact for each of (m, 6) wrenches, at known points (m, 3) in m."""
     wrenches, points = np.asarray(wrenches, float), np.asarray(points, float)
     if noise is None:
         return wrenches[:, :3].copy()
@@ -45,8 +45,8 @@ def two(
     wrenches: Floats, points: Floats, normals: Floats, friction: float, noise: Noise | None = None
 ) -> tuple[Floats, Floats]:
     """Forces (m, 2, 3) and intervals of the pushes (m, 2, 2) at two known points (m, 2, 3) with outward unit normals
-    (m, 2, 3). No largest push is infinite. NaN where friction allows no forces; :func:`contacts` tells more there.
-    The units' noise is not in the intervals."""
+    (m, 2, 3). Unbounded pushes are infinite. NaN if friction allows no forces; :func:`contacts` gives details. The
+    intervals exclude the units' noise."""
     wrenches, points, normals = (np.asarray(each, float) for each in (wrenches, points, normals))
     away = points[:, 0] - points[:, 1]
     along = away / np.linalg.norm(away, axis=1)[:, None]
@@ -98,7 +98,7 @@ def _least_norm(wrenches: Floats, points: Floats, along: Floats, noise: Noise | 
 
 
 def _allowed(starts: Floats, sides: Floats, push: Floats, more: Floats, friction: float) -> tuple[Floats, Floats]:
-    """(m, 2) each: the squeezes that friction allows at each contact; NaN where none is."""
+    """(m, 2) each: the squeezes that friction allows at each contact; NaN if none."""
     wide = 1 + friction**2
     square = 1 - wide * more**2
     square = np.where(np.abs(square) < 1e-12, 1e-12, square)

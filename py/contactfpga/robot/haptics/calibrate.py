@@ -1,5 +1,5 @@
-"""Calibration by known loads: the matrix from readings to wrench, and what the loads leave open; and how far the units'
-zeros have drifted since, watched while nothing touches."""
+"""Calibration by known loads: the matrix from readings to wrench, and undetermined directions; and the drift of the
+units' zeros, watched while nothing touches."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from contactfpga.robot.haptics.values import HapticsError, array, number, positi
 from contactfpga.surfaces.shapes import Floats
 
 SEEN = 1e-6
-"""Share of the largest load below which a direction was not loaded."""
+"""Share of the largest load below which a direction counts as not loaded."""
 
 NOISE = 5.0
-"""Times its noise that a combination of readings must have varied to count as loaded."""
+"""Required variation, in multiples of its noise, of a combination of readings to count as loaded."""
 
 
 PER_UNIT = 10
-"""Loads for each unit from which on their readings tell the covariance of the units' noise."""
+"""Loads per unit from which their noise covariance is estimated."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Calibration:
-    """What known loads say of the units."""
+    """Result of known loads."""
 
     cells: LoadCells
-    """With the matrix and the zeros found, and the covariance of noise if there were :data:`PER_UNIT` loads a unit."""
+    """The units with the fitted matrix and zeros, and with :data:`PER_UNIT` loads a unit the noise covariance."""
     rank: int
-    """Independent loads; 6 are all."""
+    """Independent loads; 6 are complete."""
     missing: tuple[str, ...]
-    """What was never loaded, in words."""
+    """Directions never loaded, in words."""
     residual_n: float
-    """Root mean square of what the loads' forces are off by, after calibration."""
+    """RMS error of the loads' forces after calibration."""
     advice: str
-    """What to do next."""
+    """The next step."""
 
 
 def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
-    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions that none has; moments count over ``length_m``."""
+    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions orthogonal to all; moments are divided by ``length_m``."""
     scaled = np.atleast_2d(loads) / np.array([1, 1, 1, length_m, length_m, length_m])
     _, values, right = np.linalg.svd(scaled)
     rank = int((values > SEEN * values[0]).sum())
@@ -48,10 +48,9 @@ def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
 
 
 def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
-    """The matrix and zeros with which (m, n) readings give (m, 6) loads best, by least squares.
+    """The matrix and zeros with which (m, n) readings best give (m, 6) loads, by least squares.
 
-    Where the loads leave directions open the matrix keeps what places and axes say there. Raises :class:`HapticsError`
-    where there are too few loads.
+    In undetermined directions the matrix is that of places and axes. Raises :class:`HapticsError` for too few loads.
     """
     read, known = np.atleast_2d(array("readings", readings)), np.atleast_2d(array("loads", loads))
     count = len(cells.units)
@@ -77,7 +76,7 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
 
 
 def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
-    """(n, n): of what loads and zeros do not explain of the readings."""
+    """(n, n): covariance of the readings left unexplained by loads and zeros."""
     explains = np.column_stack([loads, np.ones(len(loads))])
     found, _, rank, _ = np.linalg.lstsq(explains, deviations, rcond=SEEN)
     rest = (deviations - explains @ found) * np.array([unit.gain_n for unit in cells.units])
@@ -85,7 +84,7 @@ def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
-    """(6, n): the smallest change of the matrix that explains the rest; what only noise moved changes nothing."""
+    """(6, n): the smallest change of the matrix that explains the rest; noise alone changes nothing."""
     sigma = np.array([unit.sigma_n / abs(unit.gain_n) for unit in cells.units])
     left, values, right = np.linalg.svd(deviations / sigma, full_matrices=False)
     moved = values > NOISE * np.sqrt(len(deviations))
@@ -116,23 +115,23 @@ def _advice(cells: LoadCells, rank: int, missing: tuple[str, ...], residual_n: f
 
 @dataclasses.dataclass(frozen=True)
 class Drift:
-    """How far zeros have drifted."""
+    """Drift of the zeros."""
 
     deviations_n: Floats
-    """(n,): of each unit from its zero, averaged."""
+    """(n,): averaged deviation of each unit from its zero."""
     drifted: tuple[int, ...]
-    """Numbers of the units that are off by more than the limit: read their zeros again."""
+    """Indexes of the units beyond the limit, whose zeros must be read again."""
     since_s: float
-    """Time in which nothing touched, averaged over."""
+    """Averaging time without touch."""
 
 
 class DriftWatch:
-    """Averages readings while no zone is pressed; a push that the sheet misses is short, a drift stays.
+    """Averages readings while no zone is pressed: a push that the sheet misses is short, a drift stays.
 
     Args:
-        cells: the units.
-        limit_n: deviation from which on a unit has drifted; None: four times its noise.
-        over_s: time constant of the average, in s; nothing is said before it has passed without a touch.
+     cells: the units.
+     limit_n: deviation that counts as drift; None: four times its noise.
+     over_s: time constant of the average, in s; nothing is reported before it has passed without a touch.
     """
 
     def __init__(self, cells: LoadCells, limit_n: float | None = None, over_s: float = 10.0):
@@ -149,7 +148,7 @@ class DriftWatch:
         self._last_s: float | None = None
 
     def update(self, time_s: float, readings: Sequence[float] | Floats, zones: int) -> Drift:
-        """Take one reading per unit, with the number of zones pressed; returns what is known by now."""
+        """Add one reading per unit, with the number of pressed zones; returns the current drift."""
         within("time_s", (time_s,), "s")
         last, self._last_s = self._last_s, time_s
         if zones or last is None or time_s <= last:

@@ -1,11 +1,11 @@
-"""The range of each push by the units' noise: all pushes that forces within friction's cones may have while the wrench
-they exert fits the measured one nearly as well as the best.
+"""The range of each push under the units' noise: all pushes of forces within friction's cones whose wrench fits the
+measured one nearly as well as the best.
 
-For one push the misfit (in squares of noise, uncertain places counted in) may exceed its least by 3.84, what chi-square
-of one degree of freedom stays below in 95 of 100 cases (profile likelihood: Meeker and Escobar, The American
-Statistician 49, 1995). Where the wrench alone fixes a push, and its ends lie within the cones, that is the push plus or
-minus 1.96 standard deviations. Else the ends of one or two contacts are found by Newton's method with a logarithmic
-barrier for each cone and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3), those of more by Clarabel
+For one push the misfit (in squares of noise, with uncertain places) may exceed its minimum by 3.84, the 95 % quantile
+of chi-square with one degree of freedom (profile likelihood: Meeker and Escobar, The American Statistician 49, 1995).
+If the wrench alone determines a push, and its ends are within the cones, that is the push plus or minus 1.96 standard
+deviations. Else the ends of one or two contacts are found by Newton's method with a logarithmic barrier for each cone
+and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3), those of more by Clarabel
 (:mod:`contactfpga.robot.haptics.system`).
 """
 
@@ -20,43 +20,43 @@ from contactfpga.robot.haptics.contact import Interval
 from contactfpga.surfaces.shapes import Floats
 
 CHI2_1 = 3.841458820694124
-"""One degree of freedom stays below it in 95 of 100 cases."""
+"""95 % quantile of chi-square with one degree of freedom."""
 
 LARGEST = 1e4
-"""Times the measured force: no push is looked for beyond."""
+"""Largest push searched, in multiples of the measured force."""
 
 UNBOUNDED = 500.0
-"""Times the measured force: a push that may be larger than this has no largest one."""
+"""Push, in multiples of the measured force, beyond which it counts as unbounded."""
 
 GAP = 1e-4
-"""How near to its end a push is found, as a share of the measured force; the end that is stated lies as far outside."""
+"""Accuracy of an interval's end as a share of the measured force; the stated end is moved outward by it."""
 
 LEAST = 1e-4
-"""How near to the least misfit, in squares of noise."""
+"""Accuracy of the least misfit, in squares of noise."""
 
 STEEPER = 30.0
-"""From one barrier to the next."""
+"""Factor between successive barriers."""
 
 CENTERED = 1e-3
-"""Of the barrier's value: what a step has to gain for another one."""
+"""Required gain of a step, as a share of the barrier's value, for another step."""
 
 STEPS = 80
-"""Newton's at each barrier, and halvings of one, at most; some five are taken."""
+"""Most Newton steps per barrier, and halvings of a step; about five are needed."""
 
 ROUNDING = 1e-13
-"""Added to a matrix of ones on the diagonal, so that rounding makes it no singular one."""
+"""Regularization of a matrix with unit diagonal against rounding."""
 
 KNOWN = 1e-9
-"""Share below which a singular value, or what the null space does to a push, is 0."""
+"""Share below which a singular value, or the null space's effect on a push, is 0."""
 
 
 class Fit:
-    """Numbers x in N, of which ``matrix`` x in standard deviations of the wrench fits ``wanted``, in cones.
+    """Forces x in N in cones, with ``matrix`` x, in standard deviations of the wrench, fitted to ``wanted``.
 
     Args:
-        firsts: which of them are pushes; those of contacts with friction are followed by both forces along the surface.
+        firsts: indexes of the pushes; with friction, both forces along the surface follow.
         frictions: of each contact; 0: it has no such forces.
-        size_n: about as large as the pushes.
+        size_n: approximate size of the pushes.
     """
 
     def __init__(
@@ -69,7 +69,8 @@ class Fit:
         self.square = self.matrix.T @ self.matrix
         """(n, n): half the second derivative of the misfit."""
         self._cones = np.zeros((len(self.firsts), matrix.shape[1]))
-        """Times the squares of x, above 0 inside a cone: its push squared, less the rest squared over friction."""
+        """Factors of the squares of x, with a sum above 0 inside a cone: its push squared, less the rest squared over
+        friction squared."""
         for cone, first, friction in zip(self._cones, self.firsts, frictions):
             cone[first] = 1.0
             if friction:
@@ -78,12 +79,12 @@ class Fit:
         rank = int((values > KNOWN * values[0]).sum())
         self._null = right[rank:].T
         self._root = right[:rank].T / values[:rank]
-        """(n, rank): times its transpose it is the covariance."""
+        """(n, rank): a root of the covariance."""
         self._best = self._root @ (left[:, :rank].T @ wanted)
 
     def intervals(self, ends_of: Ends | None = None) -> list[Interval]:
-        """Least and largest of each push; None where there is no largest one. ``ends_of`` finds those that the wrench
-        alone does not fix; by default :func:`ends_of_few`."""
+        """Least and largest of each push; None if unbounded. ``ends_of`` finds those that the wrench alone does not
+        determine; default :func:`ends_of_few`."""
         found = {first: self._alone(first) for first in self.firsts}
         rest = [first for first, both in found.items() if both is None]
         ends = {first: both for first, both in found.items() if both is not None}
@@ -94,7 +95,7 @@ class Fit:
         return [(max(0.0, low), None if high > most else max(0.0, high)) for low, high in scaled]
 
     def _alone(self, first: int) -> tuple[float, float] | None:
-        """Where the wrench fixes it and both ends lie in the cones; None elsewhere."""
+        """The interval if the wrench determines it and both ends are in the cones; else None."""
         if float(np.abs(self._null[first]).max(initial=0.0)) > KNOWN:
             return None
         row = self._root[first]
@@ -106,39 +107,39 @@ class Fit:
         return float(self._best[first]) - half, float(self._best[first]) + half
 
     def _straightened(self, x: Floats) -> Floats:
-        """The same wrench with the smallest forces along the surface."""
+        """The forces with the same wrench and the smallest parts along the surface."""
         sides = (self._cones < 0).any(axis=0)
         if not sides.any() or not self._null.shape[1]:
             return x
         return np.asarray(x - self._null @ np.linalg.lstsq(self._null[sides], x[sides], rcond=None)[0])
 
     def _inside(self, x: Floats) -> NDArray[np.bool_]:
-        """Of each (m, n) row: whether it lies in all cones."""
+        """Whether each (m, n) row is in all cones."""
         pushes = x[:, self.firsts]
         within = (pushes > 0) & (pushes < LARGEST) & (x * x @ self._cones.T > 0)
         return np.asarray(within.all(axis=1))
 
     def misfit(self, x: Floats) -> Floats:
-        """(m,): in squares of noise, of (m, n) rows."""
+        """(m,) misfits in squares of noise, of (m, n) rows."""
         rest = x @ self.matrix.T - self.wanted
         return np.asarray((rest * rest).sum(axis=1))
 
     def half_slope(self, x: Floats) -> Floats:
-        """(m, n): half the derivative of the misfit; that of the derivative is the (n, n) ``square``."""
+        """(m, n): half the derivative of the misfit, whose derivative is the (n, n) ``square``."""
         return np.asarray((x @ self.matrix.T - self.wanted) @ self.matrix)
 
     @property
     def contacts(self) -> int:
-        """Of which a push is asked."""
+        """Number of contacts."""
         return len(self.firsts)
 
     @property
     def walls(self) -> int:
-        """Of the barrier, each as often as it counts."""
+        """Weight of the barrier's walls."""
         return 3 * len(self.firsts) + 1
 
     def barrier(self, x: Floats) -> Floats:
-        """(m,): infinite outside of the cones."""
+        """(m,) barriers, infinite outside the cones."""
         inside = self._inside(x)
         rooms, left = x * x @ self._cones.T, LARGEST - x[:, self.firsts]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -146,7 +147,7 @@ class Fit:
         return np.where(inside, value, np.inf)
 
     def barrier_slopes(self, x: Floats) -> tuple[Floats, Floats]:
-        """(m, n) and (m, n, n): its first and second derivatives."""
+        """(m, n) and (m, n, n): first and second derivatives of the barrier."""
         over = 1 / (x * x @ self._cones.T)
         ways = 2 * self._cones * x[:, None] * over[:, :, None]
         slope, curve = -ways.sum(axis=1), ways.transpose(0, 2, 1) @ ways
@@ -160,7 +161,7 @@ class Fit:
 
 
 def ends_of_few(fit: Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float]]:
-    """The least and the largest of each of these pushes, all at once."""
+    """The least and largest of each of these pushes, all at once."""
     start = np.zeros((1, fit.matrix.shape[1]))
     start[:, fit.firsts] = 1.0
     inner = _descended(_Goal(fit, None, None), start, LEAST)
@@ -176,13 +177,13 @@ def ends_of_few(fit: Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float
 
 
 class _Goal:
-    """What is made small inside the barrier: half the misfit, or each row of ``goals`` at a misfit below ``most``."""
+    """Objective inside the barrier: half the misfit, or each row of ``goals`` at a misfit below ``most``."""
 
     def __init__(self, fit: Fit, goals: Floats | None, most: float | None):
         self.fit, self._goals, self._most = fit, goals, most
 
     def value(self, x: Floats, weight: float) -> Floats:
-        """(m,): with its barriers."""
+        """(m,) values with barriers."""
         misfit, walls = self.fit.misfit(x), self.fit.barrier(x)
         if self._goals is None or self._most is None:
             return np.asarray(weight * misfit / 2 + walls)
@@ -192,7 +193,7 @@ class _Goal:
         return np.where(misfit < self._most, goal + walls + np.nan_to_num(inside), np.inf)
 
     def step(self, x: Floats, weight: float) -> tuple[Floats, Floats]:
-        """(m, n): Newton's; (m,): by how much it would lower the value if that were a parabola, twice."""
+        """(m, n): Newton steps; (m,): twice the predicted decrease."""
         (slope, curve), half = self.fit.barrier_slopes(x), self.fit.half_slope(x)
         if self._goals is None or self._most is None:
             slope, curve = slope + weight * half, curve + weight * self.fit.square
@@ -208,7 +209,7 @@ class _Goal:
 
 
 def _descended(goal: _Goal, x: Floats, gap: float) -> Floats:
-    """(m, n) rows from a point inside to the least of the goal."""
+    """(m, n) rows from an inner point to the minimum of the goal."""
     weight = 1.0
     while True:
         x = _centered(goal, x, weight)
@@ -234,8 +235,8 @@ def _centered(goal: _Goal, x: Floats, weight: float) -> Floats:
 
 
 def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> Fit | None:
-    """Pushes by their columns in ``matrix``, whatever the forces along the surface are, of which ``sides`` are the
-    columns; None where those alone exert every wrench."""
+    """Pushes by their columns in ``matrix``, for any forces along the surface with columns ``sides``; None if those
+    alone exert every wrench."""
     if sides.shape[1]:
         left, values, _ = np.linalg.svd(sides)
         rest = left[:, int((values > KNOWN * values[0]).sum()) :].T
@@ -245,4 +246,4 @@ def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> F
 
 
 Ends = Callable[[Fit, Sequence[int]], dict[int, tuple[float, float]]]
-"""The least and the largest of these pushes, over the size of the fit."""
+"""The least and largest of these pushes, over the size of the fit."""

@@ -1,4 +1,4 @@
-"""Contacts: where something touches, and what is known of the force there."""
+"""Contacts: touched places, and the forces there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.zones.zone import Zone, Zones
 
 FULL_WRENCH = "FULL_WRENCH"
-"""Force at a place that is not known: the center of pressure."""
+"""Force at an unknown place: the center of pressure."""
 PURE_FORCE = "PURE_FORCE"
 """At each contact a force of any direction within friction's cone."""
 PURE_FORCE_WITH_KNOWN_DIRECTION = "PURE_FORCE_WITH_KNOWN_DIRECTION"
@@ -29,12 +29,12 @@ PURE_FORCE_WITH_KNOWN_DIRECTION = "PURE_FORCE_WITH_KNOWN_DIRECTION"
 Interval = tuple[float, float | None]
 
 LEAST_FRICTION = 1e-6
-"""Divided by, it is still a number."""
+"""Least friction whose inverse is finite."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Touch:
-    """A place that is touched, from the sheet; the force there is asked."""
+    """A touched place from the sheet, whose force is to be found."""
 
     point_m: Vector
     normal: Vector
@@ -58,12 +58,12 @@ class Touch:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Context:
-    """What is known of the contacts of a frame besides forces."""
+    """Knowledge of a frame's contacts besides forces."""
 
     link: str = ""
     time_us: int | None = None
     tracks: Sequence[int | None] = ()
-    """Of each contact; fewer where the rest is not followed."""
+    """Track of each contact; shorter if the rest is not followed."""
 
 
 NO_CONTEXT = Context()
@@ -86,23 +86,23 @@ class Contact:
     ):
         self.touch = touch
         self.force_n = force_n
-        """On the link; None where no unit measures it."""
+        """Force on the link; None if no unit measures it."""
         self.normal_n = normal_n
-        """Push, 0 or above: a contact never pulls. None as ``force_n``."""
+        """Push, at least 0: a contact never pulls. None as ``force_n``."""
         self.frame = frame
-        """Name of the frame in which point, normal and force are."""
+        """Name of the frame of point, normal and force."""
         self.link = context.link
-        """Name of the link that is touched."""
+        """Name of the touched link."""
         self.time_us = context.time_us
-        """Device time of the frame that shows it, in us since power-up; None where no frame does."""
+        """Device time of its frame in us since power-up; None without a frame."""
         self.track = context.tracks[number] if number < len(context.tracks) else None
-        """Id that stays from frame to frame (:class:`~contactfpga.tracking.tracker.Tracker`); None: not followed."""
+        """Id that stays from frame to frame (:class:`~contactfpga.tracking.tracker.Tracker`); None: not tracked."""
         self._intervals = intervals
         self._number = number
 
     @property
     def point_m(self) -> Vector:
-        """Where it touches, in m in the link's frame."""
+        """Point in m in the link's frame."""
         return self.touch.point_m
 
     @property
@@ -118,17 +118,18 @@ class Contact:
 
     @property
     def interval_n(self) -> Interval | None:
-        """Least and largest push, in N; the second is None where there is no largest one. None as ``force_n``.
+        """Least and largest push in N; the second is None if unbounded. None as ``force_n``.
 
-        With the units' noise it holds the push in at least 95 of 100 cases
-        (:mod:`contactfpga.robot.haptics.confidence`): noise, uncertain places and what friction leaves open are in it.
+        With the units' noise it contains the push in at least 95 of 100 cases
+        (:mod:`contactfpga.robot.haptics.confidence`), considering noise, uncertain places and the freedom of friction.
         Without noise (:attr:`Wrench.noise` None) it is the range of all forces that friction allows and that exert
         exactly this wrench. With three contacts or more either may need Clarabel: raises
-        :class:`~contactfpga.MissingExtra` without it."""
+        :class:`~contactfpga.MissingExtra` without it.
+        """
         return None if self._intervals is None else self._intervals()[self._number]
 
     def to_dict(self) -> dict[str, object]:
-        """All of it in plain Python values, ready for JSON."""
+        """All fields in plain Python values, ready for JSON."""
         interval, force = self.interval_n, self.force_n
         return {
             "link": self.link,
@@ -151,27 +152,27 @@ class Contact:
 
 @dataclasses.dataclass(slots=True)
 class Solution:
-    """Forces at all contacts of one frame, and how sure they are."""
+    """Forces at all contacts of one frame, and their uncertainty."""
 
     model: str
     forces_n: list[Vector]
     intervals: Callable[[], list[Interval]]
     rank: int
     null_space: list[list[float]]
-    """Directions in which the forces may change with no change of the wrench; x, y and z of each contact in turn, or
-    one push each with known directions."""
+    """Changes of the forces that leave the wrench unchanged; x, y and z of each contact in turn, or one push each with
+    known directions."""
     chi2: float | None
     freedom: int
-    """Degrees of freedom of ``chi2``: components of the wrench that are not used up by the forces."""
+    """Degrees of freedom of ``chi2``: components of the wrench not used up by the forces."""
     touches: Sequence[Touch]
     wrench: Wrench
     covariance: Callable[[], Floats | None]
-    """(3k, 3k) of the forces, without the directions of the null space."""
+    """(3k, 3k) covariance of the forces, without the null space."""
     beyond_friction: bool = False
 
     @property
     def residual(self) -> tuple[float, float, float, float, float, float]:
-        """What is left of the wrench if the one that the forces exert is subtracted."""
+        """The wrench minus that of the forces."""
         (fx, fy, fz), (mx, my, mz) = self.wrench.force_n, self.wrench.moment_nm
         for touch, (px, py, pz) in zip(self.touches, self.forces_n):
             x, y, z = touch.point_m
@@ -181,7 +182,7 @@ class Solution:
 
 
 class Contacts(Sequence[Contact]):
-    """The contacts of one frame, in the order in which they were given."""
+    """The contacts of one frame, in the given order."""
 
     def __init__(
         self,
@@ -193,20 +194,21 @@ class Contacts(Sequence[Contact]):
     ):
         self.wrench = wrench
         self.center = center
-        """Where no zone was given: the contact that the wrench alone shows, or None."""
+        """Without a zone: the contact that the wrench alone shows, or None."""
         self._solution = solution
         self.model = solution.model
-        """Which model of a contact was chosen: :data:`PURE_FORCE`, :data:`PURE_FORCE_WITH_KNOWN_DIRECTION` or
+        """The chosen contact model: :data:`PURE_FORCE`, :data:`PURE_FORCE_WITH_KNOWN_DIRECTION` or
         :data:`FULL_WRENCH`."""
         self.rank = solution.rank
-        """Of the matrix from forces to wrench."""
+        """Rank of the matrix from forces to wrench."""
         self.null_space = solution.null_space
         self.chi2 = solution.chi2
-        """How far the wrench is from what these contacts can exert, in squares of its noise; None without noise."""
+        """Distance of the wrench from those that these contacts can exert, in squares of its noise; None without
+        noise."""
         self.freedom = solution.freedom
         self.beyond_friction = solution.beyond_friction
-        """No forces within friction's limits exert this wrench: a contact drags at the limit, friction is larger than
-        given, or a contact unseen. Intervals then hold for pushes with any friction."""
+        """Whether no forces within friction's limits exert this wrench: a contact drags at the limit, friction is
+        larger than given, or a contact is unseen. Intervals then hold for any friction."""
         if wrench.frame and not context.link:
             context = Context(wrench.frame, context.time_us, context.tracks)
         made = []
@@ -226,17 +228,17 @@ class Contacts(Sequence[Contact]):
 
     @functools.cached_property
     def covariance_n2(self) -> Floats | None:
-        """(3k, 3k) of all forces in turn, without what no wrench shows (:attr:`null_space`); None without noise."""
+        """(3k, 3k) covariance of all forces in turn, without the :attr:`null_space`; None without noise."""
         return self._solution.covariance()
 
     @property
     def alarm(self) -> bool:
-        """Whether the wrench is one that these contacts exert by chance only once in a thousand times."""
+        """Whether these contacts would exert the wrench by chance only once in a thousand times."""
         return self.chi2 is not None and self.freedom > 0 and self.chi2 > ALARM[self.freedom - 1]
 
     @property
     def unexplained(self) -> Wrench | None:
-        """The rest of the wrench, which only the units see; None unless :attr:`alarm` is set."""
+        """The residual wrench, which only the units see; None unless :attr:`alarm` is set."""
         if not self.alarm:
             return None
         rest = self._solution.residual
@@ -244,8 +246,8 @@ class Contacts(Sequence[Contact]):
 
     @property
     def unfelt(self) -> list[Contact]:
-        """What only the sheet sees: contacts that may push with no force at all (:attr:`Contact.interval_n`). Two
-        fingers that squeeze the link are such contacts."""
+        """Contacts that only the sheet sees: they may push without force (:attr:`Contact.interval_n`), such as two
+        fingers that squeeze the link."""
         return [one for one, (least, _) in zip(self._contacts, self._kept_intervals) if least <= 1e-9]
 
     @overload
@@ -261,7 +263,7 @@ class Contacts(Sequence[Contact]):
         return len(self._contacts)
 
     def _repr_html_(self) -> str:
-        """A table in a notebook; a push that is not known alone has its interval."""
+        """A table in a notebook; an ambiguous push has its interval."""
         head = ["contact", "x, mm", "y, mm", "z, mm", "push, N", "between, N"]
         rows = [
             [_name(number, one), *(f"{1e3 * each:.2f}" for each in one.point_m), *_push(one)]
@@ -289,15 +291,15 @@ def _push(contact: Contact) -> list[str]:
 
 
 EARLIER_US = 20_000
-"""Device time by which a place is older than the zone of the next contact, which presses the units before it closes a
-switch."""
+"""Device time by which a place must precede the next contact's zone, as that contact presses the units before it closes
+a switch."""
 
 Key = tuple[int, tuple[float, float, float] | None]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class _Alone:
-    """Of one frame with a single zone."""
+    """A frame with a single zone."""
 
     time_us: int
     center_m: tuple[float, float, float]
@@ -305,27 +307,26 @@ class _Alone:
 
 
 class AloneWatch:
-    """Takes every frame with its readings, and remembers the place of a contact that was alone, for
+    """Reads every frame with its readings, and remembers the place of a contact that was alone, for
     :func:`~contactfpga.robot.haptics.felt`.
 
-    With two contacts the units say nothing about where each is along the line through both, and the barycenter of one
-    to three cells is off by a quarter of the pitch: that is the largest error of the forces. A single contact's center
-    of pressure is known to less than a millimeter. It stays its place while more contacts come and its zone keeps the
-    same cells.
+    With two contacts the units do not show where each is along the line through both, and the barycenter of one to
+    three cells is off by a quarter of the pitch: the largest error of the forces. A single contact's center of pressure
+    is known to less than a millimeter. It remains its place while more contacts come and its zone keeps its cells.
     """
 
     def __init__(self, cells: LoadCells):
-        """Raises :class:`HapticsError` where the cells have no surface."""
+        """Raises :class:`HapticsError` if the cells have no surface."""
         if cells.surface is None:
             raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
         self._cells, self._surface = cells, cells.surface
         self._key: Key | None = None
-        """Of the zone that is alone."""
+        """Key of the single zone."""
         self._recent: deque[_Alone] = deque()
         self._kept: dict[Key, _Alone] = {}
 
     def take(self, zones: Zones, motion: Motion | None = None) -> None:
-        """The next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`); ``motion`` as for
+        """Add the next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`); ``motion`` as for
         :meth:`LoadCells.wrench <contactfpga.robot.haptics.LoadCells.wrench>`."""
         if len(zones) == 1:
             self._kept = {}
@@ -353,8 +354,8 @@ class AloneWatch:
             self._recent.popleft()
 
     def sharpened(self, zones: Zones, touches: Sequence[Touch]) -> list[Touch]:
-        """The touches of a frame's zones, in the order of those that have a place, each where it was alone if that is
-        known better and lies on its zone."""
+        """The touches of a frame's zones with places, in order, each at its single-contact place if that is better
+        known and on its zone."""
         placed = [zone for zone in zones if zone.point_mm is not None]
         return [self._sharper(zone, touch, zones.sheet.pitch_x_mm) for zone, touch in zip(placed, touches, strict=True)]
 
@@ -368,5 +369,5 @@ class AloneWatch:
 
 
 def _key(zone: Zone) -> Key:
-    """Changes with the zone's cells."""
+    """A key that changes with the zone's cells."""
     return zone.area_cells, zone.point_mm

@@ -1,5 +1,5 @@
-"""Frames as they come: with the force at each of their zones, as soon as the readings that belong to a frame are known,
-and with the switches that one contact has closed."""
+"""Frames with the force at each of their zones, once the frame's readings are known, and with the switches that one
+contact has closed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zones
 
 WAIT_US = 20_000
-"""How long a frame waits for the readings after it, in device time."""
+"""Longest wait of a frame for later readings, in device time."""
 
 
 def felt(
@@ -35,11 +35,10 @@ def felt(
     tracks: Tracks | None = None,
     alone: AloneWatch | None = None,
 ) -> Contacts | None:
-    """The force at each zone of a frame, from the units' readings at its moment; None where these are not known (yet),
-    and where a zone leads around the sheet (:attr:`Zone.winding <contactfpga.Zone.winding>`): it pushes as well, at no
-    known place.
+    """The force at each zone of a frame, from the units' readings at its moment; None if these are not known (yet), or
+    if a zone winds around the sheet (:attr:`Zone.winding <contactfpga.Zone.winding>`), whose push has no known place.
 
-    Raises :class:`HapticsError` where the cells have no surface, or are not as many as the board's units.
+    Raises :class:`HapticsError` if the cells have no surface, or differ in number from the board's units.
     """
     if cells.surface is None:
         raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
@@ -50,16 +49,16 @@ def felt(
 
 
 class FrameSource(Protocol):
-    """A board, or what else gives frames in order."""
+    """A board, or another source of frames in order."""
 
     def next(self, timeout: float = 1.0) -> Zones: ...
 
 
 class WithReadings:
-    """The frames of a board in the same order, each once its ``units`` are known: ``for zones in WithReadings(board)``.
+    """The frames of a board in order, each once its ``units`` are known: ``for zones in WithReadings(board)``.
 
-    The sweep after a frame is on its way when the frame comes, so each is late by a sweep or two. A frame whose
-    readings were lost comes without them ``wait_us`` of device time later.
+    Each frame is delayed by a sweep or two. A frame whose readings were lost comes without them ``wait_us`` of device
+    time later.
     """
 
     def __init__(self, source: FrameSource, wait_us: int = WAIT_US):
@@ -68,7 +67,7 @@ class WithReadings:
         self._ended = False
 
     def next(self, timeout: float = 1.0) -> Zones:
-        """The next one. Raises as that of the source; what waits comes first."""
+        """The next frame, waiting ones first. Raises the source's errors."""
         while not (self._waiting and (self._ended or self._due(self._waiting[0]))):
             try:
                 self._waiting.append(self._source.next(timeout))
@@ -94,44 +93,43 @@ class WithReadings:
 Cell = tuple[int, int]
 
 MOST = 3
-"""Switches that closed at once and are looked for."""
+"""Most simultaneous closings that are resolved."""
 
 
 class ClosingWatch:
-    """Takes every frame with its readings, and knows the cells and closings of a single contact, for
+    """Reads every frame with its readings, and knows the cells and closings of a single contact, for
     :meth:`~contactfpga.robot.haptics.Locator.locate`.
 
-    A switch closed between the scans of its row in two frames; the push at that moment is halfway between those of the
-    two. From exact sums it finds one switch that opened or closed, and two or three that closed where one choice
-    with these sums is the most compact; else it says so (:attr:`complete`) until the contact ends. With
-    ``report = "cells"`` it finds all.
+    A switch closed between the scans of its row in two frames; the push at that moment is halfway between theirs. From
+    exact sums it finds one switch that opened or closed, and two or three that closed if one choice with these sums is
+    the most compact; else :attr:`complete` is False until the contact ends. With ``report = "cells"`` it finds all.
     """
 
     def __init__(self, cells: LoadCells):
-        """Raises :class:`HapticsError` where the cells have no surface."""
+        """Raises :class:`HapticsError` if the cells have no surface."""
         if cells.surface is None:
             raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
         self._cells, self._surface = cells, cells.surface
         self._before: Zones | None = None
         self._pushes: dict[Cell, float] = {}
         self.push_n: float | None = None
-        """Push at the last frame; None: it had no readings, or nothing pushed."""
+        """Push at the last frame; None: no readings, or no push."""
         self._push_before: float | None = None
         self.complete = False
-        """All of the contact's cells are known; False before the first frame without a contact, too."""
+        """Whether all of the contact's cells are known; also False before the first frame without a contact."""
 
     @property
     def cells(self) -> list[Cell]:
-        """(row, column) of the switches that are closed."""
+        """(row, column) of the closed switches."""
         return sorted(self._pushes)
 
     @property
     def closings(self) -> list[Closing]:
-        """The closed switches, each with the push in N at which it closed."""
+        """The closed switches, each with the push in N at its closing."""
         return [Closing(*cell, push) for cell, push in sorted(self._pushes.items())]
 
     def take(self, zones: Zones) -> None:
-        """The next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`)."""
+        """Add the next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`)."""
         before, self._before = self._before, zones
         self._push_before, self.push_n = self.push_n, self._push(zones)
         if not zones.pressed:
@@ -181,7 +179,7 @@ class ClosingWatch:
         return fits[0][1] if alone else [], []
 
     def _beside(self, zones: Zones) -> list[Cell]:
-        """Open switches around the contact, or where its barycenter is if none was known."""
+        """Open switches around the contact, or at its barycenter if none was known."""
         rows, columns = zones.sheet.rows, zones.sheet.columns
         area, x, y = (int(number) for number in zones.records.sum(axis=0))
         known = list(self._pushes) or [(round(y / area), round(x / area))]
@@ -195,7 +193,7 @@ class ClosingWatch:
         return sorted(inside - self._pushes.keys())
 
     def _at(self, before: Zones, after: Zones, row: int) -> float | None:
-        """The push in N when the row was scanned: rows are scanned one after the other, from one frame to the next."""
+        """The push in N when the row was scanned, interpolated between frames."""
         if self.push_n is None:
             return None
         if self._push_before is None:
@@ -206,10 +204,10 @@ class ClosingWatch:
 
 
 def _around(sheet: Sheet) -> int | None:
-    """Columns around a closed sheet; None for any other sheet."""
+    """Columns around a closed sheet; None for others."""
     return sheet.columns if sheet.closed else None
 
 
 def _spread(cells: list[Cell], around: int | None) -> float:
-    """How far cells lie apart, in pitches: squares of all distances."""
+    """Spread of cells in pitches: the sum of all squared distances."""
     return sum((r - row) ** 2 + across(c - column, around) ** 2 for r, c in cells for row, column in cells)

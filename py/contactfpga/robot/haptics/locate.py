@@ -1,4 +1,4 @@
-"""Finer than the pitch: where a contact lies, from center of pressure, barycenter, cells and closings, and how sure.
+"""Contact places finer than the pitch, from center of pressure, barycenter, cells and closings, with their uncertainty.
 
 All places are on the sheet laid flat, in m: column 0 at x = 0, row 0 at y = 0.
 """
@@ -24,19 +24,19 @@ from contactfpga.surfaces.shapes import Floats
 from contactfpga.zones.zone import Zones
 
 STEPS, PATCH_STEPS = 512, 240
-"""Entries of the table, of a point and of a patch, which takes longer; between them it is straight."""
+"""Table entries of a point, and of a patch, which needs longer; linear in between."""
 
 LARGEST_N = 1e4
 
 
 class Reach:
-    """The force that closes a switch at a distance, and the distance at which a force still does. Both are tables
-    (:mod:`contactfpga.design.cover` computes them), within 0.01 % of the force.
+    """The force that closes a switch at a distance, and the inverse, as tables (:mod:`contactfpga.design.cover`
+    computes them), within 0.01 % of the force.
 
     Args:
-        cover: foam, switch and, for a patch, what touches.
+        cover: foam, switch and, for a patch, the touching body.
         model: the assumed contact, for instance ``Model("bonded", "point")``.
-        farthest_m: largest distance asked; None: four times the foam's thickness.
+        farthest_m: largest distance; None: four times the foam's thickness.
     """
 
     def __init__(self, cover: sense.PaddedSheet, model: sense.Model, farthest_m: float | None = None):
@@ -61,13 +61,13 @@ class Reach:
         self._roots = forces**0.4
 
     def closing_n(self, distance_m: Floats) -> Floats:
-        """Force in N that closes a switch at each distance; 1e9 where none does."""
+        """Force in N that closes a switch at each distance; 1e9 if none does."""
         distance_m = numbers("distance_m", distance_m, "m")
         roots = np.interp(distance_m * distance_m, self._squares, self._roots)
         return np.where(distance_m > self._distances[-1], 1e9, roots * roots * np.sqrt(roots))
 
     def reach_m(self, force_n: float) -> float:
-        """How far in m the force closes switches; 0 if it does not even close the one below it."""
+        """Distance in m up to which the force closes switches; 0 if not even the one below it."""
         number("force_n", force_n, unit="N")
         return math.sqrt(np.interp(max(0.0, force_n) ** 0.4, self._roots, self._squares, left=0.0))
 
@@ -77,16 +77,16 @@ def _force(found: float | NoSolution) -> float:
 
 
 ROUNDING = 1e-4
-"""Share by which the table of forces may be off."""
+"""Relative error of the table of forces."""
 
 
 CERTAIN = 10.0
-"""Standard deviations beyond a threshold at which nothing is left to chance."""
+"""Standard deviations beyond a threshold that count as certain."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Closing:
-    """A switch that closed, and the push at that instant: the contact lies on the circle of that push's reach."""
+    """A switch that closed, and the push at that instant: the contact is on the circle of that push's reach."""
 
     row: int
     column: int
@@ -98,7 +98,7 @@ class Closing:
 
 @dataclasses.dataclass(frozen=True)
 class Observations:
-    """All that is known of one contact, and what each part of it says about its place."""
+    """The observations of one contact, and their evidence on its place."""
 
     cells: Sequence[tuple[int, int]]
     force_n: float
@@ -134,8 +134,8 @@ class Observations:
         return chance, misfit
 
     def _needed(self, cell: tuple[int, int], x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
-        """The force in N that closes the switch from each place, and its standard deviation, which includes how much
-        the force varies within a step of the grid."""
+        """The force in N that closes the switch from each place, and its standard deviation, including its variation
+        within a grid step."""
         row, column = cell
         distance = np.hypot(x - column * self.pitches_m[0], y - row * self.pitches_m[1])
         needed = self.reach.closing_n(distance)
@@ -164,42 +164,43 @@ class Observations:
 
 
 def _one_side(standing: Floats, chance: Floats, misfit: Floats) -> None:
-    """A switch that is on the right side of its threshold if ``standing``, in standard deviations, is above 0."""
+    """Add the evidence of a switch on the right side of its threshold if ``standing``, in standard deviations, is above
+    0."""
     # The logistic curve is the normal one to 1 %, and needs no scipy.
     chance -= np.logaddexp(0.0, -1.702 * standing)
     misfit += np.minimum(standing, 0.0) ** 2
 
 
 HELPS_FROM = 0.8
-"""Reach over pitch above which the set of consistent places says more than the barycenter."""
+"""Reach over pitch above which the set of consistent places is better than the barycenter."""
 
 DISAGREES = 25.0
-"""Misfit, in squares of noise, of evidence that no place explains; chance exceeds it less than once in ten thousand."""
+"""Misfit, in squares of noise, of contradictory evidence; chance exceeds it less than once in ten thousand."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """Where a contact lies on the sheet laid flat."""
+    """Place of a contact on the sheet laid flat."""
 
     x_m: float
     y_m: float
     radius_m: float
-    """The contact lies within this distance in 95 of 100 cases, if it is as the model of the contact says."""
+    """The contact is within this distance in 95 of 100 cases, if it follows the contact model."""
     covariance_m2: Floats
     method: str
-    """`center of pressure`, `barycenter`, `set` or `closings`; `+ center of pressure` where both count."""
+    """`center of pressure`, `barycenter`, `set` or `closings`; `+ center of pressure` if combined."""
     agrees: bool = True
-    """False where no place explains all that is known under the assumed contact; then the coarser method answers."""
+    """False if no place explains all observations under the assumed contact; then the coarser method answers."""
 
 
 class Locator:
-    """Finds places on one sheet.
+    """Finds contact places on one sheet.
 
     Args:
-        sheet: lines and pitches; ``skin.sheet`` and ``board.hello`` have one.
-        reach: the assumed contact.
-        spread: standard deviation of the switches' thresholds, as a share of them.
-        force_sigma_n: standard deviation of the forces that are given.
+     sheet: lines and pitches; ``skin.sheet`` and ``board.hello`` have one.
+     reach: the assumed contact.
+     spread: relative standard deviation of the switches' thresholds.
+     force_sigma_n: standard deviation of the forces that are given.
     """
 
     def __init__(self, sheet: sheets.Sheet, reach: Reach, spread: float = 0.0, force_sigma_n: float = 0.0):
@@ -221,8 +222,8 @@ class Locator:
         self._sigma = force_sigma_n
 
     def center(self, center: Center, origin_m: tuple[float, float] = (0.0, 0.0)) -> Place:
-        """By the center of pressure alone; ``origin_m``: where column 0 and row 0 lie on the surface laid flat. Raises
-        :class:`HapticsError` where the wrench has no noise."""
+        """The place by the center of pressure alone; ``origin_m``: position of column 0 and row 0 on the surface laid
+        flat. Raises :class:`HapticsError` for a wrench without noise."""
         if center.covariance_m2 is None:
             raise HapticsError("the wrench has no covariance; a place needs one to say how sure it is")
         x, spread = center.sheet_m[0], center.covariance_m2
@@ -234,8 +235,8 @@ class Locator:
         return Place(x, center.sheet_m[1] - origin_m[1], posterior.radius_95(spread), spread, "center of pressure")
 
     def _inside(self, center: Center) -> tuple[float, Floats]:
-        """Arc length on the sheet, which lies under the foam, and the covariance there. Of the turns around the link
-        that one is taken that is nearest to the sheet's middle."""
+        """Arc length on the sheet, under the foam, and the covariance there, on the turn nearest to the sheet's
+        middle."""
         assert self._sheet.radius_mm is not None
         assert center.covariance_m2 is not None
         share = 1e-3 * self._sheet.radius_mm / math.hypot(center.point_m[0], center.point_m[1])
@@ -246,7 +247,7 @@ class Locator:
         return x + around * round((middle - x) / around), scale @ center.covariance_m2 @ scale
 
     def barycenter(self, x_m: float, y_m: float, force_n: float | None = None) -> Place:
-        """By a zone's barycenter. Without force it is as unsure as a barycenter can be."""
+        """The place by a zone's barycenter. Without force it has the largest uncertainty."""
         # What 95 % stay below hangs on the reach alone; it need not be exact to more than 2 % of the pitch.
         if force_n is None:
             radius = posterior.worst_95(self._pitch_x, self._pitch_y)
@@ -265,12 +266,12 @@ class Locator:
         closings: Sequence[Closing] = (),
         center: Place | None = None,
     ) -> Place:
-        """The place of one contact from everything that is known of it; takes some 10 ms.
+        """The place of one contact from all observations; needs some 10 ms.
 
         Args:
             cells: (row, column) of each pressed switch of its zone; the others around it are open.
-            force_n: its push now.
-            closings: which of them closed at which push.
+            force_n: its current push.
+            closings: their closings with pushes.
             center: from :meth:`center`, if this contact is the only one.
         """
         number("force_n", force_n, unit="N")
@@ -289,7 +290,7 @@ class Locator:
         return self._around_sheet(found, cut)
 
     def _around_sheet(self, place: Place, columns: int) -> Place:
-        """The same place, moved around the sheet by this many columns."""
+        """The place moved around the sheet by this many columns."""
         return dataclasses.replace(
             place, x_m=(place.x_m + columns * self._pitch_x) % (self._sheet.columns * self._pitch_x)
         )
@@ -311,8 +312,8 @@ class Locator:
         return _place(found, bool(closings), center is not None)
 
     def _box(self, cells: Sequence[tuple[int, int]], force_n: float, center: Place | None) -> Box:
-        """A box around all places from which these cells can be pressed, with room for the spread of thresholds and the
-        noise of the force."""
+        """A box around all places that can press these cells, with margins for the spread of thresholds and the noise
+        of the force."""
         far = 1.2 * self._reach.reach_m(1.5 * force_n + 5 * self._sigma) + max(self._pitch_x, self._pitch_y)
         rows, columns = zip(*cells)
         left, right = self._pitch_x * max(columns) - far, self._pitch_x * min(columns) + far
@@ -340,9 +341,9 @@ def _cut(taken: set[int], columns: int) -> int:
 
 
 def closed(before: Zones, after: Zones) -> tuple[int, int] | None:
-    """(row, column) of the one switch that closed between two frames, or None where that is not all that happened.
+    """(row, column) of the one switch that closed between two frames, or None if other changes happened.
 
-    Exact sums tell: a cell more changes area, sum of columns and sum of rows by its own. Needs ``report = "moments"``.
+    It follows from exact sums: a new cell adds its own area, column and row. Needs ``report = "moments"``.
     """
     if before.frame.barycenters is not None or after.frame.barycenters is not None:
         raise HapticsError('the board sends barycenters; only `report = "moments"` or "cells" has the exact sums')

@@ -1,8 +1,8 @@
-"""How sure a place is.
+"""Uncertainty of a place.
 
-Where a contact may lie, given what is known of it: a probability on a grid that is made finer where it is not 0. How
-near a barycenter comes to the contact when nothing else is known, and what the set of consistent places gains: a
-contact at a random place closes the switches within its reach; both are computed from all places of a cell.
+A contact's place, given the observations, is a probability on a grid that is refined where it is not 0. Barycenter
+errors without other knowledge, and the gain of the set of consistent places, follow from all places of a cell, at which
+a contact closes the switches within its reach.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ SIDE = 36
 
 LEVELS = 12
 NEGLIGIBLE = 12.0
-"""Of the logarithm of probability, below its largest."""
+"""Distance of the logarithm of probability below its maximum that counts as 0."""
 
 Likelihood = Callable[[Floats, Floats, float], tuple[Floats, Floats]]
-"""Of points x, y and their distance on the grid: logarithm of probability, and how badly the point fits, in squares of
-noise."""
+"""From points x, y and their grid distance: logarithm of probability, and misfit of the point in squares of noise."""
 
 Box = tuple[float, float, float, float]
 """Least x, largest x, least y, largest y in m."""
@@ -40,13 +39,13 @@ class Posterior:
     y_m: float
     covariance_m2: Floats
     radius_m: float
-    """The contact lies this near to the middle in 95 of 100 cases."""
+    """The contact is this near to the middle in 95 of 100 cases."""
     misfit: float
-    """Of the point that fits best, in squares of noise."""
+    """Misfit of the best point, in squares of noise."""
 
 
 def of(evidence: Likelihood, box: Box) -> Posterior:
-    """Mean and spread of the place, from the evidence at the points of a grid over the box; takes at most 12 grids."""
+    """Mean and spread of the place, from the evidence on grids over the box, at most 12."""
     for level in range(LEVELS):
         x, y, steps = _grid(box)
         chance, misfit = evidence(x, y, max(steps))
@@ -117,16 +116,16 @@ class Static:
 
     barycenter_rms: float
     barycenter_95: float
-    """What 95 % of the errors stay below."""
+    """95 % quantile of the errors."""
     set_rms: float
-    """Of the middle of the set of places that close exactly the same switches."""
+    """RMS error of the middle of the set of places that close exactly the same switches."""
     missed: float
     """Share of contacts that close no switch."""
 
 
 @functools.lru_cache(maxsize=256)
 def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: int = FINENESS) -> Static:
-    """Errors at a reach, in the unit in which reach and pitches are given."""
+    """Errors at a reach, in the common unit of reach and pitches."""
     places = (np.arange(fineness) + 0.5) / fineness - 0.5
     x, y = (axis.ravel() for axis in np.meshgrid(places * pitch_x, places * pitch_y))
     columns, rows = (int(np.ceil(reach / pitch + 0.5)) for pitch in (pitch_x, pitch_y))
@@ -147,8 +146,8 @@ def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: i
 
 
 def _of_sets(closed: NDArray[np.bool_], all_x: Floats, all_y: Floats, x: Floats, y: Floats) -> Floats:
-    """Distance of each place to the middle of those that close the same switches, also those across a cell's rim: a
-    pattern is the same wherever it lies, so places are taken from its first switch."""
+    """Distance of each place from the middle of those that close the same switches, also across a cell's rim, as places
+    are relative to the pattern's first switch."""
     first = closed.argmax(axis=0)
     x, y = x - all_x[first], y - all_y[first]
     # Rows of cells are as long everywhere, so a shifted pattern is the same bits from its first one on.
@@ -169,7 +168,7 @@ def _rms(errors: Floats) -> float:
 
 @functools.lru_cache(maxsize=64)
 def worst_95(pitch_x: float, pitch_y: float) -> float:
-    """A bound in the unit of the pitches: at every reach 95 % of a barycenter's errors stay below it."""
+    """A bound, in the unit of the pitches, on the 95 % quantile of barycenter errors at every reach."""
     pitch = max(pitch_x, pitch_y)
     found = [static(pitch * share, pitch_x, pitch_y, 64).barycenter_95 for share in (0.5, 0.6, 0.7, 0.71, 0.8, 1.0)]
     return float(np.nanmax(found))

@@ -1,8 +1,7 @@
-"""How far the middle of a zone's cells lies from what presses them, where the cover is known: by the count of cells and
-the push.
+"""Distance of a zone's barycenter from the pressing body under a known cover, by the number of cells and the push.
 
-The same push closes one switch in the middle of a cell, and two or more between cells. So a zone's size says where in a
-cell the contact may be; how large the differences are hangs on how far the push reaches under this cover.
+The same push closes one switch in the middle of a cell, and several between cells. So a zone's size restricts the place
+within a cell, depending on the push's reach under this cover.
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ import numpy as np
 from contactfpga.design.cover import Ball, Cells, Cover, Ellipse, Load, elastic
 
 RADII_M = (0.005, 0.01, 0.02)
-"""R* of balls that press, equally often: a pencil's end, a fingertip, a thumb."""
+"""R* of pressing balls, equally often: a pencil's end, a fingertip, a thumb."""
 
 SIDE = 6
-"""Places along each side of a quarter of a cell; the other quarters mirror it."""
+"""Places along each side of a quarter cell; the others are symmetric."""
 
 LINES = 9
-"""Of the sheet on which they press, in its middle."""
+"""Rows and columns of the computed sheet, pressed in its middle."""
 
 STEP = 1.25
-"""Between two pushes of the table."""
+"""Ratio of successive pushes in the table."""
 
 
 class Pressed:
@@ -39,8 +38,8 @@ class Pressed:
         self._tables: dict[int, dict[int, float]] = {}
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:
-        """Standard deviation of each coordinate of the place, over all places where a ball that pushes with about this
-        force closes this many switches; None where it closes as many nowhere."""
+        """Standard deviation of each coordinate of the place, over all places where a ball with about this push closes
+        this many switches; None if there is none."""
         if not force_n > 0:
             return None
         step = round(math.log(force_n) / math.log(STEP))
@@ -49,7 +48,7 @@ class Pressed:
         return self._tables[step].get(cells)
 
     def _table(self, force_n: float) -> dict[int, float]:
-        """By the count of closed switches."""
+        """Standard deviation by the number of closed switches."""
         squares: dict[int, list[float]] = {}
         for ball in self._balls:
             radius = ball.patch_m(force_n)

@@ -1,5 +1,4 @@
-"""Arrangements of units under a bumper, and how good each is for a link, judged by the contacts it has to find; and a
-picture of them.
+"""Arrangements of units under a bumper, rated for a link by the contacts it must find; and a picture.
 
 Not by the matrix's condition number, which depends on the origin and on the unit of length.
 """
@@ -42,18 +41,18 @@ def _unit(radius_m: float, degrees: float, z_m: float, tilt: float, sign: float)
 
 
 def hexapod(radius_m: float, tilt: float, z_m: float = 0.0) -> LoadCells:
-    """Six units on a ring about z, one every 60 degrees. Each is tilted by ``tilt`` rad from the ring toward z,
-    in turn to one side and to the other."""
+    """Six units on a ring about z, 60 degrees apart, tilted by ``tilt`` rad from the ring toward z, alternately to
+    either side."""
     return LoadCells([_unit(radius_m, 60 * i, z_m, tilt, (-1) ** i) for i in range(6)])
 
 
 def two_rings(radius_m: float, tilt: float, low_m: float, high_m: float) -> LoadCells:
-    """The same six units, those tilted to one side on a ring at ``low_m``, the others on one at ``high_m``."""
+    """Six units like :func:`hexapod`, those tilted to one side on a ring at ``low_m``, the others at ``high_m``."""
     return LoadCells([_unit(radius_m, 60 * i, high_m if i % 2 else low_m, tilt, (-1) ** i) for i in range(6)])
 
 
 def tripod(radius_m: float, z_m: float = 0.0) -> LoadCells:
-    """Three units along z at 90, 210 and 330 degrees: the force on a plane, and where it acts, but no friction."""
+    """Three units along z at 90, 210 and 330 degrees: the force on a plane, and its place, but no friction."""
     return LoadCells([_unit(radius_m, 90 + 120 * i, z_m, math.pi / 2, 1) for i in range(3)])
 
 
@@ -62,7 +61,7 @@ TILTS = tuple(range(30, 80, 5))
 
 
 def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[UnitLayout]:
-    """Arrangements on rings of this radius, in m, in a cylinder that is touched from z = ``low_m`` to ``high_m``."""
+    """Arrangements on rings of this radius in m, in a cylinder touched from z = ``low_m`` to ``high_m``."""
     middle, quarter = (low_m + high_m) / 2, (high_m - low_m) / 4
     found = []
     for degrees in TILTS:
@@ -80,7 +79,7 @@ def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[UnitLayout
 
 
 def on_plane(radius_m: float, height_m: float) -> list[UnitLayout]:
-    """Arrangements on a ring of this radius, in m, under a flat bumper whose outside is at z = ``height_m``."""
+    """Arrangements on a ring of this radius in m, under a flat bumper whose outside is at z = ``height_m``."""
     tilts = [UnitLayout(f"hexapod, {degrees} degrees", hexapod(radius_m, math.radians(degrees))) for degrees in TILTS]
     return [UnitLayout("3 on a plane", tripod(radius_m)), *tilts]
 
@@ -88,29 +87,29 @@ def on_plane(radius_m: float, height_m: float) -> list[UnitLayout]:
 AROUND = 24
 """Places around a cylinder."""
 ALONG = 9
-"""Places along it, and along each side of a plane."""
+"""Places along a cylinder, and along each side of a plane."""
 SLANTS = 12
 """Directions of friction."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Requirements:
-    """A link's surface and the loads that it must bear."""
+    """A link's surface and its required loads."""
 
     surface: Surface
     size_m: tuple[float, float]
-    """Touched part: of a cylinder from z = the first to the second; of a plane its width and depth about z's axis."""
+    """Touched part: z range of a cylinder; width and depth of a plane about z's axis."""
     force_n: float = 30.0
-    """Largest push; the units are chosen to bear it, with friction, anywhere."""
+    """Largest push, with friction, anywhere; the units are chosen to bear it."""
     friction: float = 0.5
     noise: float = 0.001
-    """Standard deviation of a unit, as a share of what it must bear."""
+    """Standard deviation of a unit, as a share of its required load."""
     at_n: float = 12.0
-    """Push at which errors are stated."""
+    """Push for the stated errors."""
     mass_kg: float = 0.0
-    """Of the bumper."""
+    """Mass of the bumper."""
     acceleration_sigma_m_s2: float = 0.1
-    """How well gravity and motion are known when the bumper's weight is taken out, in any pose."""
+    """Uncertainty of gravity and motion when the bumper's weight is subtracted, in any pose."""
 
     def __post_init__(self) -> None:
         positive("force_n", self.force_n, "N")
@@ -128,7 +127,7 @@ class Requirements:
             positive("depth", second, "m")
 
     def places(self) -> list[tuple[Vector, Vector]]:
-        """Points in m, and unit normals, at which contacts are tried."""
+        """Points in m, and unit normals, of the tried contacts."""
         first, second = self.size_m
         if isinstance(self.surface, Cylinder):
             round_m = 2 * math.pi * self.surface.radius_m
@@ -140,7 +139,7 @@ class Requirements:
 
     @functools.cached_property
     def slopes(self) -> Floats:
-        """(n, 2, 6): how the center of pressure of the stated push changes with the wrench, by place."""
+        """(n, 2, 6): derivative of the center of pressure by the wrench at the stated push, by place."""
         found = []
         for point, normal in self.places():
             fx, fy, fz = (-self.at_n * one for one in normal)
@@ -153,7 +152,7 @@ class Requirements:
 
     @property
     def middle_m(self) -> Vector:
-        """The bumper's center of mass is taken to be here."""
+        """Assumed center of mass of the bumper."""
         if isinstance(self.surface, Cylinder):
             return (0.0, 0.0, sum(self.size_m) / 2)
         return (0.0, 0.0, self.surface.height_m)
@@ -161,11 +160,11 @@ class Requirements:
 
 @dataclasses.dataclass(frozen=True)
 class Rating:
-    """Figures of an arrangement, each for the worst place unless it says otherwise."""
+    """Figures of an arrangement, for the worst place unless stated otherwise."""
 
     layout: UnitLayout
     bears_n: float
-    """What a single unit must bear."""
+    """Required load of a single unit."""
     sigma_n: float
     """Noise of such a unit."""
     place_m: float
@@ -173,15 +172,16 @@ class Rating:
     force_n: float
     """Standard deviation of the force at a known place."""
     seen_n: float
-    """Smallest force that is told from none, in any direction that friction allows."""
+    """Smallest detectable force in any direction that friction allows."""
     seen: Floats
-    """(places, directions): the same by place, and by direction: straight, then with friction all around."""
+    """(places, directions): smallest detectable force by place and direction: straight, then with friction all
+    around."""
     errors_m: Floats
     """``place_m`` by place."""
 
 
 def compared(needs: Requirements, radius_m: float) -> list[Rating]:
-    """Every arrangement on rings of this radius that can bear the loads, best place first."""
+    """All arrangements on rings of this radius that bear the loads, best place first."""
     positive("the ring's radius", radius_m, "m")
     if isinstance(needs.surface, Cylinder):
         layouts = on_cylinder(radius_m, *needs.size_m)
@@ -192,7 +192,7 @@ def compared(needs: Requirements, radius_m: float) -> list[Rating]:
 
 
 def rate(needs: Requirements, layout: UnitLayout) -> Rating | None:
-    """The rating of an arrangement; None where the units cannot hold the loads."""
+    """The rating of an arrangement; None if the units cannot hold the loads."""
     cells = layout.cells
     sees_friction = cells.rank == 6
     places = needs.places()
@@ -210,7 +210,7 @@ def rate(needs: Requirements, layout: UnitLayout) -> Rating | None:
 
 
 def _weight(needs: Requirements, sees_friction: bool) -> Floats:
-    """(6, 6): what is not known of the bumper's weight."""
+    """(6, 6): covariance of the bumper's weight."""
     carried = np.concatenate([np.eye(3), skew(needs.middle_m)])
     spread = (needs.mass_kg * needs.acceleration_sigma_m_s2) ** 2 * carried @ carried.T
     if not sees_friction:  # guides take what units along z do not
@@ -250,7 +250,7 @@ def _force_n(noise: Noise, places: list[tuple[Vector, Vector]], sees_friction: b
 
 
 def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
-    """Draw the best arrangement, the smallest force it sees everywhere, and all others beside it; needs matplotlib. The
+    """Draw the best arrangement, its smallest detectable force everywhere, and all others beside it, by matplotlib. The
     same input gives the same file."""
     import matplotlib
 
@@ -267,7 +267,7 @@ def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
 
 
 def _draw_units(place: Axes, needs: Requirements, rating: Rating) -> None:
-    """Where the units stand, and how each pushes."""
+    """Draw the units and their axes."""
     length = 0.35 * max(float(np.ptp([unit.point_m for unit in rating.layout.cells.units], axis=0).max()), 0.02)
     points = np.array([point for point, _ in needs.places()])
     place.plot(*(1e3 * points.T), ".", ms=2, color=style.PRESSED)
@@ -296,7 +296,7 @@ def _draw_map(figure: Figure, place: Axes, needs: Requirements, values: Floats, 
 
 
 def _draw_seen(figure: Figure, place: Axes, needs: Requirements, seen: Floats) -> None:
-    """By place; around a cylinder that makes no difference, so there by direction instead."""
+    """Draw detectable forces by place; around a cylinder, where the place is irrelevant, by direction."""
     first, second = needs.size_m
     if not isinstance(needs.surface, Cylinder) or seen.shape[1] == 1:
         _draw_map(figure, place, needs, seen.max(axis=1), "smallest force seen, N")

@@ -1,9 +1,9 @@
-"""From a wrench and touched places to contacts, by the simplest model that suffices.
+"""From a wrench and touched places to contacts, by the simplest sufficient model.
 
-One contact is solved in closed form, two with the exact interval of each push: the range of squeezes that friction's
-cones allow. In plain Python, for numpy takes several times as long for a few numbers. Both correct the wrench to the
-nearest one that contacts at these places can exert: a force has no moment about its point, two have none about the line
-through both. What is corrected away, over its variance, is chi-square.
+One contact has a closed form, two the exact interval of each push: the range of squeezes within friction's cones. Both
+are plain Python, faster than numpy for a few numbers. Both correct the wrench to the nearest that contacts at these
+places can exert: a force has no moment about its point, two have none about their line. The correction over its
+variance is chi-square.
 """
 
 from __future__ import annotations
@@ -53,19 +53,18 @@ def contacts(
 ) -> Contacts:
     """The force at each zone, or at each place in a list of :class:`Touch`.
 
-    One contact: a closed form. Two: the same, with the exact interval of each push. More: pushes along the normals if
-    they suffice, else forces in pyramids within friction's cones, by non-negative least squares (extra `haptics`). With
-    ``cones`` friction's cones themselves, by Clarabel. Where units do not see all six components of the wrench, or
-    friction is 0, pushes along the normals. Where there is no zone, the center of pressure on ``surface``. No contact
-    ever pulls.
+    One contact: a closed form. Two: also the exact interval of each push. More: pushes along the normals if sufficient,
+    else forces in pyramids within friction's cones, by non-negative least squares (extra `haptics`); with ``cones``, in
+    the cones themselves, by Clarabel. If units do not see all six components of the wrench, or friction is 0: pushes
+    along the normals. Without a zone: the center of pressure on ``surface``. No contact ever pulls.
 
     Args:
-        surface: the bumper's outside, on which zones are placed.
+        surface: the bumper's outside, for the zones' places.
         friction: of zones; a :class:`Touch` has its own.
-        sheet_m: where column 0 and row 0 lie on the surface laid flat.
-        link: name of the link; by default that of the wrench's frame.
+        sheet_m: position of column 0 and row 0 on the surface laid flat.
+        link: name of the link; default: the wrench's frame.
         tracks: of the same zones, for :attr:`Contact.track`.
-        alone: knows places of contacts from the time when they were alone; it has taken this frame.
+        alone: places of contacts from when they were alone; it has already read this frame.
     """
     if isinstance(zones, Zones):
         touches: Sequence[Touch] = touched(zones, surface, friction, sheet_m)
@@ -108,8 +107,8 @@ def _nothing(wrench: Wrench) -> Solution:
 def touched(
     zones: Zones, surface: Surface | None, friction: float = 0.5, sheet_m: tuple[float, float] = (0.0, 0.0)
 ) -> list[Touch]:
-    """The zones as places on the bumper's outside. A barycenter is taken to be off by no more than chance within a
-    cell, a pitch over the root of 12; :class:`~contactfpga.robot.haptics.Locator` knows better."""
+    """The zones as places on the bumper's outside. A barycenter's error is that of chance within a cell, a pitch over
+    the root of 12; :class:`~contactfpga.robot.haptics.Locator` is more precise."""
     if surface is None:
         raise HapticsError("surface is missing; contacts() needs the bumper's outside to place zones on it")
     pitch_mm = math.hypot(zones.sheet.pitch_x_mm, zones.sheet.pitch_y_mm) / math.sqrt(2)
@@ -131,13 +130,13 @@ def touched(
 
 
 ROUNDING = 1e-9
-"""Share of a force that is rounding."""
+"""Share of a force that counts as rounding."""
 
 NONE: Vector = (0.0, 0.0, 0.0)
 
 
 def _one(wrench: Wrench, touch: Touch) -> Solution:
-    """The force at one contact: generalized least squares. Friction is not needed to find it."""
+    """The force at one contact by generalized least squares, without friction."""
     force, chi2 = _at_point(wrench, touch)
     push = -dot(touch.normal, force)
     sideways = math.sqrt(max(0.0, dot(force, force) - push * push))
@@ -148,10 +147,10 @@ def _one(wrench: Wrench, touch: Touch) -> Solution:
 
 
 def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
-    """The forces at two contacts: all but a squeeze along the line that joins them is known, and friction bounds that.
+    """The forces at two contacts: all but a squeeze along their line is determined, and friction bounds that.
 
-    Of what friction allows it takes the forces with the smallest parts along the surface, and where these hang on no
-    squeeze the smallest one.
+    Of the allowed forces it takes those with the smallest parts along the surface, and if these do not depend on the
+    squeeze, the smallest squeeze.
     """
     first, second = touches
     (ax, ay, az), (bx, by, bz) = first.point_m, second.point_m
@@ -172,7 +171,7 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
 
 
 def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
-    """The force, and chi-square of the moment about the point, which should be 0."""
+    """The force, and chi-square of the moment about the point, ideally 0."""
     force, point = wrench.force_n, touch.point_m
     if wrench.noise is None:
         return force, None
@@ -199,7 +198,7 @@ def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
 def _about_line(
     wrench: Wrench, touches: Sequence[Touch], along: Vector, length: float
 ) -> tuple[Vector, Vector, float | None]:
-    """Both forces without any squeeze, and chi-square of the moment about their line, which should be 0."""
+    """Both forces without squeeze, and chi-square of the moment about their line, ideally 0."""
     force, moment = wrench.force_n, wrench.moment_nm
     (ax, ay, az), (bx, by, bz) = touches[0].point_m, touches[1].point_m
     middle = ((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2)
@@ -226,7 +225,7 @@ def _about_line(
 
 
 def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> tuple[Vector, Vector]:
-    """Two forces without squeeze: half of the sum each, and what turns about the middle."""
+    """Two forces without squeeze: half of the sum each, plus a couple about the middle."""
     exerted = cross(middle, force)
     couple = cross((moment[0] - exerted[0], moment[1] - exerted[1], moment[2] - exerted[2]), along)
     x, y, z = couple[0] / length, couple[1] / length, couple[2] / length
@@ -235,7 +234,7 @@ def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length:
 
 
 def _widen(spread: list[list[float]], sigma: float, force: Vector) -> None:
-    """What an uncertain point does to the moment about it: sigma^2 (|f|^2 - f f^T)."""
+    """Add the effect of an uncertain point on the moment about it: sigma^2 (|f|^2 - f f^T)."""
     square = dot(force, force)
     for row in range(3):
         spread[row][row] += sigma * sigma * square
@@ -244,7 +243,7 @@ def _widen(spread: list[list[float]], sigma: float, force: Vector) -> None:
 
 
 def _best_alone(wrench: Wrench, touches: Sequence[Touch], along: Vector) -> Solution:
-    """Where two contacts would have to pull: the one of them that alone comes nearer to the wrench."""
+    """If two contacts would have to pull: the one that alone fits the wrench better."""
     alone = [_one(wrench, touch) for touch in touches]
     scores = [_misfit(each, touch) for each, touch in zip(alone, touches)]
     best = 0 if scores[0] <= scores[1] else 1
@@ -256,7 +255,7 @@ def _best_alone(wrench: Wrench, touches: Sequence[Touch], along: Vector) -> Solu
 
 
 def _misfit(found: Solution, touch: Touch) -> tuple[bool, float]:
-    """Order of preference among contacts that are alone: those that push, those that explain most."""
+    """Sort key of single contacts: those that push, then the best fit."""
     rest = found.residual
     about = np.array(rest[3:]) - np.cross(touch.point_m, rest[:3])
     return found.forces_n[0] == NONE, found.chi2 if found.chi2 is not None else float(about @ about)
@@ -271,7 +270,7 @@ def _solution(
     chi2: float | None,
     beyond: bool,
 ) -> Solution:
-    """``chi2``: None where the forces are not the best ones without friction; then it is computed from the residual."""
+    """A solution; ``chi2`` None, for forces that are not the best without friction, is computed from the residual."""
     half = math.sqrt(0.5)
     null = [] if along is None else [[half * one for one in along] + [-half * one for one in along]]
     rank = 3 if along is None else 5
@@ -315,7 +314,7 @@ def _less(first: Vector, second: Vector) -> Vector:
 
 
 Range = tuple[float, float]
-"""Of the squeeze in N; its ends may be infinite."""
+"""Range of the squeeze in N, possibly infinite."""
 
 
 @dataclasses.dataclass(slots=True)
@@ -326,7 +325,7 @@ class _Line:
     along: Vector
     normal: Vector
     push: float = 0.0
-    """At no squeeze."""
+    """Push without squeeze."""
     more: float = 0.0
     """Push per newton of squeeze."""
 
@@ -334,7 +333,7 @@ class _Line:
         self.push, self.more = -dot(self.normal, self.start), -dot(self.normal, self.along)
 
     def force(self, squeeze: float) -> Vector:
-        """At this squeeze."""
+        """Force at this squeeze."""
         (x, y, z), (ax, ay, az) = self.start, self.along
         return x + squeeze * ax, y + squeeze * ay, z + squeeze * az
 
@@ -349,14 +348,14 @@ class _Line:
         return max(0.0, least), None if largest == math.inf else max(0.0, largest)
 
     def pushing(self) -> Range | None:
-        """Squeezes at which the contact does not pull."""
+        """Squeezes without pull."""
         if abs(self.more) <= ROUNDING:
             return (-math.inf, math.inf) if self.push >= 0 else None
         start = -self.push / self.more
         return (start, math.inf) if self.more > 0 else (-math.inf, start)
 
     def within(self, friction: float) -> Range | None:
-        """Squeezes at which the force lies in friction's cone: |f|^2 <= (1 + mu^2) push^2, a quadratic."""
+        """Squeezes with the force in friction's cone: |f|^2 <= (1 + mu^2) push^2, a quadratic."""
         wide = 1 + friction * friction
         square = 1 - wide * self.more * self.more
         slope = dot(self.start, self.along) - wide * self.push * self.more
@@ -377,7 +376,7 @@ class _Line:
 
 
 def _below(slope: float, level: float) -> Range | None:
-    """Where slope t + level <= 0."""
+    """Range of t with slope t + level <= 0."""
     if abs(slope) <= ROUNDING:
         return (-math.inf, math.inf) if level <= ROUNDING else None
     end = -level / slope
@@ -385,7 +384,7 @@ def _below(slope: float, level: float) -> Range | None:
 
 
 def both(first: Range | None, second: Range | None) -> Range | None:
-    """What lies in both ranges; a gap of rounding between them counts as a common point."""
+    """The common part of two ranges; a gap of rounding counts as a common point."""
     if first is None or second is None:
         return None
     low, high = max(first[0], second[0]), min(first[1], second[1])
@@ -397,7 +396,7 @@ def both(first: Range | None, second: Range | None) -> Range | None:
 
 
 def least_sideways(lines: Sequence[_Line], allowed: Range) -> float:
-    """The squeeze with the smallest squares of the parts along the surface; where it changes none, the smallest."""
+    """The squeeze with the smallest squared parts along the surface; if these are constant, the smallest squeeze."""
     curve = slope = 0.0
     for line in lines:
         curve += 1 - line.more * line.more

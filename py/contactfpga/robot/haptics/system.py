@@ -1,7 +1,7 @@
-"""The linear system of one frame: forces at known places, and the wrench that they exert, weighted by its noise; solved
-for any number of contacts by non-negative least squares (scipy, from three on) or in friction's cones (Clarabel).
+"""The linear system of one frame: forces at known places, and their wrench, weighted by its noise; solved for any
+number of contacts by non-negative least squares (scipy, from three on) or in friction's cones (Clarabel).
 
-Both solvers are loaded where they are needed.
+Both solvers are loaded on demand.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from contactfpga.robot.haptics.wrench import ALARM, Wrench
 from contactfpga.surfaces.shapes import Floats, Vector, vector
 
 SAME_M = 1e-9
-"""Points nearer to each other than this are one."""
+"""Distance below which points are identical."""
 
 
 class System:
-    """A wrench, where it is exerted, and how its parts are weighed.
+    """A wrench, its points, and the weight of its components.
 
     Without noise a newton counts as much as a newton times the contacts' mean distance, about their barycenter: then
-    the answer hangs neither on the frame nor on the unit of length.
+    the answer does not depend on the frame or the unit of length.
     """
 
     def __init__(self, wrench: Wrench, touches: Sequence[Touch]):
@@ -54,7 +54,7 @@ class System:
 
     @functools.cached_property
     def root(self) -> Floats:
-        """Root of the weight: its transpose times the root is the weight."""
+        """A root of the weight: its transpose times itself."""
         return np.sqrt(self.weight) if self.noise is None else self.noise.root
 
     def matrix(self) -> Floats:
@@ -79,7 +79,7 @@ class System:
 
     @functools.cached_property
     def length_m(self) -> float:
-        """The contacts' mean distance from their barycenter, or 1 where they are one."""
+        """The contacts' mean distance from their barycenter, or 1 if they coincide."""
         points = np.array(self.points)
         length = math.sqrt(((points - points.mean(axis=0)) ** 2).sum() / len(points))
         return length if length > SAME_M else 1.0
@@ -93,7 +93,7 @@ class System:
         return moved
 
     def places_widen(self, forces: Floats) -> bool:
-        """Add to the noise what the contacts' uncertain places do to the moments; False where places are certain."""
+        """Add the effect of uncertain places on the moments to the noise; False if places are certain."""
         if self.noise is None or not any(touch.point_sigma_m for touch in self.touches):
             return False
         more = np.zeros((3, 3))
@@ -115,12 +115,12 @@ class System:
         return None if self.noise is None else float(rest @ self.weight @ rest)
 
     def freedom(self, rank: int) -> int:
-        """How many components of the wrench are left to check forces of this rank."""
+        """Components of the wrench left to check forces of this rank."""
         return max(0, (6 if self.noise is None else self.noise.rank) - rank)
 
 
 def distinct(touches: Sequence[Touch]) -> None:
-    """Raises :class:`HapticsError` where two touches lie at one place: nothing tells their forces apart."""
+    """Raises :class:`HapticsError` if two touches are at one place: their forces are indistinguishable."""
     for last, one in enumerate(touches):
         for first in range(last):
             if math.dist(one.point_m, touches[first].point_m) < SAME_M:
@@ -128,14 +128,14 @@ def distinct(touches: Sequence[Touch]) -> None:
 
 
 EDGES = 12
-"""Of the pyramid that stands for friction's cone, inside of it."""
+"""Edges of the inscribed pyramid for friction's cone."""
 
 SMALL = 1e-6
-"""Share of the wrench that pushes alone may leave over where no noise is known."""
+"""Share of the wrench that pushes alone may leave unexplained without known noise."""
 
 
 def along_normals(system: System) -> Solution:
-    """Only pushes along the normals, for contacts without friction and for units that do not see it."""
+    """Pushes along the normals, for contacts without friction and units that do not see it."""
     found = _along_normals(system)
     if system.places_widen(np.ravel(found)):
         found = _along_normals(system)
@@ -154,7 +154,7 @@ def by_least_squares(system: System) -> Solution:
 
 
 def _beyond(system: System, forces: Sequence[Vector]) -> bool:
-    """Whether these forces, the best within friction's cones, exert the wrench worse than others at these places."""
+    """Whether these forces, the best within friction's cones, fit the wrench worse than unrestricted ones."""
     matrix = system.root @ system.matrix()
     rest = system.root @ system.wrench - matrix @ np.ravel(forces)
     more = matrix @ np.linalg.lstsq(matrix, rest, rcond=confidence.KNOWN)[0]
@@ -162,8 +162,8 @@ def _beyond(system: System, forces: Sequence[Vector]) -> bool:
 
 
 def within_cones(system: System) -> Solution:
-    """The forces within friction's cones that come nearest to the wrench. Raises
-    :class:`~contactfpga.MissingExtra` without Clarabel."""
+    """The forces within friction's cones nearest to the wrench. Raises :class:`~contactfpga.MissingExtra` without
+    Clarabel."""
     forces = _nearest(system)
     if system.places_widen(forces):
         forces = _nearest(system)
@@ -185,7 +185,7 @@ def _along_normals(system: System) -> list[Vector]:
 
 
 def _few(matrix: Floats, system: System) -> list[float]:
-    """The best one or two amounts, none below 0."""
+    """The best one or two nonnegative amounts."""
     weighted = matrix.T @ system.weight
     gram, wanted = (weighted @ matrix).tolist(), (weighted @ system.wrench).tolist()
     alone = [max(0.0, want / gram[at][at]) if gram[at][at] > 0 else 0.0 for at, want in enumerate(wanted)]
@@ -279,13 +279,13 @@ def _rank(system: System, matrix: Floats) -> int:
 
 
 DETERMINED = 1e-9
-"""A push that the null space changes by no more than this share is known."""
+"""Share of a push within which the null space may change it if it counts as known."""
 
 SMALLEST = 1e-7
 """Weight of the forces' own size against the wrench."""
 
 TOLERANCE = 1e-10
-"""Of Clarabel's answers, as a share."""
+"""Relative tolerance of Clarabel."""
 
 
 def _frame(normal: Vector) -> Floats:
@@ -299,11 +299,11 @@ def _frame(normal: Vector) -> Floats:
 
 
 def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, beyond: bool) -> list[Interval]:
-    """The least and largest push in N of each contact, which also hold the pushes of ``forces``: with noise 95 % of it
-    (:mod:`contactfpga.robot.haptics.confidence`), without it all that exert exactly the same wrench.
+    """The least and largest push in N of each contact, containing those of ``forces``: with noise at 95 %
+    (:mod:`contactfpga.robot.haptics.confidence`), without it over all forces that exert exactly the same wrench.
 
     Args:
-        frictionless: all forces lie along the normals.
+        frictionless: all forces are along the normals.
         beyond: ``forces`` do not exert the wrench. With noise friction then bounds nothing.
     """
     if system.noise is None:
@@ -321,7 +321,7 @@ def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, b
 
 
 def _fitted(fit: confidence.Fit) -> list[Interval]:
-    """The solver of numpy's takes the more time the more contacts there are, and is for two at most."""
+    """Intervals of a fit; the numpy solver slows with contacts, and is for two at most."""
     return fit.intervals() if fit.contacts <= 2 else fit.intervals(_ends_of_many)
 
 
@@ -344,8 +344,8 @@ def _frictions(touches: Sequence[Touch], frictionless: bool) -> list[float]:
 
 
 def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
-    """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
-    ``forces``, which lie in them, and so in the interval. None: no largest one."""
+    """The least and largest push in N of each contact, over all forces in the cones with the wrench of ``forces``,
+    which are in them. None: unbounded."""
     basis, firsts = _basis(system.touches, frictionless)
     _, values, right = np.linalg.svd(system.centered(system.matrix() @ basis))
     rank = int((values > 1e-9 * values[0]).sum())
@@ -367,7 +367,7 @@ def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list
 
 
 def _nearest(system: System) -> Floats:
-    """The forces (3k,) in N in the cones that exert the nearest wrench; if several do, the smallest of them."""
+    """The smallest forces (3k,) in N in the cones that exert the nearest wrench."""
     basis, firsts = _basis(system.touches, False)
     matrix = system.root @ system.matrix() @ basis
     square = matrix.T @ matrix
@@ -383,7 +383,7 @@ def _nearest(system: System) -> Floats:
 
 
 def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[int]]:
-    """(3k, n): axes of the forces that are looked for, and which of the n are pushes."""
+    """(3k, n): axes of the unknown forces, and which of the n are pushes."""
     blocks = [_frame(touch.normal)[:, : 1 if frictionless or not touch.friction else 3] for touch in touches]
     widths = [block.shape[1] for block in blocks]
     basis = np.zeros((3 * len(touches), sum(widths)))
@@ -394,12 +394,12 @@ def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[i
 
 
 class _Solver:
-    """start + y in all cones, where fixed y = 0. So few of its numbers are not 0 that 64 contacts take no longer each
-    than three do; with the null space of ``fixed`` in place of it they take 50 times as long.
+    """start + y in all cones, with fixed y = 0. The problem is so sparse that 64 contacts need no longer each than
+    three; with the null space of ``fixed`` they need 50 times as long.
 
     Args:
         frictions: of each contact; 0: a push alone.
-        near: a matrix, what it times y should be, and by how much it may be off.
+        near: a matrix, its wanted product with y, and the tolerance.
     """
 
     def __init__(
@@ -431,7 +431,7 @@ class _Solver:
         self._start = np.concatenate(starts)
 
     def least(self, at: int, factor: float) -> float | None:
-        """The least of ``factor`` times this one of y; None where there is none."""
+        """The minimum of ``factor`` times this component of y; None if unbounded."""
         count = self._sides.shape[1]
         slope = np.zeros(count)
         slope[at] = factor
@@ -444,7 +444,7 @@ class _Solver:
         return float(solution.obj_val)
 
     def solve(self, square: Floats, slope: Floats) -> Floats:
-        """The y with the least of y square y / 2 + slope y."""
+        """The y that minimizes y square y / 2 + slope y."""
         solution = self._run(self._sparse.csc_matrix(np.triu(square)), slope)
         if "Solved" not in str(solution.status):
             raise HapticsError(f"no forces within friction's cones were found ({solution.status})")

@@ -1,4 +1,4 @@
-"""The pressure units that carry the bumper: readings to a wrench, what they cannot see, and the file units.toml."""
+"""The pressure units under the bumper: readings to a wrench, unseen components, and the file units.toml."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ from contactfpga.surfaces.shapes import Floats, Vector
 
 @dataclasses.dataclass(frozen=True)
 class Unit:
-    """One unit. It pushes the bumper along its axis, and reads how hard."""
+    """A unit, which pushes the bumper along its axis, and measures the force."""
 
     point_m: Vector
     axis: Vector
-    """Unit vector."""
+    """Unit vector of its axis."""
     gain_n: float = 1.0
     """Newtons per step of its reading."""
     zero: float = 0.0
-    """Its reading while nothing touches."""
+    """Its reading without touch."""
     sigma_n: float = 0.05
     """Standard deviation of its noise."""
     range: tuple[float, float] | None = None
-    """Readings at its ends: a unit that reads one of them is saturated. None: it has none."""
+    """Saturated readings at its ends; None: none."""
     preload_n: float | None = None
-    """What a spring presses it with while nothing touches. None: not known, and whether it lifts is not told."""
+    """Spring force on it without touch. None: unknown, and lifting is not reported."""
 
     def __post_init__(self) -> None:
         within("point_m", self.point_m, "m")
@@ -74,17 +74,17 @@ class LoadCells:
         sheet_m: tuple[float, float] = (0.0, 0.0),
         noise_n2: Floats | None = None,
     ):
-        """Raises :class:`HapticsError` where there is no unit, or ``noise_n2`` is no covariance.
+        """Raises :class:`HapticsError` without a unit, or if ``noise_n2`` is no covariance.
 
         Args:
-            frame: name of the link's frame.
-            bumper: the mass on the units; None: it weighs nothing.
-            zero_gravity_m_s2: which way things fell when the zeros were read, in the link's frame; 0: without bumper.
-            matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
-            surface: the bumper's outside.
-            sheet_m: where column 0 and row 0 of the sheet lie on the surface laid flat.
-            noise_n2: (n, n) covariance of the units' noise in N2, for units that share a supply or a reference; None:
-                independent, by each unit's ``sigma_n``, which it replaces.
+         frame: name of the link's frame.
+         bumper: the mass on the units; None: it weighs nothing.
+         zero_gravity_m_s2: gravity when the zeros were read, in the link's frame; 0: without bumper.
+         matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
+         surface: the bumper's outside.
+         sheet_m: position of column 0 and row 0 of the sheet on the surface laid flat.
+         noise_n2: (n, n) covariance of the units' noise in N2, for units that share a supply or a reference; None:
+         independent, by each unit's ``sigma_n``, which it replaces.
         """
         if not units:
             raise HapticsError("there is no unit; give at least one")
@@ -98,7 +98,7 @@ class LoadCells:
         axes = np.array([unit.axis for unit in self.units], float)
         places = np.array([unit.point_m for unit in self.units], float)
         self.geometry: Floats = np.concatenate([axes.T, np.cross(places, axes).T])
-        """(6, n): what each unit exerts on the bumper per newton; about the link's origin."""
+        """(6, n): wrench of each unit on the bumper per newton, about the link's origin."""
         self._gains = np.array([unit.gain_n for unit in self.units])
         self.noise_n2 = None if noise_n2 is None else covariance("noise_n2", noise_n2, len(self.units))
         if self.noise_n2 is not None:
@@ -106,7 +106,7 @@ class LoadCells:
             self.units = tuple(dataclasses.replace(unit, sigma_n=sigma) for unit, sigma in zip(self.units, sigmas))
         # Units act on the bumper and contacts oppose them: this is the one place of that sign.
         self.matrix: Floats = -self.geometry * self._gains if matrix is None else np.asarray(matrix, float)
-        """(6, n): what contacts exert on the link per step of each reading."""
+        """(6, n): wrench of the contacts on the link per step of each reading."""
         self.zeros: Floats = np.array([unit.zero for unit in self.units])
         self.noise = Noise(self._spread())
         self._weight = None if bumper is None else bumper.wrench(Motion(zero_gravity_m_s2))
@@ -130,8 +130,8 @@ class LoadCells:
         return cls(**load(path))
 
     def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
-        """What the contacts exert on the link, from one reading per unit. With ``motion`` the bumper's weight and
-        inertia are taken out; without, it has to be at rest as when its zeros were read."""
+        """The contacts' wrench on the link, from one reading per unit. With ``motion`` the bumper's weight and inertia
+        are subtracted; without, it must be at rest as when its zeros were read."""
         read = array("readings", readings)
         if read.shape != self.zeros.shape:
             raise HapticsError(
@@ -186,13 +186,13 @@ class LoadCells:
 
     @property
     def rank(self) -> int:
-        """Independent components of a wrench that the units see; 6 are all."""
+        """Independent components of a wrench that the units see; 6 are complete."""
         return self._seen[1]
 
     @property
     def unseen(self) -> Floats:
-        """What no unit reads, (6 - rank, 6): the inner product of each row with a wrench about the link's origin. Read
-        as a motion, a row is one that no unit resists."""
+        """Unseen components, (6 - rank, 6): the inner product of each row with a wrench about the link's origin. As a
+        motion, a row is one that no unit resists."""
         vectors, rank, place, length = self._seen
         lost = np.array(vectors[:, rank:])
         lost[3:] /= length
@@ -202,7 +202,7 @@ class LoadCells:
 
     @property
     def cannot_see(self) -> list[str]:
-        """:attr:`unseen` in words: the components that each of them is made of."""
+        """:attr:`unseen` in words, by components."""
         return [_in_words(one) for one in reduced(self.unseen)]
 
     def noise_at(self, point_m: Vector) -> Floats:
@@ -213,8 +213,8 @@ class LoadCells:
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(exerts.T @ self.noise.information @ exerts))))
 
     def lifting_n(self, point_m: Vector, along: Vector) -> float:
-        """The force in N, along the unit vector ``along`` at this point, from which on a unit is lifted; infinite where
-        none ever is. Needs every unit's ``preload_n``."""
+        """The force in N, along the unit vector ``along`` at this point, that lifts a unit; infinite if none. Needs
+        every unit's ``preload_n``."""
         if not np.isfinite(self._preload).all():
             raise HapticsError("preload_n is missing; give the preload of every unit")
         exerted = np.concatenate([along, np.cross(point_m, along)])
@@ -223,13 +223,13 @@ class LoadCells:
         return float((self._preload[falls] / -per_newton[falls]).min(initial=np.inf))
 
     def rezeroed(self, readings: Floats, zones: int, gravity_m_s2: Vector | None = None) -> LoadCells:
-        """The same with new zeros, from (m, n) readings while nothing touches.
+        """A copy with new zeros, from (m, n) readings without touch.
 
-        Raises :class:`HapticsError` where something does: ``zones`` on the sheet, or readings that are not quiet, which
-        vary by more than three times their noise.
+        Raises :class:`HapticsError` if something touches: ``zones`` on the sheet, or readings that vary by more than
+        three times their noise.
 
         Args:
-            gravity_m_s2: which way things fall now, in the link's frame; None: as when the last zeros were read.
+            gravity_m_s2: current gravity in the link's frame; None: as when the last zeros were read.
         """
         if zones:
             raise HapticsError(f"{zones} zones are pressed; zeros are read while nothing touches")
@@ -249,7 +249,7 @@ class LoadCells:
         self, zeros: Floats, matrix: Floats | None, noise_n2: Floats | None, gravity_m_s2: Vector | None = None
     ) -> LoadCells:
         """Units with these zeros (n,) in steps, this matrix, (6, n) in N and Nm per step, or None: not calibrated, and
-        this covariance of noise, (n, n) in N2, or None: independent."""
+        this noise covariance, (n, n) in N2, or None: independent."""
         return LoadCells(
             [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, zeros)],
             frame=self.frame,
@@ -263,7 +263,7 @@ class LoadCells:
 
 
 def covariance(name: str, values: Any, count: int) -> Floats:
-    """(count, count): what is given, if it is a covariance with no variance of 0. Raises :class:`HapticsError`."""
+    """(count, count): the given values, if a covariance without zero variances. Raises :class:`HapticsError`."""
     given = matrix(name, values, count, count)
     if not (np.diag(given) > 0).all():
         raise HapticsError(f"{name} has a variance of {np.diag(given).min():g}; each unit has some noise, above 0 N2")
@@ -273,7 +273,7 @@ def covariance(name: str, values: Any, count: int) -> Floats:
 
 
 def reduced(rows: Floats) -> Floats:
-    """Rows that span the same space, each with a leading 1 that the others lack, so that they name few components."""
+    """Rows with the same span, each with a leading 1 that the others lack, so that each involves few components."""
     found = np.array(rows)
     done = 0
     for column in range(found.shape[1]):
@@ -311,7 +311,7 @@ def load(path: str | Path) -> dict[str, Any]:
 
 
 def read(values: dict[str, Any]) -> dict[str, Any]:
-    """The same, from the tables of such a file."""
+    """The arguments of :class:`LoadCells`, from the tables of a units.toml."""
     _known(values, KEYS, "the file")
     given = values.get("unit")
     if not isinstance(given, list) or not given:
@@ -332,7 +332,7 @@ def read(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _surface(values: Any) -> dict[str, Any]:
-    """The bumper's outside, and where the sheet begins on it."""
+    """The bumper's outside, and the sheet's origin on it."""
     kind = dict(values) if isinstance(values, dict) else values
     place = kind.pop("sheet_m", (0.0, 0.0)) if isinstance(kind, dict) else None
     found = read_surface(kind)

@@ -1,5 +1,5 @@
-"""Input that no bumper can have, how numbers from outside are read, and vectors of three numbers in plain Python: for
-these numpy takes several times as long."""
+"""Invalid input of a bumper, checks of numbers from outside, and vectors of three numbers in plain Python, faster than
+numpy."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.surfaces.shapes import Floats, Vector
 
 LARGEST = 1e9
-"""Of what a file says in SI units; powers of it are still numbers."""
+"""Largest SI value in a file, whose powers are finite."""
 
 
 SMALLEST = 1e-9
-"""Of what has to be above 0: divided by, it is still a number."""
+"""Smallest positive value, whose inverse is finite."""
 
 
 class HapticsError(ContactFPGAError, ValueError):
-    """A value that no bumper, unit or contact can have; the message names it and the limit."""
+    """An impossible value of a bumper, unit or contact; the message names it and the limit."""
 
 
 def number(name: str, value: Any, low: float = -LARGEST, high: float = LARGEST, unit: str = "") -> float:
@@ -42,7 +42,7 @@ def positive(name: str, value: Any, unit: str) -> float:
 
 
 def within(name: str, values: Sequence[float], unit: str) -> None:
-    """Raises :class:`HapticsError` unless all of these are numbers with which one can compute."""
+    """Raises :class:`HapticsError` unless all of these are usable numbers."""
     for value in values:
         if not -LARGEST <= value <= LARGEST:
             raise HapticsError(
@@ -51,7 +51,7 @@ def within(name: str, values: Sequence[float], unit: str) -> None:
 
 
 def array(name: str, values: Any) -> Floats:
-    """An array of such numbers, of any shape; raises :class:`HapticsError`."""
+    """An array of usable numbers, of any shape; raises :class:`HapticsError`."""
     try:
         found = np.asarray(values, float)
     except OverflowError:  # one of Python's whole numbers
@@ -70,7 +70,7 @@ def vector(name: str, value: Any, unit: str) -> Vector:
 
 
 def direction(name: str, value: Any) -> Vector:
-    """Three numbers as a vector of length 1; raises :class:`HapticsError` where they have no direction."""
+    """Three numbers as a unit vector; raises :class:`HapticsError` if they are all 0."""
     x, y, z = vector(name, value, "")
     length = math.hypot(x, y, z)
     if length < 1e-9:

@@ -1,5 +1,5 @@
-"""Force and moment on the link, with their noise: what all units together measure, and where on the bumper's outside a
-wrench pushes (the center of pressure of a single contact)."""
+"""Force and moment on the link, with their noise: the units' common measurement, and its center of pressure on the
+bumper's outside."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from contactfpga.surfaces import shapes
 from contactfpga.surfaces.shapes import Floats, Vector
 
 ALARM = (10.828, 13.816, 16.266, 18.467, 20.515, 22.458)
-"""Chi-square that chance exceeds once in a thousand times, with 1 to 6 degrees of freedom."""
+"""Chi-square exceeded by chance once in a thousand times, with 1 to 6 degrees of freedom."""
 
 Block = tuple[Vector, ...]
 
 
 class Noise:
-    """The covariance of a wrench, and what follows from it; one object serves all wrenches of the same units."""
+    """The covariance of a wrench, and derived quantities; one object serves all wrenches of the same units."""
 
     def __init__(self, covariance: Floats):
         self.covariance = covariance
@@ -30,8 +30,8 @@ class Noise:
 
     @classmethod
     def checked(cls, covariance: Floats) -> Noise | None:
-        """The noise of a covariance from outside; None where all of it is 0, which says nothing. Raises
-        :class:`HapticsError` for what is no covariance."""
+        """The noise of a covariance from outside; None if it is all 0, which is uninformative. Raises
+        :class:`HapticsError` if it is no covariance."""
         if not covariance.any():
             return None
         size = np.sqrt(np.abs(np.diag(covariance)))
@@ -47,7 +47,7 @@ class Noise:
 
     @functools.cached_property
     def _spectrum(self) -> tuple[Floats, Floats, Floats]:
-        """Eigenvalues and vectors of the correlations, and the standard deviations they are scaled by."""
+        """Eigenvalues and vectors of the correlations, and their standard deviations."""
         size = np.sqrt(np.diag(self.covariance))
         size = np.where(size > 1e-9 * size.max(), size, 0.0)
         over = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
@@ -63,19 +63,19 @@ class Noise:
 
     @functools.cached_property
     def information(self) -> Floats:
-        """(6, 6): the inverse of the covariance. A component without noise is one that the units do not see, so it
-        counts for nothing."""
+        """(6, 6): the inverse of the covariance. A component without noise is unseen by the units and gets no
+        weight."""
         return np.asarray(self.root.T @ self.root)
 
     @functools.cached_property
     def root(self) -> Floats:
-        """(rank, 6): transposed times itself it is the information."""
+        """(rank, 6): a root of the information."""
         values, vectors, over = self._spectrum
         seen = values > 1e-9 * values[-1]
         return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T * over)
 
     def widened(self, moments: Floats) -> Noise:
-        """The same noise with ``moments``, (3, 3) in N2m2, added to the covariance of the moments that units see."""
+        """The noise with ``moments``, (3, 3) in N2m2, added to the covariance of the seen moments."""
         more = np.zeros((6, 6))
         more[3:, 3:] = moments
         if self.rank < 6:
@@ -87,26 +87,26 @@ class Noise:
 
     @functools.cached_property
     def rank(self) -> int:
-        """Independent components that the units see: 6 where they see all."""
+        """Independent components that the units see: 6 for all."""
         values = self._spectrum[0]
         return int((values > 1e-9 * values[-1]).sum())
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Wrench:
-    """What the contacts together exert on the link."""
+    """The common wrench of the contacts on the link."""
 
     force_n: Vector
     moment_nm: Vector
-    """About the origin of the link's frame."""
+    """Moment about the origin of the link's frame."""
     noise: Noise | None = None
-    """None where it is not known."""
+    """None if unknown."""
     frame: str = ""
     """Name of the link's frame."""
     saturated: tuple[int, ...] = ()
-    """Numbers of the units at an end of their range: the wrench is wrong by an unknown amount."""
+    """Indexes of saturated units: the wrench is wrong by an unknown amount."""
     lifted: tuple[int, ...] = ()
-    """Numbers of the units that nothing presses any more: they would have to pull."""
+    """Indexes of lifted units, which would have to pull."""
 
     def __post_init__(self) -> None:
         within("force_n", self.force_n, "N")
@@ -114,7 +114,7 @@ class Wrench:
 
     @property
     def covariance(self) -> Floats | None:
-        """(6, 6), as :class:`Noise` has it."""
+        """(6, 6) covariance of :class:`Noise`."""
         return None if self.noise is None else self.noise.covariance
 
     @property
@@ -125,12 +125,12 @@ class Wrench:
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """How the link moves, in its own frame, for the force that carries the bumper along."""
+    """Motion of the link, in its own frame, for the bumper's inertial force."""
 
     gravity_m_s2: Vector = (0.0, 0.0, -9.80665)
-    """Which way things fall, in the link's frame."""
+    """Gravity in the link's frame."""
     acceleration_m_s2: Vector = (0.0, 0.0, 0.0)
-    """Of the frame's origin, without gravity."""
+    """Acceleration of the frame's origin, without gravity."""
     turning_rad_s: Vector = (0.0, 0.0, 0.0)
     """Angular velocity."""
     turning_rad_s2: Vector = (0.0, 0.0, 0.0)
@@ -143,13 +143,13 @@ class Motion:
 
 @dataclasses.dataclass(frozen=True)
 class Bumper:
-    """The mass that the units carry."""
+    """The mass on the units."""
 
     mass_kg: float
     center_m: Vector
     """Its center of mass in the link's frame."""
     inertia_kg_m2: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0),) * 3
-    """About its center of mass."""
+    """Inertia about its center of mass."""
 
     def __post_init__(self) -> None:
         number("mass_kg", self.mass_kg, 0, LARGEST, "kg")
@@ -158,7 +158,7 @@ class Bumper:
             within("inertia_kg_m2", row, "kg m2")
 
     def wrench(self, motion: Motion) -> Floats:
-        """The wrench (6,) in N and Nm that the units must exert on the bumper to move it with the link."""
+        """The wrench (6,) in N and Nm of the units on the bumper that moves it with the link."""
         center, inertia = np.array(self.center_m), np.array(self.inertia_kg_m2)
         spin, more = np.array(motion.turning_rad_s), np.array(motion.turning_rad_s2)
         felt = np.array(motion.acceleration_m_s2) - np.array(motion.gravity_m_s2)
@@ -170,28 +170,28 @@ class Bumper:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Center:
-    """Where one contact alone would exert the wrench, if it pushes with a force and turns about the normal only."""
+    """The place where one contact alone would exert the wrench, by a force and a moment about the normal."""
 
     point_m: Vector
     normal: Vector
     """Outward unit normal there."""
     normal_n: float
-    """Push; above 0."""
+    """Push, above 0."""
     tangential_n: float
     """Size of the force along the surface."""
     torsion_nm: float
     """Moment about the outward normal."""
     force_n: Vector
-    """On the link."""
+    """Force on the link."""
     sheet_m: tuple[float, float]
     """The point on the surface laid flat: x and y of a plane, arc length and z of a cylinder."""
     covariance_m2: Floats | None
-    """(2, 2) of ``sheet_m`` from the wrench's noise; None where that is not known."""
+    """(2, 2) covariance of ``sheet_m`` from the wrench's noise; None if unknown."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Plane:
-    """The plane z = ``height_m`` of the link's frame; outside is where z is larger."""
+    """The plane z = ``height_m`` of the link's frame; outside is larger z."""
 
     height_m: float = 0.0
 
@@ -199,7 +199,7 @@ class Plane:
         number("height_m", self.height_m, -100, 100, "m")
 
     def center(self, wrench: Wrench) -> Center | None:
-        """The center of pressure; None where the wrench does not push on the plane."""
+        """The center of pressure; None if the wrench does not push on the plane."""
         (fx, fy, fz), (mx, my, mz) = wrench.force_n, wrench.moment_nm
         if not fz < -SMALLEST:
             return None
@@ -222,13 +222,13 @@ class Plane:
         return shapes.on_plane(x_m, y_m, self.height_m)
 
     def flat(self, point_m: Vector) -> tuple[float, float]:
-        """The place, laid flat, of the surface's point nearest to this one."""
+        """The place, laid flat, of the nearest point of the surface."""
         return point_m[0], point_m[1]
 
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder:
-    """A cylinder about the link's z axis. The force enters at the outside, so its radius is that with the foam."""
+    """A cylinder about the link's z axis, whose radius includes the foam, as the force enters at the outside."""
 
     radius_m: float
 
@@ -236,7 +236,7 @@ class Cylinder:
         positive("radius_m", self.radius_m, "m")
 
     def center(self, wrench: Wrench) -> Center | None:
-        """The center of pressure; None where no push on the cylinder exerts this wrench."""
+        """The center of pressure; None if no push on the cylinder exerts this wrench."""
         (fx, fy, fz), (mx, my, mz) = wrench.force_n, wrench.moment_nm
         radius = self.radius_m
         across, square = mz / radius, fx * fx + fy * fy
@@ -274,7 +274,7 @@ class Cylinder:
         return shapes.on_cylinder(x_m, y_m, self.radius_m)
 
     def flat(self, point_m: Vector) -> tuple[float, float]:
-        """The place, laid flat, of the surface's point nearest to this one."""
+        """The place, laid flat, of the nearest point of the surface."""
         return shapes.off_cylinder(point_m, self.radius_m)
 
 
@@ -286,7 +286,7 @@ SURFACES: dict[str, tuple[type[Plane] | type[Cylinder], str]] = {
 
 
 def read_surface(values: Any, name: str = "surface") -> Surface:
-    """The surface that a table describes; raises :class:`HapticsError`."""
+    """The surface of a table; raises :class:`HapticsError`."""
     if not isinstance(values, dict) or values.get("kind") not in list(SURFACES):
         kind = values.get("kind") if isinstance(values, dict) else values
         raise HapticsError(

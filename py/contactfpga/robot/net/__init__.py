@@ -1,1 +1,1 @@
-"""A board's bytes over a network: published on the machine that has the board, read anywhere, through Eclipse Zenoh."""
+"""A board's bytes over a network: published by the machine with the board, read anywhere, through Eclipse Zenoh."""

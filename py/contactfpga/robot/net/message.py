@@ -1,4 +1,4 @@
-"""A message: a board's raw bytes, and before them a head that shows what is missing."""
+"""A message: a board's raw bytes after a header that exposes losses."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ _MAGIC = _NAME + VERSION
 HEAD_BYTES = _HEAD.size
 
 MOST_BYTES = 1 << 16
-"""Of a board in one message."""
+"""Most bytes of a board in one message."""
 MOST_ASKED = 512
-"""Bytes of one message to a board."""
+"""Most bytes of one message to a board."""
 BREAK_S = 2.0
-"""After a hole of this length nobody knows any more how often the frames' times wrapped in it."""
+"""Length of a gap after which the number of wraps of frame times in it is unknown."""
 BEAT_S = 0.25
-"""A publisher sends a message at least this often, so that a loss shows also where nothing follows it."""
+"""Longest interval of a publisher's messages, so that a loss is noticed without later data."""
 QUIET_S = 2 * BEAT_S
-"""After this long without a message that was taken, messages that contradict the last one may be the genuine ones."""
+"""Time without an accepted message after which contradicting messages may be genuine."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Message:
-    """What a publisher sends."""
+    """A message of a publisher."""
 
     publisher: int
-    """A random number that each start of a publisher draws."""
+    """A random number, drawn at each start of a publisher."""
     sequence: int
-    """Messages before this one."""
+    """Number of messages before this one."""
     offset: int
-    """Bytes before this message's."""
+    """Number of bytes before this message's."""
     read_us: int
-    """When they were read, on the publisher's clock."""
+    """Read time, on the publisher's clock."""
     denied: int
-    """Messages to the board that it did not pass on."""
+    """Messages to the board that it refused."""
     data: bytes
 
     def encode(self) -> bytes:
@@ -47,19 +47,19 @@ class Message:
 
     @classmethod
     def decode(cls, payload: bytes) -> Message | None:
-        """None for what no publisher sends."""
+        """A message; None for an invalid payload."""
         if not HEAD_BYTES <= len(payload) <= HEAD_BYTES + MOST_BYTES or not payload.startswith(_MAGIC):
             return None
         _, publisher, sequence, offset, read_us, denied = _HEAD.unpack_from(payload)
         return cls(publisher, sequence, offset, read_us, denied, payload[HEAD_BYTES:])
 
     def follows(self, other: Message) -> bool:
-        """Whether its publisher can have sent it after the other, with any number of messages between them."""
+        """Whether its publisher can have sent it after the other, with any number of messages between."""
         after = self.sequence > other.sequence and self.offset >= other.offset + len(other.data)
         return self.publisher == other.publisher and after
 
     def continues(self, other: Message) -> bool:
-        """Whether it is the very next one."""
+        """Whether it is the next message."""
         return self.follows(other) and (self.sequence, self.offset) == (
             other.sequence + 1,
             other.offset + len(other.data),
@@ -67,26 +67,26 @@ class Message:
 
 
 def token(publisher: int) -> str:
-    """How a publisher's number reads in the key of its token of liveliness."""
+    """A publisher's number in the key of its liveliness token."""
     return f"{publisher:016x}"
 
 
 class Stream:
-    """Puts the bytes of messages together again, with a delimiter in each hole, so that no packet is made of two.
+    """Reassembles the bytes of messages, with a delimiter in each gap, so that no packet mixes two.
 
-    Whoever may write under the key can forge messages. A message that continues the last one is taken at once. Any
-    other, such as the first and one after a hole, is doubted until the next message follows it. If it contradicts the
-    last one, nothing may have been taken for :data:`QUIET_S`, either. So a single forged message keeps out what comes
-    after it for at most :data:`QUIET_S` and two beats.
+    Anyone who may write under the key can forge messages. A message that continues the last one is accepted at once.
+    Any other, such as the first and one after a gap, is held until the next message follows it. If it contradicts the
+    last one, nothing may have been accepted for :data:`QUIET_S`, either. So a single forged message blocks later ones
+    for at most :data:`QUIET_S` and two beats.
     """
 
     def __init__(self, counters: NetCounters):
         self.heard_s: float | None = None
-        """When a message came that its publisher can have sent now."""
+        """Arrival of the last message that its publisher can have sent now."""
         self.ended = False
-        """The publisher has said that it ends, and no message of it came since: another may follow at once."""
+        """Whether the publisher announced its end, without later messages: another may follow at once."""
         self.other_version = False
-        """Messages of another version came, and none of this one."""
+        """Whether only messages of another version arrived."""
         self._counters = counters
         self._last: Message | None = None
         self._doubted: Message | None = None
@@ -94,11 +94,11 @@ class Stream:
 
     @property
     def publisher(self) -> int | None:
-        """Number of the publisher that is read; None before its first message."""
+        """Number of the publisher in use; None before its first message."""
         return None if self._last is None else self._last.publisher
 
     def take(self, payload: bytes, now_s: float) -> list[tuple[bytes, bool]]:
-        """What a message that comes at ``now_s`` adds: pieces of bytes, each with whether it comes after a break."""
+        """The bytes added by a message that arrives at ``now_s``: pieces, each with whether it follows a break."""
         message = Message.decode(payload)
         if message is None:
             self._counters.refused += 1
@@ -128,7 +128,7 @@ class Stream:
         return pieces
 
     def _may_come(self, message: Message, now_s: float) -> bool:
-        """Whether a message may come after the last one, though it does not continue it."""
+        """Whether a message may follow the last one without continuing it."""
         last = self._last
         if last is None or message.follows(last) or now_s - self._taken_s >= QUIET_S:
             return True

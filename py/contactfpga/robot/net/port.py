@@ -1,4 +1,4 @@
-"""The port ``zenoh://KEY``: a board somewhere else."""
+"""The port ``zenoh://KEY``: a remote board."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     import zenoh
 
 MOST_WAITING = 1 << 24
-"""Bytes that wait to be read; beyond, the oldest are left out."""
+"""Most unread bytes; beyond it the oldest are dropped."""
 FOUND_S = 3.0
-"""How long the first message of a publisher may take."""
+"""Timeout for the first message of a publisher."""
 GONE_S = 1.0
-"""A publisher that sent nothing for so long is gone, whatever its token says: anyone can declare a token."""
+"""Silence after which a publisher is gone, whatever its token: anyone can declare a token."""
 
 
 class ZenohPort:
@@ -69,7 +69,7 @@ class ZenohPort:
             raise PortNotFound(f"{self.name}: nobody publishes it{refused(self.counters)}; {step}?")
 
     def read(self, timeout_s: float) -> bytes:
-        """What is there, waiting at most ``timeout_s`` for the first byte."""
+        """Available bytes, after waiting at most ``timeout_s`` for the first."""
         with self._changed:
             if not self._pieces:
                 self._changed.wait(timeout_s)
@@ -92,12 +92,12 @@ class ZenohPort:
         return silent_s > (max(wait_s, QUIET_S) if self._stream.ended else wait_s + GONE_S)
 
     def write(self, data: bytes) -> None:
-        """Ask the board."""
+        """Send a request to the board."""
         assert self._asks is not None
         self._asks.put(data)
 
     def clock(self) -> float:
-        """Of this machine."""
+        """This machine's clock."""
         return time.monotonic()
 
     def close(self) -> None:
@@ -121,7 +121,7 @@ class ZenohPort:
                 self._changed.notify_all()
 
     def _leave_out(self) -> None:
-        """Of those that wait, the oldest; what follows comes after a break then."""
+        """Drop the oldest unread bytes; the rest follows a break."""
         oldest, oldest_broken = self._pieces.popleft()
         self._waiting -= len(oldest)
         self.counters.left_out += len(oldest) - oldest.startswith(b"\0")
@@ -132,7 +132,7 @@ class ZenohPort:
         self._waiting += len(self._pieces[0][0]) - len(following)
 
     def _note(self, sample: zenoh.Sample) -> None:
-        """A publisher begins or ends."""
+        """Handle the beginning or end of a publisher."""
         import zenoh
 
         name = str(sample.key_expr).rpartition("/")[2]

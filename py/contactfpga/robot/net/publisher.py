@@ -1,4 +1,4 @@
-"""Publishes a board's bytes, and passes requests on to it."""
+"""Publishes a board's bytes, and passes requests to it."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     import zenoh
 
 SLICE_S = 0.01
-"""A port is read at least this often while bytes are collected, lest its own memory runs over."""
+"""Longest interval of reading a port while bytes are collected, lest it overflows."""
 SIMULATED_S = 0.002
-"""The most simulated time that passes at once."""
+"""Most simulated time that passes at once."""
 
 
 class BoardPort(Protocol):
@@ -38,11 +38,11 @@ class BoardPort(Protocol):
 
 
 class BoardPublisher:
-    """One board under one key: ``KEY/bytes`` from it, ``KEY/ask`` to it, ``KEY/alive/...`` as long as this runs.
+    """One board under one key: ``KEY/bytes`` from it, ``KEY/ask`` to it, ``KEY/alive/...`` while this runs.
 
-    ``batch_s``: how long bytes are collected before they are sent. ``block``: where the network is too slow, wait and
-    let the port overflow; else Zenoh drops messages. Both are counted by who reads. ``commands``: pass commands on as
-    well, not requests alone. Raises :class:`~contactfpga.ContactFPGAError` where someone else has the key.
+    ``batch_s``: time for which bytes are collected. ``block``: on a slow network wait and let the port overflow; else
+    Zenoh drops messages. Readers count both. ``commands``: pass commands as well as requests. Raises
+    :class:`~contactfpga.ContactFPGAError` if the key is taken.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class BoardPublisher:
         import zenoh
 
         self.denied = self.passed = self.sent = 0
-        """Messages to the board that were not passed on, and that were; messages from it."""
+        """Messages to the board refused, and passed; messages from it."""
         self._source, self._batch_s, self._commands, self._clock = source, batch_s, commands, clock
         self._number = random.SystemRandom().getrandbits(64)
         self._offset = 0
@@ -72,7 +72,7 @@ class BoardPublisher:
         self._token = session.liveliness().declare_token(f"{key}/alive/{token(self._number)}")
 
     def run(self, stop: threading.Event) -> None:
-        """Publish until told to stop. Raises :class:`~contactfpga.PortLost` where the board is gone."""
+        """Publish until stopped. Raises :class:`~contactfpga.PortLost` if the board is gone."""
         try:
             while not stop.is_set():
                 self.step()
@@ -82,7 +82,7 @@ class BoardPublisher:
             self._out.undeclare()
 
     def step(self) -> None:
-        """Send what comes next."""
+        """Send the next bytes."""
         data = self._read(BEAT_S)
         read_us = round(self._clock() * 1e6)
         if data and self._batch_s:
@@ -117,7 +117,7 @@ class BoardPublisher:
         return data
 
     def _take(self, sample: zenoh.Sample) -> None:
-        """Someone asks the board."""
+        """Handle a request to the board."""
         data = sample.payload.to_bytes()
         asked = request_kind(data) if len(data) <= MOST_ASKED else RequestKind.OTHER
         if asked is RequestKind.OTHER or (asked is RequestKind.COMMAND and not self._commands):
@@ -132,8 +132,8 @@ class BoardPublisher:
 
 
 def _check_alone(session: zenoh.Session, key: str) -> None:
-    """Whoever sends has the key. A token alone says little: a killed publisher may leave its token for a while, and
-    anyone can declare one."""
+    """Raise if another publisher sends under the key. A token alone proves little: a killed publisher's lasts for a
+    while, and anyone can declare one."""
     if not list(session.liveliness().get(f"{key}/alive/*", timeout=LEASE_MS / 1000)):
         return
     counters, heard = NetCounters(), threading.Event()

@@ -1,5 +1,4 @@
-"""Zenoh sessions that nobody on another machine can reach unless that was asked for; keys of boards, and endpoints of
-this machine alone."""
+"""Zenoh sessions, by default unreachable from other machines; keys of boards, and local endpoints."""
 
 from __future__ import annotations
 
@@ -21,23 +20,23 @@ if TYPE_CHECKING:
     import zenoh
 
 LOOPBACK = "tcp/127.0.0.1:7447"
-"""An endpoint that every user of this machine reaches."""
+"""An endpoint for every user of this machine."""
 _MOST_PATH = 100
-"""Most bytes of a socket's path; operating systems take 103 or 107."""
+"""Most bytes of a socket's path; operating systems allow 103 or 107."""
 
 
 def key_of(name: str, fingerprint: bytes) -> str:
-    """The usual key of a board."""
+    """The default key of a board."""
     usual = re.sub(r"[^\w.@:+-]+", "-", name).strip("-") or fingerprint.hex()
     return f"contactfpga/{usual}"
 
 
 def own_endpoint() -> str:
-    """Where a publisher listens, and where a port looks for it, unless asked otherwise.
+    """The default endpoint of publishers and ports.
 
-    It is a Unix socket in a folder that only this user can open: in ``XDG_RUNTIME_DIR`` if that is set, else in the
-    folder for temporary files. On Windows it is :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` where
-    another user could open or replace the folder.
+    It is a Unix socket in a folder for this user alone: in ``XDG_RUNTIME_DIR``, else in the folder for temporary files.
+    On Windows it is :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` if another user could open or
+    replace the folder.
     """
     if sys.platform == "win32":
         return LOOPBACK
@@ -62,7 +61,7 @@ def own_endpoint() -> str:
 
 
 def is_loopback(endpoint: str) -> bool:
-    """Whether nobody on another machine can reach an endpoint such as ``tcp/127.0.0.1:7447``."""
+    """Whether an endpoint such as ``tcp/127.0.0.1:7447`` is unreachable from other machines."""
     protocol, _, place = endpoint.partition("/")
     if protocol.startswith("unix"):
         return True
@@ -74,11 +73,11 @@ def is_loopback(endpoint: str) -> bool:
 
 
 LEASE_MS = 1000
-"""After this long without a sign of life a peer counts as gone."""
+"""Silence after which a peer counts as gone."""
 MOST_RECEIVED = 1 << 20
-"""Bytes of one message that a session takes, which Zenoh keeps roughly: more than any of ours, and little memory."""
+"""Approximate largest message that a session accepts: more than any of ours, and little memory."""
 CONNECT_MS = 2000
-"""How long a connection may take."""
+"""Timeout of a connection."""
 
 
 FILES = (
@@ -86,21 +85,21 @@ FILES = (
     *(f"transport/link/tls/{name}" for name in ("connect_private_key", "connect_certificate")),
     "transport/auth/usrpwd/dictionary_file",
 )
-"""Settings that name a file."""
+"""Settings with file names."""
 
 
 def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
-    """A session that others connect to, and that passes on between them: a router."""
+    """A session that others connect to, and that forwards between them: a router."""
     return _open({"mode": "router"}, endpoint, config, "listen")
 
 
 def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
-    """A session that connects to a router, and listens nowhere."""
+    """A session that connects to a router, without listening."""
     return _open({"mode": "client", "connect/timeout_ms": CONNECT_MS}, endpoint, config, "connect")
 
 
 def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, what: str) -> zenoh.Session:
-    """What a configuration file says comes first; but an endpoint that is named by itself comes before it."""
+    """Open a session; a configuration file overrides the settings, an explicit endpoint overrides the file."""
     try:
         import zenoh
     except ModuleNotFoundError as error:
@@ -143,7 +142,7 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
 
 
 def _check_files(found: zenoh.Config, config: str) -> None:
-    """Zenoh says of some that there is no connection."""
+    """Check files that Zenoh would report as a missing connection."""
     for name in FILES:
         path = json.loads(found.get_json(name))
         if path is not None and not Path(path).is_file():
@@ -176,7 +175,7 @@ def _step(what: str, reason: str, places: Any) -> str:
 
 
 def _answers(place: str) -> bool:
-    """Whether something takes connections at an endpoint of TCP."""
+    """Whether a TCP endpoint accepts connections."""
     found = re.fullmatch(r"(?:tcp|tls)/\[?(.+?)\]?:(\d+)(?:[?#].*)?", place)
     if found is None:
         return False
@@ -188,5 +187,5 @@ def _answers(place: str) -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """Without the places in Zenoh's sources."""
+    """The message without places in Zenoh's sources."""
     return str(error).split(" at /")[0].strip("[] ") or type(error).__name__

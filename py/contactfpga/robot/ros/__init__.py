@@ -1,4 +1,4 @@
-"""ROS 2: what a board says as messages of ``contactfpga_msgs``, and a way to publish them without ROS (docs/ros.md)."""
+"""ROS 2: a board's data as messages of ``contactfpga_msgs``, and publishing without ROS (docs/ros.md)."""
 
 from __future__ import annotations
 
@@ -7,4 +7,4 @@ from contactfpga.robot.ros.types import PACKAGE, messages
 __all__ = ["PACKAGE", "messages"]
 
 MAX_DOMAIN = 232
-"""The last domain of DDS: beyond, its port numbers end."""
+"""The last DDS domain, by its port numbers."""

@@ -1,4 +1,4 @@
-"""Messages to bytes as ROS 2 sends and records them: CDR version 1, little-endian."""
+"""Messages as ROS 2 sends and records them: CDR version 1, little-endian."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any
 from contactfpga.robot.ros.types import PRIMITIVES, MessageField, message_type
 
 HEAD = b"\x00\x01\x00\x00"
-"""What the bytes are: plain CDR, lowest byte first."""
+"""Header for plain CDR, lowest byte first."""
 
 Message = Mapping[str, Any]
-"""Fields by name; a nested message is a mapping as well, an array any sequence."""
+"""Fields by name; a nested message is a mapping, an array any sequence."""
 _Put = Callable[[bytearray, Message], None]
 _Path = tuple[str, ...]
 
 
 def encode(name: str, message: Message) -> bytes:
-    """A message of this type (``contactfpga_msgs/Zones``), with the head that says how it is written."""
+    """A message of this type (``contactfpga_msgs/Zones``), with its encapsulation header."""
     out = bytearray()
     for put in _puts(name):
         put(out, message)
@@ -28,7 +28,7 @@ def encode(name: str, message: Message) -> bytes:
 
 @functools.cache
 def _puts(name: str) -> tuple[_Put, ...]:
-    """What writes the fields in turn. Numbers that follow one another are written at once."""
+    """Writers of the fields in turn; consecutive numbers are written at once."""
     puts: list[_Put] = []
     letters, paths = "", []  # of the numbers that wait to be written
     for path, field in [*_leaves(name, ()), ((), None)]:
@@ -45,7 +45,7 @@ def _puts(name: str) -> tuple[_Put, ...]:
 
 
 def _leaves(name: str, path: _Path) -> list[tuple[_Path, MessageField | None]]:
-    """Fields in order, with those of nested messages in their place."""
+    """Fields in order, with those of nested messages in place."""
     found: list[tuple[_Path, MessageField | None]] = []
     for field in message_type(name).fields:
         where = (*path, field.name)
@@ -65,7 +65,7 @@ def _put_numbers(letters: str, paths: tuple[_Path, ...], out: bytearray, message
 
 @functools.cache
 def _aligned(letters: str, offset: int) -> struct.Struct:
-    """Numbers after so many bytes, each at a multiple of its own size."""
+    """Numbers after ``offset`` bytes, each aligned to its own size."""
     form = "<"
     for letter in letters:
         size = struct.calcsize("<" + letter)

@@ -1,4 +1,4 @@
-"""What a board says, as messages: lengths in m, flags as bits. Whoever publishes or records takes them from here."""
+"""A board's data as messages, for publishing and recording: lengths in m, flags as bits."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ZONE_FLAGS = _bits("Zone", "FLAG_")
 
 
 def header(time_ns: int, frame: str) -> Message:
-    """A ``std_msgs/Header``: a moment in ns since 1970, and the frame in which places are given."""
+    """A ``std_msgs/Header``: a moment in ns since 1970, and the frame of places."""
     sec, nanosec = divmod(time_ns, _SECOND)
     return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
 
@@ -112,7 +112,7 @@ def flag_bits(flags: frozenset[str]) -> int:
 
 
 def tracks(found: Tracks, events: Iterable[Event], restarted: bool, head: Message) -> Message:
-    """A ``Tracks`` with all events since the message before, and whether contacts were begun again since."""
+    """A ``Tracks`` with all events since the previous message, and whether tracking restarted since."""
     return {
         "header": head,
         "device_time_us": found.time_us,
@@ -124,7 +124,7 @@ def tracks(found: Tracks, events: Iterable[Event], restarted: bool, head: Messag
 
 
 def contacts(found: Iterable[Track], head: Message, forces: Contacts | None = None) -> Message:
-    """A ``Contacts``: the tracks that the frame shows, each with its force where that is known."""
+    """A ``Contacts``: the tracks in the frame, each with its force if known."""
     shown = [one for one in found if not one.held and one.zone.point_mm is not None]
     known = forces_of(forces)
     return {"header": head, "contacts": [_contact(one, head["frame_id"], known.get(one.id)) for one in shown]}
@@ -136,13 +136,13 @@ def forces_of(forces: Contacts | None) -> dict[int | None, Sequence[float]]:
 
 
 def wrench(found: Wrench, head: Message) -> Message:
-    """A ``geometry_msgs/WrenchStamped``: what all contacts together exert on the link, about its origin."""
+    """A ``geometry_msgs/WrenchStamped``: the contacts' common wrench on the link, about its origin."""
     return {"header": head, "wrench": {"force": vector(found.force_n), "torque": vector(found.moment_nm)}}
 
 
 def transform(head: Message, child: str, place_m: Sequence[float], turn_rad: Sequence[float]) -> Message:
-    """A ``tf2_msgs/TFMessage``: where a frame lies in that of the header; turned about the fixed x, y and z axes in
-    turn, as in a URDF."""
+    """A ``tf2_msgs/TFMessage``: the pose of a frame in the header's; rotations about the fixed x, y and z axes in turn,
+    as in a URDF."""
     made = {"translation": vector(place_m), "rotation": quaternion(*turn_rad)}
     return {"transforms": [{"header": head, "child_frame_id": child, "transform": made}]}
 
@@ -198,7 +198,7 @@ def vector(values: Sequence[float]) -> Message:
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Message:
-    """A ``geometry_msgs/Quaternion``: turned about the fixed x, y and z axes in turn, in rad."""
+    """A ``geometry_msgs/Quaternion``: rotations about the fixed x, y and z axes in turn, in rad."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(one / 2), math.cos(one / 2)) for one in (roll, pitch, yaw))
     return {
         "x": sr * cp * cy - cr * sp * sy,
@@ -211,13 +211,13 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Message:
 ARROW, SPHERE, LINE_STRIP, TEXT = 0, 2, 4, 9
 ADD, DELETE_ALL = 0, 3
 LIFETIME_NS = 500_000_000
-"""After this time without news they vanish: no data is never no contact."""
+"""Lifetime of markers without updates: no data is never no contact."""
 NEWTON_M = 0.01
-"""Length of an arrow per newton; without forces an arrow has :data:`ARROW_M`."""
+"""Length of an arrow per newton; without forces :data:`ARROW_M`."""
 ARROW_M = 0.03
 
 _EDGE = 16
-"""Pieces of each edge of the outline."""
+"""Segments of each edge of the outline."""
 _GRAY, _BLUE, _ORANGE = (0.5, 0.5, 0.5, 1.0), (0.0, 0.45, 0.7, 0.9), (0.85, 0.37, 0.0, 1.0)
 
 
@@ -226,8 +226,7 @@ Place = Callable[[float, float], tuple[Sequence[float], Sequence[float]]]
 
 
 def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
-    """The rim of the sheet's cells in m, as points of a line; ``place`` says where it lies that does not lie as its
-    Skin says."""
+    """The rim of the sheet's cells in m, as points of a line; ``place`` overrides the Skin's surface."""
     x0, x1 = -sheet.pitch_x_mm / 2, (sheet.columns - 0.5) * sheet.pitch_x_mm
     y0, y1 = -sheet.pitch_y_mm / 2, (sheet.rows - 0.5) * sheet.pitch_y_mm
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
@@ -241,8 +240,8 @@ def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
 
 
 def markers(rim: Sequence[Message], found: Sequence[Track], head: Message, forces: Contacts | None = None) -> Message:
-    """A ``visualization_msgs/MarkerArray``, which RViz and Foxglove draw: the rim, and for each contact a ball as large
-    as its zone, its id, and an arrow: the force on the link, or where none is known the inward normal."""
+    """A ``visualization_msgs/MarkerArray`` for RViz and Foxglove: the rim, and for each contact a ball as large as its
+    zone, its id, and an arrow: the force on the link, or if unknown the inward normal."""
     shown = [_marker(head, "", 0, ADD, action=DELETE_ALL)]
     shown.append(_marker(head, "sheet", 0, LINE_STRIP, scale=(0.001, 0.0, 0.0), color=_GRAY, points=rim))
     known = forces_of(forces)

@@ -1,4 +1,4 @@
-"""Publish to ROS 2 nodes without ROS: Cyclone DDS, on this computer alone unless the network is asked for."""
+"""Publish to ROS 2 nodes without ROS, by Cyclone DDS, by default on this computer alone."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _FOLDER = "/proc/self/fd"
 
 
 def kept_inside(make: Callable[[], _Made]) -> _Made:
-    """What ``make`` returns; the sockets that it opened take packets from this computer alone. On Linux since 5.7;
-    elsewhere it changes nothing."""
+    """The result of ``make``, whose opened sockets accept packets from this computer alone. On Linux since 5.7;
+    elsewhere without effect."""
     if not sys.platform.startswith("linux"):
         return make()
     before = set(_sockets())
@@ -37,7 +37,7 @@ def kept_inside(make: Callable[[], _Made]) -> _Made:
 
 
 def _sockets() -> dict[str, int]:
-    """The process's sockets: their names, and a number of each."""
+    """The process's sockets: names, and a number of each."""
     found = {}
     for number in os.listdir(_FOLDER):
         with contextlib.suppress(OSError):  # closed meanwhile
@@ -61,15 +61,15 @@ LOCALHOST = """<CycloneDDS><Domain Id="any">
 {compatibility}</Domain></CycloneDDS>"""
 NETWORK = '<CycloneDDS><Domain Id="any">{compatibility}</Domain></CycloneDDS>'
 _NO_TYPE_INFORMATION = "<Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>"
-"""Fast DDS of Kilted describes types in another way than Cyclone; the hash in the user data tells them apart."""
+"""Fast DDS of Kilted describes types differently from Cyclone; the hash in the user data distinguishes them."""
 
 
 class Publisher:
     """A participant with a writer for each topic; a context manager."""
 
     def __init__(self, namespace: str = "skin", domain: int = 0, network: bool = False):
-        """``namespace`` is that of the topics; ``domain`` is ROS_DOMAIN_ID. On this computer alone, unless ``network``.
-        Raises :class:`~contactfpga.MissingExtra`."""
+        """``namespace`` of the topics; ``domain`` is ROS_DOMAIN_ID. On this computer alone, unless ``network``. Raises
+        :class:`~contactfpga.MissingExtra`."""
         try:
             from cyclonedds.domain import Domain, DomainParticipant
         except ModuleNotFoundError as error:
@@ -89,7 +89,7 @@ class Publisher:
         self._writers = {name: self._writer(topic) for name, topic in TOPICS.items()}
 
     def topic(self, name: str) -> str:
-        """The whole name of a topic."""
+        """The full name of a topic."""
         return TOPICS[name].resolved(self._namespace)
 
     def send(self, topic: str, data: bytes) -> None:
@@ -103,7 +103,7 @@ class Publisher:
         writer.write(sample)
 
     def subscribers(self, topic: str) -> int:
-        """How many take a topic now."""
+        """Current number of subscribers of a topic."""
         return len(self._writers[topic][0].get_matched_subscriptions())
 
     def _writer(self, topic: Topic) -> tuple[Any, Any]:
@@ -127,7 +127,7 @@ class Publisher:
 
 
 def qos_of(topic: Topic) -> Any:
-    """Quality of service of a topic's writer; a reader's fits it."""
+    """Quality of service of a topic's writer, also for readers."""
     from cyclonedds.core import Policy, Qos
     from cyclonedds.util import duration
 
@@ -142,7 +142,7 @@ def qos_of(topic: Topic) -> Any:
 
 @functools.cache
 def idl_type(name: str) -> Any:
-    """The type as cyclonedds describes it, under the name that ROS 2 gives it on the wire."""
+    """The cyclonedds type, under its ROS 2 name on the wire."""
     from cyclonedds.idl import make_idl_struct
 
     package, _, short = name.partition("/")

@@ -1,5 +1,5 @@
-"""From what a board sends to messages: which, and when; and how the board fares. The same for a ROS 2 node and for
-Cyclone DDS."""
+"""From a board's data to messages: selection and timing, and diagnostics. The same for a ROS 2 node and for Cyclone
+DDS."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from contactfpga.robot.haptics.live import FrameSource
 
 KEPT_S = 1.0
-"""The difference of the clocks is measured as often: they drift apart, and a clock may be set."""
+"""Interval of measuring the difference of the clocks, which drift and may be set."""
 _TRIES = 5
 
 
@@ -37,11 +37,11 @@ class Moments:
         self._offset_ns = 0
 
     def now(self) -> int:
-        """In ns."""
+        """The current time in ns."""
         return self._now_ns()
 
     def of(self, zones: Zones) -> int:
-        """When a frame was sampled, in ns; of a recording, which does not say so, now."""
+        """Sample time of a frame in ns; the current time for a recording without one."""
         return self._now_ns() if zones.host_time_s is None else self._shifted(zones.host_time_s)
 
     def _shifted(self, seconds: float) -> int:
@@ -52,7 +52,7 @@ class Moments:
         return round(seconds * 1e9) + self._offset_ns
 
     def _measured(self) -> int:
-        """The difference of the clocks, by the reading that was interrupted for the shortest time."""
+        """The difference of the clocks, by the least interrupted reading."""
         found = []
         for _ in range(_TRIES):
             before, now_ns, after = self._clock(), self._now_ns(), self._clock()
@@ -62,15 +62,15 @@ class Moments:
 
 OK, WARN, ERROR = range(3)
 WAITED_S = 0.25
-"""Frames that wait for longer until they are taken are told."""
+"""Waiting time of frames that is reported."""
 
 _COUNTED = ("frames", "lost", "dropped", "overwritten", "resynchronized", "restarts", "skin_changes")
 _TROUBLE = ("lost", "damaged", "dropped", "restarts")
-"""Of these a new one since the last message is a warning."""
+"""Counters whose increase since the last message is a warning."""
 
 
 class Diagnostics:
-    """Counts between two messages."""
+    """Counters between two messages."""
 
     def __init__(self, board: Board, name: str, silence_s: float):
         self._board = board
@@ -83,7 +83,7 @@ class Diagnostics:
         self._faults: tuple[str, ...] = ()
 
     def frame(self, zones: Zones) -> None:
-        """A frame came."""
+        """Count a frame."""
         self._heard_s = self._board.clock()
         if zones.arrived_s is not None:
             self._waited_s = max(self._waited_s, self._heard_s - zones.arrived_s)
@@ -92,11 +92,11 @@ class Diagnostics:
 
     @property
     def silent(self) -> bool:
-        """No frame came for too long."""
+        """Whether no frame came for too long."""
         return self._board.clock() - self._heard_s > self._silence_s
 
     def message(self, head: Message, left_out: int) -> Message:
-        """A ``DiagnosticArray`` of what happened since the message before."""
+        """A ``DiagnosticArray`` of the events since the previous message."""
         counts = self._counts() | {"not published": left_out}
         now, frames = self._board.clock(), counts["frames"] - self._before.get("frames", 0)
         rate = frames / (now - self._since_s) if now > self._since_s else 0.0
@@ -131,7 +131,7 @@ class Diagnostics:
 
 
 def lost_board(name: str, why: str, head: Message) -> Message:
-    """A ``DiagnosticArray`` where no board is connected."""
+    """A ``DiagnosticArray`` without a connected board."""
     return _array(head, name, ERROR, why, "", {})
 
 
@@ -147,22 +147,22 @@ def _array(head: Message, name: str, level: int, text: str, hardware: str, value
 
 
 QUEUE = 4096
-"""Frames that wait while others are published."""
+"""Frames that may wait while others are published."""
 BEHIND_S, BEHIND_HZ = 0.02, 10.0
-"""A frame that waited for longer is published this often at most, so that those after it wait less."""
+"""Waiting time of a frame, and the largest rate above it, so that later frames wait less."""
 EARLY = 0.1
-"""Periods by which a frame may come too early: boards whose frames come at the rate asked for are not exact."""
+"""Allowed earliness in periods: boards' frame rates are not exact."""
 POLL_S = 0.1
-"""How long to wait for a frame before looking at what else is due."""
+"""Wait for a frame before checking other work."""
 
 Send = Callable[[str, bytes], None]
-"""Publishes a message, written as CDR, by the name of its topic in :data:`TOPICS`."""
+"""Publishes a CDR message by the name of its topic in :data:`TOPICS`."""
 Felt = Callable[[Zones, Tracks], "Contacts | None"]
-"""The forces at the zones of a frame, from pressure units; None: no readings belong to it."""
+"""The forces at the zones of a frame, from pressure units; None: it has no readings."""
 
 
 class Feed:
-    """Publishes what a board says. Its methods are called by one thread."""
+    """Publishes a board's data. One thread calls its methods."""
 
     def __init__(
         self,
@@ -175,7 +175,7 @@ class Feed:
         """``now_ns`` is the clock of the messages, in ns."""
         self.settings = settings or Settings()
         self.left_out = 0
-        """Frames that were followed, but not published, because they came faster than ``zones_hz``."""
+        """Frames tracked but not published, because they were faster than ``zones_hz``."""
         self._board = board
         self._send = send
         self._felt = felt
@@ -192,7 +192,7 @@ class Feed:
         self._diagnostics = Diagnostics(board, self._frame, self.settings.silence_s)
 
     def run(self, frames: FrameSource, stop: Callable[[], bool] = lambda: False) -> None:
-        """Publish until ``stop`` says so, or a recording ends; errors as for :meth:`Board.next`."""
+        """Publish until ``stop`` returns true, or a recording ends; errors as for :meth:`Board.next`."""
         self.begin()
         while not stop():
             try:
@@ -204,14 +204,14 @@ class Feed:
             self.tick()
 
     def begin(self) -> None:
-        """Say what does not change: the Skin, and where the sheet is."""
+        """Publish the constants: the Skin, and the sheet's place."""
         self._put("skin", convert.skin(self._board.hello, self._head(self._frame)))
         if self.settings.parent:
             moved = self.settings.place_m, self.settings.turn_rad
             self._put("/tf_static", convert.transform(self._head(self.settings.parent), self._frame, *moved))
 
     def frame(self, zones: Zones) -> None:
-        """Follow a frame, and publish it if that is due or the number of zones changed."""
+        """Track a frame, and publish it if due or if the number of zones changed."""
         tracks = self._tracker.update(zones)
         self._last = zones, tracks
         self._events += tracks.events
@@ -232,14 +232,14 @@ class Feed:
         self._events, self._restarted = [], False
 
     def _wanted(self, zones: Zones) -> bool:
-        """Whether to publish a frame. Frames wait where the computer is busy, or was while the board was opened."""
+        """Whether to publish a frame. Frames wait while the computer is busy, or was during opening."""
         now = self._board.clock()
         if zones.arrived_s is not None and now - zones.arrived_s > BEHIND_S:
             return now - self._published_s >= 1 / BEHIND_HZ
         return self._is_due("zones", self.settings.zones_hz)
 
     def tick(self) -> None:
-        """Publish what is due by the clock alone."""
+        """Publish what is due by time alone."""
         if self._is_due("diagnostics", self.settings.diagnostics_hz):
             self._put("/diagnostics", self._diagnostics.message(self._head(""), self.left_out))
         if self._last is None or self._diagnostics.silent or not self._is_due("markers", self.settings.markers_hz):
@@ -255,7 +255,7 @@ class Feed:
         self._send(topic, encode(TOPICS[topic].type, message))
 
     def _is_due(self, what: str, rate_hz: float) -> bool:
-        """Whether it is time to do it, at this rate on average. What was missed is not made up for."""
+        """Whether it is due, at this average rate, without making up for missed ones."""
         now, due, period_s = self._board.clock(), self._due[what], 1 / rate_hz
         if now < due - EARLY * period_s:
             return False

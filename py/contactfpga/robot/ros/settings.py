@@ -1,4 +1,4 @@
-"""What is published, where and how often."""
+"""Topics, names and rates of publishing."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ MOST_HZ = 100_000.0
 
 @dataclasses.dataclass(frozen=True)
 class Topic:
-    """A topic."""
+    """A topic with its type."""
 
     name: str
-    """Below the namespace, or with a slash as it is."""
+    """Name below the namespace; with a slash, absolute."""
     type: str
     depth: int
     latched: bool = False
-    """Late subscribers get the last message."""
+    """Whether late subscribers get the last message."""
 
     def resolved(self, namespace: str) -> str:
-        """The whole name."""
+        """The full name."""
         return self.name if self.name.startswith("/") else f"/{namespace.strip('/')}/{self.name}"
 
 
@@ -43,22 +43,22 @@ TOPICS = {
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Raises ValueError for what cannot be."""
+    """Settings of a feed. Raises ValueError for impossible values."""
 
     frame: str = ""
-    """Name of the link's frame; "": the board's name, or ``skin`` where it has none."""
+    """Name of the link's frame; "": the board's name, or ``skin`` if unnamed."""
     parent: str = ""
-    """The frame in which the sheet's is published; "": it is not, because something else does."""
+    """The frame in which the sheet's is published; "": not published here."""
     place_m: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """Where the sheet's frame lies in its parent, in m."""
+    """Position of the sheet's frame in its parent, in m."""
     turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """How it is turned: about the fixed x, y and z axes in turn, in rad."""
+    """Rotation of the sheet's frame: about the fixed x, y and z axes in turn, in rad."""
     zones_hz: float = 1000.0
-    """Zones, tracks and contacts at most as often; a frame with another number of zones is always published."""
+    """Largest rate of zones, tracks and contacts; a frame with another number of zones is always published."""
     markers_hz: float = 30.0
     diagnostics_hz: float = 1.0
     silence_s: float = 0.5
-    """After this time without a frame, diagnostics say that the board is silent."""
+    """Time without a frame after which diagnostics report a silent board."""
 
     def __post_init__(self) -> None:
         for name in ("frame", "parent"):

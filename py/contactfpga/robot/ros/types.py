@@ -1,5 +1,4 @@
-"""The types of messages, read from their texts, which are the same files that a ROS workspace builds; and the hash by
-which ROS 2 tells whether two programs mean the same type (REP 2011)."""
+"""Message types, read from the texts that a ROS workspace builds; and their hash in ROS 2 (REP 2011)."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = "contactfpga_msgs"
-"""Of our own messages."""
+"""Package of our own messages."""
 
 STANDARD = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
@@ -61,7 +60,7 @@ bool mesh_use_embedded_materials
 """,
     "visualization_msgs/MarkerArray": "Marker[] markers\n",
 }
-"""The standard messages of ROS 2 that we use: their fields, in their order, as Jazzy and Kilted have them."""
+"""The standard messages of ROS 2 that we use, with fields in order, as in Jazzy and Kilted."""
 
 PRIMITIVES = {
     "bool": "?",
@@ -95,7 +94,7 @@ class MessageField:
     type: str
     """A key of :data:`PRIMITIVES`, ``string``, or the name of a message: ``std_msgs/Header``."""
     count: int | None
-    """Of an array with so many elements; 0: as many as there are; None: it is no array."""
+    """Length of a fixed array; 0: any length; None: no array."""
 
     @property
     def nested(self) -> bool:
@@ -105,23 +104,23 @@ class MessageField:
 
 @dataclasses.dataclass(frozen=True)
 class MessageType:
-    """A type of messages."""
+    """A message type."""
 
     name: str
     """Package and type: ``contactfpga_msgs/Zones``."""
     fields: tuple[MessageField, ...]
     constants: tuple[tuple[str, int], ...]
-    """Numbers that fields may have."""
+    """Named constants."""
     text: str
 
     def constant(self, name: str) -> int:
-        """A number by its name in the text."""
+        """A constant by its name in the text."""
         return dict(self.constants)[name]
 
 
 @functools.cache
 def message_type(name: str) -> MessageType:
-    """A type by its name: ours, or one of the standard messages that we use. Raises KeyError for another one."""
+    """A type by its name: ours, or a standard message that we use. Raises KeyError otherwise."""
     package, _, short = name.partition("/")
     if package != PACKAGE:
         return _parsed(name, STANDARD[name])
@@ -132,7 +131,7 @@ def message_type(name: str) -> MessageType:
 
 
 def needed(name: str) -> list[MessageType]:
-    """The types that a type holds, and those they hold, each once, sorted by name; without itself."""
+    """All types nested in a type, each once, sorted by name."""
     found: dict[str, MessageType] = {}
     todo = [name]
     while todo:
@@ -144,7 +143,7 @@ def needed(name: str) -> list[MessageType]:
 
 
 def schema(name: str) -> str:
-    """The text of a type with those of all that it holds, as recordings keep it (encoding ``ros2msg``)."""
+    """The text of a type with those of all nested types, as in recordings (encoding ``ros2msg``)."""
     parts = [message_type(name).text]
     parts += [f"{'=' * 80}\nMSG: {one.name}\n{one.text}" for one in needed(name)]
     return "".join(part if part.endswith("\n") else part + "\n" for part in parts)
@@ -188,7 +187,7 @@ _NUMBERS = {
     "string": 17,
 }
 _NESTED, _FIXED_ARRAY, _ANY_ARRAY = 1, 48, 144
-"""What is added to a type's number for an array of a fixed and of any length."""
+"""Increments of a type's number for an array of fixed and of any length."""
 
 
 @functools.cache

@@ -1,1 +1,1 @@
-"""The commands of `contactfpga`, one file or folder each; loaded when called."""
+"""The commands of `contactfpga`, one file or folder each; loaded on call."""

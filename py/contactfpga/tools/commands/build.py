@@ -1,4 +1,4 @@
-"""`contactfpga build`: a bitstream for a board, what it takes of the FPGA, and how the sheet is wired to it."""
+"""`contactfpga build`: a bitstream for a board, its FPGA resources, and the sheet's wiring."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; :data:`UNSOLVED` where ``--check`` finds that something does not fit."""
+    """Run the command; :data:`UNSOLVED` if ``--check`` finds a misfit."""
     from contactfpga_hdl.board import sites
 
     board = flags.named_board(args)
@@ -61,8 +61,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """That of the Skin's file, or of the board's own Skin. Raises CircuitError where it cannot work, or where times are
-    too short for it."""
+    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if it cannot work, or if times
+    are too short for it."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)
@@ -75,7 +75,7 @@ def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several)
 
 
 def _check(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> int:
-    """Print what fits and what does not, and values that fit together."""
+    """Print what fits and what does not, and fitting values."""
     from contactfpga_hdl.board import build
 
     if isinstance(design, Several):
@@ -120,7 +120,7 @@ def _changed(several: Several) -> list[dict[str, Any]]:
 
 
 def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> dict[str, Any]:
-    """Build the bitstream and print what it takes; the same for JSON."""
+    """Build the bitstream and print its resources; returns them for JSON."""
     from contactfpga_hdl.board import build
 
     folder = outputs.folder(args.output or default_folder(board, args.kit))
@@ -142,7 +142,7 @@ def _described(skin: Skin | Several) -> str:
 
 
 def default_folder(board: BoardSpec, kit: str | None) -> Path:
-    """Where the bitstream of a board, or of a kit, is put and looked for."""
+    """Folder of the bitstream of a board, or of a kit."""
     return Path("build", "kits", kit) if kit else Path("build", board.name)
 
 
@@ -155,17 +155,17 @@ DIODES = {
 
 @dataclasses.dataclass(frozen=True)
 class WiringTable:
-    """All wires of a sheet, or of several ones, on a board, with what its circuit states."""
+    """All wires of one or several sheets on a board, with the circuit's values."""
 
     board: BoardSpec
     skin: Skin | Several
     circuit: Circuit | None
-    """None: the Skin's file has no table ``[circuit]``, so resistors have no values here."""
+    """None: the Skin's file has no table ``[circuit]``, so resistors have no values."""
     sites: Sequence[str]
     """FPGA pins of the wires."""
 
     def show(self) -> None:
-        """Print it."""
+        """Print the table."""
         for sheet, skin in self._sheets:
             terminal.say(
                 f"{self.board.title}, {sheet and f'sheet {sheet}: '}{skin.rows}x{skin.columns}, rows {skin.row_drive}, "
@@ -187,7 +187,7 @@ class WiringTable:
         terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
 
     def to_dict(self) -> dict[str, Any]:
-        """The same for JSON; ohms are null where nothing is fitted or stated."""
+        """The table for JSON; ohms are null where nothing is fitted or stated."""
         return {
             "wires": [
                 {"wire": wire.port, "pin": self.board.label(wire.pin) if wire.pin else None, "fpga": site}
@@ -205,7 +205,7 @@ class WiringTable:
 
     @property
     def _sheets(self) -> list[tuple[str, Skin]]:
-        """Each Skin with the number of its sheet; "" where there is one."""
+        """Each Skin with the number of its sheet; "" for a single one."""
         if isinstance(self.skin, Several):
             return [(str(number), skin) for number, skin in enumerate(self.skin.skins)]
         return [("", self.skin)]
@@ -237,7 +237,7 @@ class WiringTable:
 
 
 def _show(rows: Sequence[Sequence[str]]) -> None:
-    """Print the columns that have something in them, where there are lines."""
+    """Print the nonempty columns, if there are rows."""
     from contactfpga.tools.console import tables  # JSON needs no display
 
     if len(rows) > 1:

@@ -1,4 +1,4 @@
-"""`contactfpga doctor`: looks at everything between this computer and the board, and says what to do."""
+"""`contactfpga doctor`: checks everything between this computer and the board, and names remedies."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ EXTRA = None
 COUNTED_S = 1.0
 
 FAULTS = ("stuck", "flutter")
-"""Kinds of suspicion that are no note: it takes more than a hand to bring them about."""
+"""Kinds of suspicion that are faults, not notes: a hand alone does not cause them."""
 
 STUCK_S = 10.0
-"""After which a pressed switch that does not change is told, where the user names no time."""
+"""Default time after which a constantly pressed switch is reported."""
 
 ZONES_ONLY = (
     'the board sends zones, so dead and loose switches cannot be told; for these set report = "cells" in the Skin\'s '
@@ -54,7 +54,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; status 1 when a fault was found."""
+    """Run the command; returns 1 if a fault was found."""
     if args.list:
         return _list(args)
     if args.watch and args.self_test:
@@ -73,12 +73,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Report:
-    """What was found so far, printed as it comes unless ``silent``."""
+    """The findings so far, printed at once unless ``silent``."""
 
     def __init__(self, silent: bool):
         self.stats: Stats | None = None
         self.lines: list[str] | None = None
-        """Names of the faults that the board told last; None: it tells none."""
+        """Names of the faults last reported by the board; None: it reports none."""
         self._silent = silent
         self._findings: list[Finding] = []
 
@@ -110,7 +110,7 @@ def _line(finding: Finding) -> str:
 
 
 def _list(args: argparse.Namespace) -> int:
-    """All boards; status 1 where there is none."""
+    """List all boards; returns 1 without any."""
     skin = Skin.load(args.skin) if args.skin else None
     heard = finding.survey(finding.candidates(), args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
     boards = [one for one in heard if one.hello is not None]
@@ -165,7 +165,7 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
 
 
 def _watch(args: argparse.Namespace) -> int:
-    """Watch for ``args.seconds`` or until Ctrl-C; status 1 when a switch is stuck, loose or never read pressed."""
+    """Watch for ``args.seconds`` or until Ctrl-C; returns 1 if a switch is stuck, loose or never read pressed."""
     with flags.opened(args) as board:
         skin = flags.known_skin(board)
         watch = Watch(skin, stuck_s=args.stuck_s or STUCK_S)
@@ -201,7 +201,7 @@ def _watch(args: argparse.Namespace) -> int:
 
 
 def suspected(suspicion: Suspicion) -> Finding:
-    """What a watch noticed."""
+    """The finding of a watch."""
     return Finding("fault" if suspicion.kind in FAULTS else "note", suspicion.sentence)
 
 
@@ -223,8 +223,8 @@ def _without_mask(skin: Skin | None) -> list[Finding]:
 
 
 def dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
-    """The names of switches that ``never`` read pressed, of all that were ``seen``. Whole lines first:
-    these are broken wires rather than dead switches."""
+    """The names of switches that ``never`` read pressed, of all ``seen``. Whole lines come first, as broken wires
+    rather than dead switches."""
     rows = sorted({row for row, _ in never if not seen[row].any()})
     columns = sorted({column for _, column in never if not seen[:, column].any()})
     left = [(row, column) for row, column in never if row not in rows and column not in columns]
@@ -248,7 +248,7 @@ def _watched(watch: Watch, findings: list[Finding], seconds: float, faults: int)
 
 
 def _self_test(args: argparse.Namespace) -> int:
-    """Test for ``args.seconds`` or until Ctrl-C; status 1 when lines are joined or a diode is bridged."""
+    """Test for ``args.seconds`` or until Ctrl-C; returns 1 if lines are joined or a diode is bridged."""
     with flags.opened(args) as board:
         known: list[LineFinding] = []
         last: list[SelfTest] = []
@@ -299,5 +299,5 @@ def _tests_end(
 
 
 def tested(finding: LineFinding) -> Finding:
-    """What a self-test found."""
+    """The finding of a self-test."""
     return Finding("fault" if finding.kind == "fault" else "note", finding.sentence)

@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
-    """The task, and all candidates; raises ValueError for what cannot be."""
+    """The task, and all candidates; raises ValueError for impossible requests."""
     from contactfpga_sim.lab.fit import candidates
     from contactfpga_sim.lab.fit.faces import feels
     from contactfpga_sim.lab.fit.sources import Recorded, default_count, source
@@ -165,7 +165,7 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
-    """That of the Skin's file, those named, or the usual ones; none where nothing but recordings is asked for."""
+    """The cover of the Skin's file, the named ones, or the default ones; none for recordings alone."""
     from contactfpga_sim.lab import covers
     from contactfpga_sim.lab.fit import faces
 
@@ -179,7 +179,7 @@ def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
 
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:
-    """Those of the labellers named, or of ``cells``: the host labels them."""
+    """The methods of the named labellers, or of ``cells``: the host labels them."""
     from contactfpga_sim.lab.fit.candidates import METHODS, by
 
     if not names:
@@ -196,7 +196,7 @@ def _share(percent: float | None) -> float | None:
 
 
 def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
-    """Print what is known of the candidates; what is to be said of that."""
+    """Print the results so far; returns a sentence on them."""
     from contactfpga_sim.lab.fit import show
 
     again = "run the same command again to go on from there"

@@ -1,4 +1,4 @@
-"""`contactfpga flash`: hands a bitstream to the board's usual programmer."""
+"""`contactfpga flash`: passes a bitstream to the board's programmer."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _file(args: argparse.Namespace, board: BoardSpec) -> Path:
-    """The bitstream to write. Only that of a kit without a released one need not be there yet."""
+    """The bitstream to write, which may be missing only for a kit without a released one."""
     if args.kit and not args.file:
         released = kits.kit(args.kit).bitstream
         return released if released.is_file() else bitstream_path(board, default_folder(board, args.kit))
@@ -67,7 +67,7 @@ def _build(kit: kits.Kit, folder: Path) -> None:
 
 
 def _tool(programmer: Programmer) -> str | None:
-    """Path of the program, or of its wheel's command where that starts; None where neither does."""
+    """Path of the program, or of its wheel's command if it starts; None otherwise."""
     if (found := shutil.which(programmer.tool)) is not None or not programmer.wheel:
         return found
     beside = shutil.which(programmer.wheel) or shutil.which(programmer.wheel, path=str(Path(sys.executable).parent))

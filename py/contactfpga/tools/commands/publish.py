@@ -31,8 +31,8 @@ PORTS = (
     "them publish several boards (default: the one supported board plugged in; with --skin, the one with that Skin)."
 )
 SHOWN_S = 0.2
-"""How often to check which boards are still there. Boards that go within this time, as all sheets of one FPGA do, are
-reported together."""
+"""Interval of checking which boards are still there. Boards lost within it, as all sheets of one FPGA, are reported
+together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int]]:
-    """Device and baud rate of each board, by its key."""
+    """Device and baud rate of each board, by key."""
     found: dict[str, tuple[str, int]] = {}
     for port in args.ports or [None]:
         if port is not None and port.startswith(("replay:", NET)):
@@ -96,14 +96,14 @@ def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int
 
 
 def _refuse(first: str, second: str, of: str) -> NoReturn:
-    """Two ports would have the same key."""
+    """Refuse two ports with the same key."""
     if _place(first) == _place(second) != ("sim", None):
         raise ContactFPGAError(f"{second} is the port {first}, which is named already; name it once")
     raise ContactFPGAError(f"{first} and {second} would both be {of}; give their Skins different names")
 
 
 def _place(port: str) -> tuple[str, int | None]:
-    """The device behind a name and the number of the sheet; each ``sim://`` without one is a board of its own."""
+    """The device behind a name and the number of the sheet; each ``sim://`` without one is a separate board."""
     sheet = SheetOf.parse(port)
     name, number = (port, None) if sheet is None else (sheet.port, sheet.number)
     virtual = name.startswith("sim:")
@@ -113,7 +113,7 @@ def _place(port: str) -> tuple[str, int | None]:
 
 
 def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
-    """One thread each. If a board is gone, the others go on."""
+    """Run one thread per publisher. If a board is gone, the others go on."""
     stop = threading.Event()
     ended: queue.SimpleQueue[Exception] = queue.SimpleQueue()
     threads = [threading.Thread(target=_run, args=(*one, stop, ended), daemon=True) for one in publishers.items()]
@@ -136,7 +136,7 @@ def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
 
 
 def _ended(ended: queue.SimpleQueue[Exception]) -> list[Exception]:
-    """Why boards are gone, of all those that went together."""
+    """Reasons of the boards lost together."""
     try:
         found = [ended.get(timeout=SHOWN_S)]
     except queue.Empty:

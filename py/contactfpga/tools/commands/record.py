@@ -1,4 +1,4 @@
-"""`contactfpga record`: everything a board says, into a file; and what is whole of a file that was not closed."""
+"""`contactfpga record`: a board's data into a file; and recovery of a file that was not closed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 EXTRA = "record"
 
 SHOWN_S = 0.5
-"""How often the progress is shown."""
+"""Interval of the progress display."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -78,7 +78,7 @@ def _record(args: argparse.Namespace) -> int:
 
 
 def _body(args: argparse.Namespace) -> Body | None:
-    """The robot that is to be recorded; None: a board."""
+    """The robot to record; None: a board."""
     if not names_robot(args.port):
         return None
     from contactfpga.robot.body import Body
@@ -107,7 +107,7 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
 
 def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
-    """What says the forces at contacts of a link with pressure units."""
+    """A function that computes the forces at contacts of a link with pressure units."""
     from contactfpga.robot.body.snapshot import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
@@ -141,7 +141,7 @@ def _pieces(count: int) -> str:
 
 
 class _Progress:
-    """A line that is written over, where the terminal can do so, and the last word."""
+    """A progress line, overwritten if the terminal can, and the final message."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

@@ -1,4 +1,4 @@
-"""`contactfpga ros`: what the skin says as ROS 2 topics, without an installation of ROS."""
+"""`contactfpga ros`: the skin's data as ROS 2 topics, without an installation of ROS."""
 
 from __future__ import annotations
 

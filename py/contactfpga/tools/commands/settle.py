@@ -1,4 +1,4 @@
-"""`contactfpga settle`: which times a sheet's circuit needs, and whether it can work."""
+"""`contactfpga settle`: times that a sheet's circuit needs, and whether it can work."""
 
 from __future__ import annotations
 
@@ -75,8 +75,7 @@ def _flag(name: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; :data:`UNSOLVED` if the sheet cannot work, a time is never long enough, or the Skin's are too
-    short."""
+    """Run the command; :data:`UNSOLVED` if the sheet cannot work, no time suffices, or the Skin's are too short."""
     args.skin = flags.sheet_file(args)
     skin = Skin.load(args.skin) if args.skin else Skin()
     if skin.diodes == "none" and args.diodes is None:
@@ -143,7 +142,7 @@ def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: flo
 
 
 def _given(skin: Skin, wanted: dict[str, float | None]) -> dict[str, Any]:
-    """Whether the Skin's times are enough."""
+    """Whether the Skin's times suffice."""
     return {
         name: {
             "given": getattr(skin, name),

@@ -1,4 +1,4 @@
-"""`contactfpga sheet`: the sheet of a Skin as files to order, and what its lines come to as a circuit."""
+"""`contactfpga sheet`: the sheet of a Skin as files to order, and the circuit of its lines."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 1 if KiCad was asked and found something."""
+    """Run the command; returns 1 if KiCad was run and found something."""
     from contactfpga.design.sheet import check, files
     from contactfpga.design.sheet.caps import caps
     from contactfpga.design.sheet.extract import extracted

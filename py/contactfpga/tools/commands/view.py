@@ -78,5 +78,5 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _has_display() -> bool:
-    """Whether a browser would have a window: one in the terminal cannot show this."""
+    """Whether a browser would have a window, as one in the terminal cannot show this."""
     return not sys.platform.startswith("linux") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

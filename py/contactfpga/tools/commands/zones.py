@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Follow:
-    """Follows contacts over all frames, also those that are not shown, where ids or forces are asked for."""
+    """Follows contacts over all frames, also those not shown, if ids or forces are requested."""
 
     def __init__(self, args: argparse.Namespace, forces: Forces | None):
         self._tracker = Tracker() if args.tracks else None
@@ -61,7 +61,7 @@ class _Follow:
         self.forces = forces
 
     def frames(self, board: Board) -> FrameSource:
-        """The board's frames, to the end that was asked for; with forces, each once its readings are known."""
+        """The board's frames up to the requested end; with forces, each once its readings are known."""
         frames: FrameSource = board if self.forces is None else WithReadings(board)
         return frames if self._seconds is None else _TimeLimit(frames, self._seconds)
 

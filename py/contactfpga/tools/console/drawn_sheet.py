@@ -1,7 +1,7 @@
-"""A sheet drawn with characters, row 0 on top: what the board tells of it, and no more.
+"""A sheet drawn with characters, row 0 on top, from the board's frames alone.
 
-A board that sends cells has them drawn. One that sends zones says how large each is and where its barycenter lies; of
-its shape it says nothing, so a thin circle shows the size, and the line below says what it is.
+Cells are drawn if the board sends them. Of a zone only size and barycenter are known, not its shape, so a thin circle
+shows the size, with a line of explanation below.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from contactfpga.zones.zone import Zones
 Mask = Iterable[tuple[int, int]]
 
 SCALES = (4, 2, 1)
-"""Dots from a cell to the next, the largest drawing first. A character holds 2 x 4 dots, as those of braille do."""
+"""Dots per cell, the largest drawing first. A character holds 2 x 4 dots, as in braille."""
 
 ACROSS, DOWN = 2, 4
 
 FREE, CELL, CIRCLE, CENTER, MASKED, SEEN, FLUTTERS, STUCK = range(8)
-"""What a character shows."""
+"""Meaning of a character."""
 
 STYLES = {
     FREE: "dim",
@@ -45,7 +45,7 @@ _SIGNS = {
 
 @dataclasses.dataclass(frozen=True)
 class Marks:
-    """What is known of cells from earlier frames: (rows, columns) bool each."""
+    """Knowledge of cells from earlier frames: (rows, columns) bool each."""
 
     seen: np.ndarray
     flutters: np.ndarray
@@ -54,7 +54,7 @@ class Marks:
 
 @dataclasses.dataclass(frozen=True)
 class SheetDrawing:
-    """Characters, what each of them shows, and a line that says how to read them."""
+    """Characters, their meanings, and a line of explanation."""
 
     characters: np.ndarray
     """(lines, columns) of one character each."""
@@ -63,12 +63,12 @@ class SheetDrawing:
 
     @property
     def text(self) -> str:
-        """The lines, with nothing at their ends."""
+        """The lines without trailing spaces."""
         return "\n".join("".join(line).rstrip() for line in self.characters)
 
 
 def scales(zones: Zones, width: int, height: int | None) -> list[int]:
-    """Those of the :data:`SCALES` at which the sheet fits; the smallest one if none does."""
+    """The :data:`SCALES` at which the sheet fits; the smallest if none does."""
     sizes = ((scale, *size(zones, scale)) for scale in SCALES)
     fit = [scale for scale, wide, high in sizes if wide <= width and (height is None or high <= height)]
     return fit or [SCALES[-1]]
@@ -82,8 +82,8 @@ def size(zones: Zones, scale: int) -> tuple[int, int]:
 def draw(
     zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask = (), marks: Marks | None = None
 ) -> SheetDrawing:
-    """The sheet of one frame: its pressed cells if the board sends them, else its zones' barycenters and sizes.
-    ``mask``: the (row, column) of switches that are known to be absent; ``marks``: of a board that sends cells."""
+    """The sheet of one frame: pressed cells if the board sends them, else the zones' barycenters and sizes. ``mask``:
+    the (row, column) of absent switches; ``marks``: of a board that sends cells."""
     wide, high = size(zones, scale)
     signs = _SIGNS[unicode]
     characters = np.full((high, wide), signs[FREE])
@@ -161,7 +161,7 @@ def _spread(cells: np.ndarray, scale: int) -> np.ndarray:
 
 
 def _blocks(dots: np.ndarray, filled: bool = False) -> np.ndarray:
-    """(lines, columns, 4, 2): the dots of each character; what lies beyond the sheet is ``filled`` or not."""
+    """(lines, columns, 4, 2): the dots of each character; beyond the sheet they are ``filled`` or not."""
     high, wide = dots.shape
     padded = np.pad(dots, ((0, -high % DOWN), (0, -wide % ACROSS)), constant_values=filled)
     blocks: np.ndarray = padded.reshape(-(-high // DOWN), DOWN, -(-wide // ACROSS), ACROSS).swapaxes(1, 2)
@@ -191,7 +191,7 @@ def _circles(zones: Zones, scale: int) -> np.ndarray:
 
 
 def _centers(zones: Zones, scale: int) -> Iterable[tuple[int, int]]:
-    """Column and line of the character in which each barycenter lies."""
+    """Column and line of each barycenter's character."""
     wide, high = size(zones, scale)
     for x, y in _places(zones, scale):
         column, line = math.floor(x / ACROSS), math.floor(y / DOWN)
@@ -201,7 +201,7 @@ def _centers(zones: Zones, scale: int) -> Iterable[tuple[int, int]]:
 
 def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
     """The barycenters in dots from the upper left corner of cell (0, 0). In the largest drawing a cell's sign is on its
-    left, and so is what lies in its middle."""
+    left, as is its middle."""
     sheet = zones.sheet
     middle = (0.5 if scale < SCALES[0] else 0.25) * scale
     found = [
@@ -212,5 +212,5 @@ def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
 
 
 def _placed(zones: Zones) -> list[tuple[float, float, float]]:
-    """x and y in mm and area in mm2 of the zones that have a place: a frame flagged `mismatch` may hold others."""
+    """x and y in mm and area in mm2 of the zones with a place, which those in a frame flagged `mismatch` may lack."""
     return [(zone.x_mm, zone.y_mm, zone.area_mm2) for zone in zones if zone.x_mm is not None and zone.y_mm is not None]

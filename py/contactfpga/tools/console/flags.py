@@ -1,4 +1,4 @@
-"""Flags that several commands share."""
+"""Flags of several commands."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ SKIN = "Require a board built from this Skin, and use its baud rate."
 
 
 def connection(parser: argparse.ArgumentParser, port: str = PORT, skin: str = SKIN) -> None:
-    """What :func:`opened` takes; ``port``, ``skin``: the help of these."""
+    """Add the flags of :func:`opened`; ``port``, ``skin``: their help."""
     parser.add_argument("port", nargs="?", metavar="PORT", help=port)
     reading(parser, skin)
 
 
 def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
-    """How a port is opened; ``skin``: the help of this option."""
+    """Add the flags for opening a port; ``skin``: help of this option."""
     parser.add_argument("--skin", metavar="FILE", help=skin)
     parser.add_argument(
         "--baud", type=numbers.BAUD, metavar="N", help="Bits per second (default: the Skin's, or 3000000)."
@@ -40,18 +40,18 @@ def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
 
 
 def sheet(parser: argparse.ArgumentParser, skin: str) -> None:
-    """A Skin's file or a kit's name; ``skin``: the help of the former."""
+    """Add a Skin's file or a kit's name; ``skin``: help of the former."""
     parser.add_argument("--skin", metavar="FILE", help=skin)
     kit(parser)
 
 
 def kit(parser: argparse.ArgumentParser) -> None:
-    """A kit by its name."""
+    """Add a kit by name."""
     parser.add_argument("--kit", metavar="NAME", help="The sheet of this kit (docs/kits.md).")
 
 
 def sheet_file(args: argparse.Namespace) -> str | None:
-    """The Skin's file that the options of :func:`sheet` name, or None."""
+    """The Skin's file by the options of :func:`sheet`, or None."""
     given: str | None = args.skin
     if not args.kit:
         return given
@@ -61,7 +61,7 @@ def sheet_file(args: argparse.Namespace) -> str | None:
 
 
 def board(args: argparse.Namespace) -> BoardSpec | None:
-    """The board that ``--board`` or its argument names, or that of ``--kit``; None where neither is given."""
+    """The board of ``--board`` or its argument, or of ``--kit``; None if neither is given."""
     if not args.kit:
         return find(args.board) if args.board else None
     found = kits.kit(args.kit).board
@@ -71,7 +71,7 @@ def board(args: argparse.Namespace) -> BoardSpec | None:
 
 
 def named_board(args: argparse.Namespace) -> BoardSpec:
-    """As :func:`board`; raises :class:`ContactFPGAError` where neither a board nor a kit is named."""
+    """Like :func:`board`; raises :class:`ContactFPGAError` without a board or a kit."""
     found = board(args)
     if found is None:
         known = " or --kit ".join(kits.names())
@@ -80,13 +80,13 @@ def named_board(args: argparse.Namespace) -> BoardSpec:
 
 
 def design(parser: argparse.ArgumentParser, skin: str) -> None:
-    """A Skin, a kit's or several of them; ``skin``: the help of the first option."""
+    """Add a Skin, a kit's or several of them; ``skin``: help of the first option."""
     sheet(parser, skin)
     parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
 
 
 def designed(args: argparse.Namespace, usual: Skin, load: Callable[[str], Skin] = Skin.load) -> Skin | Several:
-    """What the options of :func:`design` name, or the usual Skin; ``load`` reads a Skin's file."""
+    """The design by the options of :func:`design`, or the default Skin; ``load`` reads a Skin's file."""
     args.skin = sheet_file(args)
     if args.skin and args.sheets:
         raise ContactFPGAError("give --skin or --sheets, not both; the Skins of several sheets are in their file")
@@ -96,13 +96,13 @@ def designed(args: argparse.Namespace, usual: Skin, load: Callable[[str], Skin] 
 
 
 def seconds(parser: argparse.ArgumentParser) -> None:
-    """Of commands that run until Ctrl-C."""
+    """Add the duration of commands that run until Ctrl-C."""
     long = "End after this many seconds (default: at Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
 
 
 def forces(parser: argparse.ArgumentParser, what: str) -> None:
-    """Forces from pressure units; ``what`` the command does with them."""
+    """Add forces from pressure units; ``what`` the command does with them."""
     units = f"{what}, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
     friction = "Friction coefficient of what touches (default: 0.5); needs --units."
@@ -110,23 +110,23 @@ def forces(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def check_forces(args: argparse.Namespace) -> None:
-    """Before a board is opened: raises :class:`ContactFPGAError` for friction where no forces are asked for."""
+    """Before a board is opened: raises :class:`ContactFPGAError` for friction without forces."""
     if args.friction is not None and args.units is None:
         raise ContactFPGAError("--friction needs --units: it is used for forces only")
 
 
 def once(parser: argparse.ArgumentParser) -> None:
-    """Of commands that follow a board."""
+    """Add ``--once`` of commands that follow a board."""
     parser.add_argument("--once", action="store_true", help="Ask for one frame, show it, and exit.")
 
 
 def opened(args: argparse.Namespace, record: str | None = None) -> Board:
-    """The board that the arguments of a command name."""
+    """The board by the arguments of a command."""
     return driver.open(args.port, args.skin, baud=args.baud, record=record, timeout=args.timeout)
 
 
 def known_skin(board: Board) -> Skin | None:
-    """The board's Skin; None where only its hello is known."""
+    """The board's Skin; None if only its hello is known."""
     try:
         return board.skin
     except ContactFPGAError:
@@ -134,20 +134,20 @@ def known_skin(board: Board) -> Skin | None:
 
 
 def workers(parser: argparse.ArgumentParser) -> None:
-    """Where the pieces of a long computation run."""
+    """Add the flags for workers of a long computation."""
     parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")
     dask = "Send the work to the Dask cluster with this scheduler."
     parser.add_argument("--dask", metavar="ADDRESS", help=dask)
 
 
 def output(parser: argparse.ArgumentParser, folder: str) -> None:
-    """A folder for results."""
+    """Add a folder for results."""
     usual = f"Folder for the results (default: {folder})."
     parser.add_argument("--output", metavar="DIR", default=folder, help=usual)
 
 
 def known(option: str, names: list[str] | None, choices: list[str]) -> list[str]:
-    """The names given, or all there are; raises ValueError for one that is not among them."""
+    """The given names, or all choices; raises ValueError for an unknown one."""
     for name in names or ():
         if name not in choices:
             raise ValueError(f"{option} {name!r} is not known; take one of: {'; '.join(choices)}")

@@ -10,7 +10,7 @@ from contactfpga.zones.zone import Zones
 
 
 def cells_of(board: Board, path: str) -> LoadCells:
-    """The units in a file, which must be as many as the board has. Raises :class:`HapticsError`, OSError."""
+    """The units in a file, as many as the board has. Raises :class:`HapticsError`, OSError."""
     cells = LoadCells.load(path)
     facts = board.hello.units
     if facts is None:
@@ -21,7 +21,7 @@ def cells_of(board: Board, path: str) -> LoadCells:
 
 
 class Forces:
-    """The contacts of the frame that was taken last, and the units whose zeros wander."""
+    """The contacts of the last frame, and units with drifting zeros."""
 
     def __init__(self, cells: LoadCells, friction: float):
         self._cells, self._friction = cells, friction
@@ -30,27 +30,27 @@ class Forces:
         self.drift: Drift | None = None
         """None: no readings yet."""
         self.contacts: Contacts | None = None
-        """None: no readings belong to the frame."""
+        """None: the frame has no readings."""
 
     @classmethod
     def of(cls, board: Board, path: str | None, friction: float | None) -> Forces | None:
-        """Those that a command asks for; None where it names no file. Raises :class:`HapticsError`, OSError."""
+        """The forces requested by a command; None without a file. Raises :class:`HapticsError`, OSError."""
         return None if path is None else cls(cells_of(board, path), 0.5 if friction is None else friction)
 
     def take(self, zones: Zones, tracks: Tracks | None) -> None:
-        """The next frame."""
+        """Add the next frame."""
         self._alone.take(zones)
         self.contacts = felt(self._cells, zones, self._friction, tracks=tracks, alone=self._alone)
         if zones.units is not None:
             self.drift = self._watch.update(zones.time_us / 1e6, zones.units.readings, len(zones))
 
     def of_frame(self, zones: Zones, tracks: Tracks | None) -> Contacts | None:
-        """The same, and what it found."""
+        """Add the next frame; returns its contacts."""
         self.take(zones, tracks)
         return self.contacts
 
     def to_dict(self) -> dict[str, object]:
-        """In plain Python values, ready for JSON."""
+        """The forces in plain Python values, ready for JSON."""
         found = self.contacts
         if found is None:
             return {"contacts": None}
@@ -68,7 +68,7 @@ class Forces:
         }
 
     def sentences(self) -> list[str]:
-        """What to mind, for a display."""
+        """Warnings for a display."""
         found = self.contacts
         if found is None:
             return ["no readings of the units yet"]

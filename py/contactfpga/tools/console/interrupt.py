@@ -1,6 +1,6 @@
-"""How a command ends that fails or is interrupted: at once, with its status, and without a word that is no use.
+"""How a command ends on failure or interruption: at once, with its status, without useless output.
 
-The signal TERM, which stops services, does what Ctrl-C does, with a status of its own.
+The signal TERM, which stops services, acts like Ctrl-C, with its own status.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from contactfpga.tools.console import signals
 from contactfpga.tools.console.signals import SIGNALS
 
 AGAIN_S = 0.01
-"""After which a signal comes again that Python dropped where nothing can be raised, as in the end of an object."""
+"""Delay of repeating a signal that Python dropped where nothing can be raised, as in a destructor."""
 
 _came: int | None = None
-"""The signal that came since the command began, unless it was the usual end of what ran."""
+"""The signal since the command began, unless it was the normal end."""
 
 
 class Interruption(KeyboardInterrupt):
-    """Ctrl-C, once what was found so far is in safety; says where that is."""
+    """Ctrl-C, once the results so far are safe; the message names their place."""
 
 
 def guarded(body: Callable[[], int | None]) -> int:
-    """The status of ``body``; neither Ctrl-C nor what a user can mend ends it with a traceback.
+    """The status of ``body``; neither Ctrl-C nor a user's error ends it with a traceback.
 
-    A shell starts what runs in its background with Ctrl-C ignored, and so does everything below it. A command is
-    ended by the same signal, so it listens all the same.
+    A shell starts background processes with Ctrl-C ignored, and their children inherit this. A command is ended by the
+    same signal, so it listens anyway.
     """
     global _came
     _came = None
@@ -59,8 +59,8 @@ def guarded(body: Callable[[], int | None]) -> int:
 def leave(status: int) -> NoReturn:
     """End the process with a status of :func:`guarded`.
 
-    After a signal the process skips the destructors of C++ libraries: a library that the signal cut off while it
-    loaded may crash in them, as matplotlib 3.10 does. Functions of :mod:`atexit` run all the same.
+    After a signal the process skips destructors of C++ libraries: a library interrupted while loading may crash in
+    them, as matplotlib 3.10 does. Functions of :mod:`atexit` still run.
     """
     if status in map(signals.status, SIGNALS):
         atexit._run_exitfuncs()
@@ -103,7 +103,7 @@ def _cut_short(said: str = "") -> int:
 
 @contextlib.contextmanager
 def usual_end() -> Iterator[None]:
-    """Around what runs until Ctrl-C: that is no failure."""
+    """For code that normally runs until Ctrl-C, which is no failure."""
     global _came
     try:
         yield
@@ -118,7 +118,7 @@ def _told(error: OSError) -> str:
 
 
 def failed(reason: object) -> int:
-    """Say why a command failed; its status. What fails because a signal came is no failure."""
+    """Print why a command failed; returns its status. Failures due to a signal are none."""
     if _came is not None:
         return _cut_short()
     silence_amaranth()
@@ -150,7 +150,7 @@ def _interrupt(number: int, _: object) -> None:
 
 
 def _again(what: sys.UnraisableHookArgs) -> None:
-    """In place of Python's words about what could not be raised: where it was a signal, it comes again."""
+    """Replacement of Python's report on unraisable errors: a signal is repeated."""
     if _came is None or not issubclass(what.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(what)
         return
@@ -160,7 +160,7 @@ def _again(what: sys.UnraisableHookArgs) -> None:
 
 
 def _send(number: int) -> None:
-    """Send a signal to the main thread, and wake it if it sleeps."""
+    """Send a signal to the main thread, waking it if asleep."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:  # Windows
@@ -168,7 +168,7 @@ def _send(number: int) -> None:
 
 
 def silence_amaranth() -> None:
-    """Not a word from Amaranth about components that were made and never used: the reason is known."""
+    """Silence Amaranth's warnings about unused components, whose reason is known."""
     unused = sys.modules.get("amaranth._unused")
     if unused is not None:
         warnings.simplefilter("ignore", unused.UnusedMustUse)

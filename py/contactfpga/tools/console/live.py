@@ -1,4 +1,4 @@
-"""Follow a board frame by frame, and draw some of them. What draws needs rich, which scripts do without."""
+"""Follow a board frame by frame, and draw some frames. Drawing needs rich, which scripts do without."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ if TYPE_CHECKING:
 REFRESH_US = 66_667
 
 LISTED_S = 1.0
-"""How often a frame is shown where they stand one below the other."""
+"""Interval of frames listed below one another."""
 
 SILENT_S = 0.2
-"""Without a frame for this long, and what a board may need besides, a display says so."""
+"""Time without a frame, beyond the board's needs, that is displayed as silence."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Room:
-    """What there is for a frame."""
+    """Available space for a frame."""
 
     console: Console
     width: int
     height: int | None
-    """Lines; None where there is no end of them."""
+    """Lines; None: unlimited."""
     unicode: bool
 
     def without(self, lines: int) -> Room:
-        """The room that is left when this many lines are taken."""
+        """The space left after this many lines."""
         return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
 
 
 Render = Callable[[Zones, Room], "RenderableType"]
 
 Take = Callable[[Zones], None]
-"""Gets every frame, also those that are not shown."""
+"""Receives every frame, also those not shown."""
 
 
 def _ignore(zones: Zones) -> None:
@@ -61,8 +61,8 @@ def _ignore(zones: Zones) -> None:
 def show(
     board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: FrameSource | None = None
 ) -> int:
-    """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends, and one per
-    second where nothing can be redrawn; ``frames``: what gives the board's, by default it does."""
+    """Show one frame with ``--once``, else fifteen per second until Ctrl-C or the recording ends, or one per second
+    without redrawing; ``frames``: source of frames, default the board."""
     console = terminal.console()
     frames = frames or board
     if args.once:
@@ -78,7 +78,7 @@ def show(
 def _display(
     board: Board, args: argparse.Namespace, render: Render, take: Take, frames: FrameSource, console: Console
 ) -> None:
-    """Show frames until there are no more."""
+    """Show frames until the end."""
     if not terminal.of().live:
         if sys.stdout.isatty():
             what = "contactfpga: this terminal cannot be redrawn, so one frame per second is shown, and the last one"
@@ -96,11 +96,10 @@ def _display(
 def follow(
     board: Board, args: argparse.Namespace, take: Callable[[Zones], None], render: Render | None = None
 ) -> tuple[float, list[Finding]]:
-    """Hand every frame to ``take`` until ``args.seconds`` of device time are over (None: no limit), the recording ends,
-    no frame comes any more, or Ctrl-C. Where the terminal can be redrawn it shows what ``render`` makes of fifteen
-    frames per second.
+    """Pass every frame to ``take`` for ``args.seconds`` of device time (None: no limit), until the recording or the
+    frames end, or Ctrl-C. If the terminal can redraw, it shows fifteen per second by ``render``.
 
-    Returns the device time that was followed, in s, and what is to be said of its end and of frames that were lost.
+    Returns the followed device time in s, and findings about its end and lost frames.
     """
     first_us: int | None = None
     time_us = 0
@@ -124,7 +123,7 @@ def follow(
 
 @contextlib.contextmanager
 def shown(render: Render | None) -> Iterator[Take]:
-    """Draws what ``render`` makes of the frames that it is given, where the terminal can be redrawn."""
+    """Draws the given frames by ``render``, if the terminal can redraw."""
     if render is None or not terminal.of().live:
         yield lambda zones: None
         return
@@ -142,7 +141,7 @@ def shown(render: Render | None) -> Iterator[Take]:
 
 
 def room(console: Console, endless: bool = False) -> Room:
-    """What there is for a frame now; ``endless``: as many lines as it takes."""
+    """Current space for a frame; ``endless``: unlimited lines."""
     shown = terminal.of(console.file)  # not standard output, for which Live stands in
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
@@ -150,8 +149,8 @@ def room(console: Console, endless: bool = False) -> Room:
 def _list(
     board: Board, frames: FrameSource, args: argparse.Namespace, console: Console, render: Render, take: Take
 ) -> None:
-    """Show one frame per second below the other, at once the first, and at the end the last, be it that of a recording
-    or the one at which Ctrl-C comes."""
+    """Show one frame per second below the other, beginning with the first, and finally the last, of a recording or at
+    Ctrl-C."""
     waits: Zones | None = None  # the last one, while it is not shown
     due_s = -math.inf
 
@@ -174,9 +173,9 @@ def _list(
 def _paced(
     board: Board, frames: FrameSource, timeout: float, take: Take, tell_silence: bool = False
 ) -> Iterator[Zones | Silence]:
-    """One frame every REFRESH_US of device time, and the last one of a recording in any case.
+    """One frame every REFRESH_US of device time, and always the last of a recording.
 
-    With ``tell_silence`` no table stands still: where no frame comes what is yielded says so, until the timeout.
+    With ``tell_silence`` missing frames yield a silence until the timeout.
     """
     wait_s = min(timeout, SILENT_S + longest_pause_s(board.hello, None)) if tell_silence else timeout
     refresh = _Refresh()
@@ -202,17 +201,15 @@ def _paced(
 
 
 class _Refresh:
-    """Of frames that are shown: one every REFRESH_US of device time, not faster than that in real time.
-
-    A board on a port keeps that pace by itself; the simulated one and a recording would run ahead.
-    """
+    """Selects frames: one every REFRESH_US of device time, and not faster in real time, as simulated boards and
+    recordings would be."""
 
     def __init__(self) -> None:
         self._shown_us = -REFRESH_US
         self._due = time.monotonic()
 
     def due(self, zones: Zones) -> bool:
-        """Whether to show this frame; if so, waits until it is time to."""
+        """Whether to show this frame; if so, waits for its time."""
         if 0 <= zones.time_us - self._shown_us < REFRESH_US:
             return False
         self._shown_us = zones.time_us

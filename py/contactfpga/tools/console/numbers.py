@@ -1,4 +1,4 @@
-"""Numbers on the command line: each type says its range and unit when a value lies outside."""
+"""Numbers on the command line: each type names its range and unit when a value is outside."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def whole(low: int, high: int, unit: str = "") -> Callable[[str], int]:
 
 
 def shortened(text: str) -> str:
-    """What was typed, cut where it would fill the screen."""
+    """The input, cut to fit the screen."""
     return text if len(text) <= 40 else f"{text[:40]}..."
 
 
 def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
-    """The same, or the word `none`."""
+    """The type, or the word `none`."""
 
     def read(text: str) -> float | None:
         if text == "none":
@@ -44,7 +44,7 @@ def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
 
 
 def length(high: float, low: float = MIN_LENGTH_M) -> Callable[[str], float]:
-    """A length in m; who means mm is far outside."""
+    """A length in m; values in mm are out of range."""
     return number(low, high, "m", hint=IN_METERS)
 
 
@@ -71,7 +71,7 @@ SECONDS = number(0, 86_400, "s", above=True)
 BAUD = whole(limits.MIN_BAUD, limits.MAX_CLOCK_HZ // 2, "bits per second")
 PITCH_MM = number(limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
 CELL = number(-1e300, 1e300)
-"""A value that cells are compared with."""
+"""A threshold for cells."""
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
 TURN = number(-7, 7, "rad", hint="angles are in rad, 90 degrees are 1.5708")

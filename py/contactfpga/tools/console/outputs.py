@@ -1,4 +1,4 @@
-"""Where a command writes: looked at before the work begins, so that no result is lost for want of a place."""
+"""Output places, checked before the work begins, so that no result is lost."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from contactfpga.errors import ContactFPGAError
 
 
 class OutputError(ContactFPGAError):
-    """What was worked out could not be written there."""
+    """A result could not be written."""
 
 
 def folder(path: str | Path, option: str = "--output") -> Path:
-    """The folder, made where there is none; raises :class:`OutputError` where nothing can be written into it."""
+    """The folder, created if missing; raises :class:`OutputError` if it is not writable."""
     place = Path(path)
     _made(place, place, option)
     return place
 
 
 def _made(place: Path, asked: Path, option: str) -> None:
-    """``asked``: what the user named."""
+    """Create a folder; ``asked``: the path that the user named."""
     try:
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=place):
@@ -34,7 +34,7 @@ def _made(place: Path, asked: Path, option: str) -> None:
 
 
 def file(path: str | Path, option: str = "--output") -> Path:
-    """A file that can be written, with its folder; nothing of it is changed yet."""
+    """A writable file, with its folder; its content is unchanged."""
     place = Path(path)
     _made(place.parent, place, option)
     if place.is_dir():

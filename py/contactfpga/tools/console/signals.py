@@ -4,17 +4,16 @@ import os
 import signal
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""Ctrl-C, and what stops services."""
+"""Ctrl-C, and the signal that stops services."""
 
 
 def status(number: int) -> int:
-    """Exit status of a command that this signal ended, as shells count it."""
+    """Exit status of a command ended by this signal, as in shells."""
     return 128 + number
 
 
 def end_at_once(number: int, _: object = None) -> None:
-    """Signal handler that ends the process at once: nothing is to be put in order while a command starts, or at the
-    second signal."""
+    """Signal handler that ends the process at once, while a command starts, or at the second signal."""
     os._exit(status(number))
 
 

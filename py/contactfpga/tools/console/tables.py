@@ -1,4 +1,4 @@
-"""Tables that no terminal is too narrow for: what does not fit beside the first columns follows below them."""
+"""Tables for any terminal width: columns that do not fit follow below, after the first columns again."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from rich.table import Table
 from contactfpga import terminal
 
 GAP = 3
-"""Characters from a column to the next."""
+"""Characters between columns."""
 
 FOLDED = 24
-"""A column of sentences is given at least this width."""
+"""Least width of a column of sentences."""
 
 HEADING = 8
-"""Headings are not broken into lines shorter than this."""
+"""Least width of a broken heading."""
 
 
 def show(rows: Sequence[Sequence[str]], **options: Any) -> None:
-    """Print :func:`tables` as wide as the terminal, with a blank line after each."""
+    """Print :func:`tables` to the terminal's width, with a blank line after each."""
     console = terminal.console()
     for table in tables(rows, console.width, **options):
         console.print(table)
@@ -41,10 +41,10 @@ def tables(
     texts: Sequence[int] = (),
     styles: Mapping[int, str] | None = None,
 ) -> Iterator[Table]:
-    """The head and lines of ``rows`` as few tables of this width, each of which begins with the first ``keys`` columns.
+    """The head and lines of ``rows`` as few tables of this width, each beginning with the first ``keys`` columns.
 
-    ``texts``: columns of words, which begin on the left; the last column is broken into lines where it has to be, and
-    so is the first one if it is the only key. ``styles``: of lines by their number.
+    ``texts``: left-aligned columns of words; the last column is wrapped if needed, and so is the first if it is the
+    only key. ``styles``: of lines by number.
     """
     columns = [list(column) for column in zip(*rows, strict=True)]
     last = len(columns) - 1
@@ -77,7 +77,7 @@ def _widths(columns: Sequence[Sequence[str]], last_folds: bool) -> list[int]:
 
 
 def _folded(heading: str, width: int) -> str:
-    """The heading in lines of this width, or as long as its longest word."""
+    """The heading in lines of this width, or of its longest word."""
     longest = max(map(cell_len, heading.split()), default=1)
     return "\n".join(textwrap.wrap(heading, max(width, longest), break_on_hyphens=False)) or heading
 

@@ -1,4 +1,4 @@
-"""Frames as rich shows them: the sheet drawn as large as there is room for, and what is known besides."""
+"""Frames in rich: the sheet as large as fits, and further knowledge."""
 
 from __future__ import annotations
 
@@ -26,20 +26,19 @@ BESIDE = 3
 LEGEND_LINES = 2
 
 TABLE_LINES = 6
-"""Of a table: title, head, rules and caption."""
+"""Lines of a table: title, head, rules and caption."""
 
 SUSPECTED = 4
-"""Lines of what a watch suspects, while it goes on."""
+"""Lines of current suspicions of a watch."""
 
 NAMED = 12
-"""Pressed cells whose places are written out."""
+"""Pressed cells listed by place."""
 
 
 def zones_view(
     board: Board, zones: Zones, room: Room, tracks: Tracks | None = None, forces: Forces | None = None
 ) -> RenderableType:
-    """The sheet, with the table of its zones beside it or below; with ``tracks``, the ids of their contacts, with
-    ``forces``, their pushes."""
+    """The sheet, with the table of its zones beside or below; with ``tracks``, contact ids, with ``forces``, pushes."""
     said = () if forces is None else forces.sentences()
     below = status(board, zones, room.width, said)
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
@@ -60,7 +59,7 @@ def zones_view(
 
 
 def watch_view(board: Board, watch: Watch, suspected: list[str], zones: Zones, room: Room) -> RenderableType:
-    """The sheet with what a watch knows of its switches, and below it what is suspected; the newest if that is much."""
+    """The sheet with a watch's knowledge of its switches, and the newest suspicions below."""
     count = f"{len(watch.never)} switches never pressed so far" if watch.seen is not None else "zones only"
     below = "\n".join([*suspected[-SUSPECTED:], count, status(board, zones, room.width)])
     below = "\n".join(terminal.wrapped(line, room.width, 2) for line in below.split("\n"))
@@ -96,8 +95,7 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
 
 
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
-    """The scale of the drawing, and whether the table stands beside it. Beside it is better than large: it is read
-    with the sheet, and stays in sight."""
+    """The scale of the drawing, and whether the table is beside it, which is preferred to a larger drawing."""
     for scale in drawn_sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
         if drawn_sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
             return scale, True
@@ -107,7 +105,7 @@ def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
 def table(
     zones: Zones, lines: int | None = None, tracks: Tracks | None = None, contacts: Contacts | None = None
 ) -> Table:
-    """The zones, the first of them where there are lines for no more."""
+    """The zones, as many as there are lines for."""
     most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
     left_out = len(zones) - most
     title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
@@ -126,7 +124,7 @@ def table(
 
 
 def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
-    """Of each zone its push in N, and the least and largest one that it may be (95 of 100)."""
+    """Push of each zone in N, with its least and largest value (95 of 100)."""
     if contacts is None:
         return [()] * len(zones)
     left, found = iter(contacts), []
@@ -139,7 +137,7 @@ def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
 
 
 def _interval(contact: Contact) -> tuple[float | None, float | None]:
-    """Unknown where the solver for it is not installed."""
+    """The interval; unknown without its solver."""
     try:
         return contact.interval_n or (None, None)
     except MissingExtra:
@@ -147,12 +145,12 @@ def _interval(contact: Contact) -> tuple[float | None, float | None]:
 
 
 def _names(track: Track) -> str:
-    """The ids that a zone has, the one that it goes by first."""
+    """The ids of a zone, the main one first."""
     return "+".join(map(str, (track.id, *track.merged)))
 
 
 def _mask(board: Board) -> drawn_sheet.Mask:
-    """The switches that the board's Skin leaves out; none where only its hello is known."""
+    """The switches that the board's Skin leaves out; none if only its hello is known."""
     try:
         return board.skin.mask
     except ContactFPGAError:
@@ -171,7 +169,7 @@ def styled(drawing: drawn_sheet.SheetDrawing) -> Text:
 
 
 def status(board: Board, zones: Zones, width: int, said: Iterable[str] = ()) -> str:
-    """The lines below a frame: which one it is, what went wrong so far, and what else there is to say."""
+    """The lines below a frame: its number, errors so far, and remarks."""
     stats = board.stats
     parts = [
         f"{board.port}: frame at {zones.time_us / 1e6:.3f} s",

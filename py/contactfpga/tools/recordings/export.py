@@ -1,6 +1,7 @@
-"""Writes a recording as one long table for programs that analyze it: Parquet, NPZ, CSV.
+"""Writes a recording as one long table for analysis programs: Parquet, NPZ, CSV.
 
-The table has a row for each zone of each frame, and one for a frame without zones."""
+The table has a row for each zone of each frame, and one for a frame without zones.
+"""
 
 from __future__ import annotations
 
@@ -38,14 +39,15 @@ COLUMNS = {
 """Type and meaning of each column."""
 
 ROWS = 1 << 16
-"""Of a piece."""
+"""Rows of a piece."""
 
 _NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False, "")
 Piece = dict[str, np.ndarray]
 
 
 def pieces(recording: Recording, rows: int = ROWS) -> Iterator[Piece]:
-    """The table in pieces of about so many rows: an array for each of :data:`COLUMNS`. It has at least one piece."""
+    """The table in pieces of about this many rows: an array for each of :data:`COLUMNS`. There is at least one
+    piece."""
     trackers: dict[str, Tracker] = {}
     counts: dict[str, int] = {}
     found: list[tuple[object, ...]] = []
@@ -84,7 +86,7 @@ def _arrays(rows: list[tuple[object, ...]]) -> Piece:
 
 
 def facts(recording: Recording) -> str:
-    """What belongs to the table, as JSON: when it began, and each link's sheet and Skin."""
+    """Metadata of the table as JSON: its beginning, and each link's sheet and Skin."""
     links = {
         link: {
             "name": hello.name,
@@ -98,14 +100,14 @@ def facts(recording: Recording) -> str:
 
 
 KEY = "contactfpga"
-"""Under which the facts stand in Parquet and NPZ."""
+"""Key of the metadata in Parquet and NPZ."""
 
 
 def export(recording: Recording, path: str | Path) -> int:
-    """Write the table to a file whose name ends in ``.parquet``, ``.npz`` or ``.csv``; returns the number of its rows.
+    """Write the table to a file named ``.parquet``, ``.npz`` or ``.csv``; returns the number of rows.
 
-    The file is there once it is whole. Raises :class:`ContactFPGAError`; :class:`~contactfpga.MissingExtra` where
-    pyarrow is missing, which Parquet needs.
+    The file appears once it is complete. Raises :class:`ContactFPGAError`; :class:`~contactfpga.MissingExtra` without
+    pyarrow, which Parquet needs.
     """
     target = Path(path)
     write = _WRITERS.get(target.suffix.lower())
@@ -121,7 +123,7 @@ def export(recording: Recording, path: str | Path) -> int:
 
 
 class _PieceCounter:
-    """Pieces, and how many rows they had."""
+    """Counts the rows of pieces."""
 
     def __init__(self, parts: Iterable[Piece]):
         self._parts = parts

@@ -1,4 +1,4 @@
-"""One board that is being recorded: takes what comes and writes it, as bytes and as messages for other programs."""
+"""One board under recording: reads and writes its data, as bytes and as messages for other programs."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zone, Zones
 
 QUEUE = 1 << 16
-"""Frames that wait to be written as messages; what they were made of is written first."""
+"""Frames that wait to be written as messages; their bytes are written first."""
 POLL_S = 0.01
-"""How often bytes are written."""
+"""Interval of writing bytes."""
 END_S = 1.0
-"""How long frames that wait at the end are written as messages."""
+"""Time for writing the remaining frames as messages at the end."""
 AT_ONCE_S = 1e-6
 BATCH_BYTES = 2048
-"""Of which so many are written at once: about 100 frames with a zone each."""
+"""Bytes per write: about 100 frames with a zone each."""
 
 
 class Buffer:
-    """A tap whose bytes wait to be written."""
+    """A tap with a buffer of bytes."""
 
     events: Events
-    """All that the board says, from the first byte on."""
+    """All events of the board, from the first byte on."""
 
     def __init__(self) -> None:
         self._pieces: collections.deque[tuple[bytes, float]] = collections.deque()
@@ -57,7 +57,7 @@ class Buffer:
         self.events = board.events(QUEUE)
 
     def take(self, data: bytes, clock_s: float) -> None:
-        """Bytes that came then."""
+        """Add bytes with their arrival time."""
         with self._lock:
             if data and not self._ended:
                 self._pieces.append((data, clock_s))
@@ -65,20 +65,20 @@ class Buffer:
                 self._taken += len(data)
 
     def end_at(self, count: int) -> bool:
-        """Take no more once this many bytes were taken in all; returns whether that is so."""
+        """Stop after this many bytes in all; returns whether they have arrived."""
         with self._lock:
             self._ended = self._ended or self._taken == count
             return self._ended
 
     def close(self) -> None:
-        """What waits can still be taken out."""
+        """End; buffered bytes can still be read."""
 
     def due(self, clock_s: float) -> bool:
-        """Whether enough waits, or for long enough."""
+        """Whether enough bytes wait, or for long enough."""
         return self._bytes >= BATCH_BYTES or (bool(self._pieces) and clock_s - self._pieces[0][1] >= POLL_S)
 
     def drain(self) -> tuple[bytes, float]:
-        """All that waits, and when its last byte came."""
+        """All buffered bytes, and arrival of the last one."""
         with self._lock:
             data, moment = b"".join(piece for piece, _ in self._pieces), self._pieces[-1][1] if self._pieces else 0.0
             self._pieces.clear()
@@ -87,9 +87,9 @@ class Buffer:
 
 
 class LinkRecorder:
-    """Writes what a board says until it is stopped, the recording that it plays ends, or the port is lost. ``events``:
-    of the board, from the first one on. Without ``said`` it writes the bytes alone. ``late``: a frame is taken once its
-    readings of pressure units have come."""
+    """Writes a board's data until it is stopped, the played recording ends, or the port is lost. ``events``: the
+    board's, from the first on. Without ``said`` it writes only bytes. ``late``: frames wait for their readings of
+    pressure units."""
 
     def __init__(
         self,
@@ -103,13 +103,13 @@ class LinkRecorder:
         self.board = board
         self.name = link.name
         self.frames = 0
-        """Frames that were taken."""
+        """Frames read."""
         self.seconds = 0.0
-        """How long it has been recorded: on the board's clock, of a recording in device time."""
+        """Recorded time: on the board's clock, for a recording in device time."""
         self.notes: list[str] = []
-        """What a user should hear of."""
+        """Messages for the user."""
         self.error: ContactFPGAError | None = None
-        """Why it ended before it was stopped."""
+        """The error that ended it early."""
         self._events = events
         self._buffer = buffer
         self._link = link
@@ -143,7 +143,7 @@ class LinkRecorder:
             self.error = error
 
     def next(self, timeout: float = 1.0) -> Zones:
-        """The next frame; what comes before it is written."""
+        """The next frame; earlier data are written."""
         while True:
             if self._left == 0:
                 raise ReadTimeout(f"{self.name}: nothing more is to be recorded")
@@ -171,7 +171,7 @@ class LinkRecorder:
         self._drain()
 
     def _take_rest(self, frames: WithReadings | LinkRecorder) -> int:
-        """Frames of the bytes that have come by the end, for a while; how many are left."""
+        """Read the remaining frames for a while; returns the number left."""
         until, left = time.monotonic() + END_S, 0
         with contextlib.suppress(ReadTimeout):
             self._left = self._events.settle(self._buffer.end_at)
@@ -190,7 +190,7 @@ class LinkRecorder:
         self._link.poll()
 
     def _clock_s(self) -> float:
-        """Now; of a recording, which has no clock, the time of its last frame."""
+        """The current time; for a recording, without a clock, the time of its last frame."""
         now_s = self.board.clock() if self.board.live else self._last_us / 1e6
         self._begun_s = now_s if self._begun_s is None else self._begun_s
         self.seconds = max(self.seconds, now_s - self._begun_s)
@@ -204,22 +204,22 @@ class LinkRecorder:
 
 @dataclasses.dataclass(frozen=True)
 class Mount:
-    """Where a board is on a robot: its messages have places in the frame of the robot's link, not the sheet's."""
+    """A board's place on a robot: its messages have places in the frame of the robot's link, not the sheet's."""
 
     frame: str
-    """Of the robot's link."""
+    """Frame of the robot's link."""
     place: Place
-    """In that frame."""
+    """Place in that frame."""
 
     def zone(self, zone: Zone) -> Zone:
-        """The zone with its place there."""
+        """The zone with its place in the link's frame."""
         if zone.x_mm is None or zone.y_mm is None:
             return zone
         point_m, normal = self.place(zone.x_mm, zone.y_mm)
         return dataclasses.replace(zone, point_mm=_vector(1e3 * one for one in point_m), normal=_vector(normal))
 
     def tracks(self, tracks: Tracks) -> Tracks:
-        """The same of all zones in them."""
+        """The tracks with their zones' places in the link's frame."""
         active = tuple(dataclasses.replace(one, zone=self.zone(one.zone)) for one in tracks.active)
         events = tuple(dataclasses.replace(one, zone=self.zone(one.zone)) for one in tracks.events)
         return dataclasses.replace(tracks, active=active, events=events)
@@ -235,15 +235,15 @@ ZONES, TRACKS, CONTACTS = (f"{PACKAGE}/{name}" for name in ("Zones", "Tracks", "
 TRANSFORMS, MARKERS, WRENCH = "tf2_msgs/TFMessage", "visualization_msgs/MarkerArray", "geometry_msgs/WrenchStamped"
 
 DRAWN_S = 1 / 30
-"""How often what 3-D programs show is written."""
+"""Interval of messages for 3-D programs."""
 WORLD = "world"
-"""The frame that a board lies in which is on no robot."""
+"""The frame of a board without a robot."""
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
 class LinkMessages:
-    """Writes what one link says as messages, in order, for programs that know nothing of us. Those of a board on a
-    robot have places in the robot's frame."""
+    """Writes one link's data as standard messages, in order. Those of a board on a robot have places in the robot's
+    frame."""
 
     def __init__(self, board: Board, link: LinkFile, mount: Mount | None = None, felt: Felt | None = None):
         self._link = link
@@ -255,7 +255,7 @@ class LinkMessages:
         self._rim = outline(board.sheet, None if mount is None else mount.place)
 
     def told(self, item: SideEvent, clock_s: float) -> None:
-        """What came between frames."""
+        """Write an event between frames."""
         time_ns = self._link.time_ns(clock_s)
         if isinstance(item, Faults):
             self._link.write("faults", FAULTS, of_faults(item.names, time_ns, self._frame), clock_s)
@@ -263,7 +263,7 @@ class LinkMessages:
             self._link.write("units", UNITS, of_units(item, time_ns, self._frame), clock_s)
 
     def frame(self, zones: Zones, clock_s: float) -> None:
-        """A frame; contacts whenever something happens to them, and now and then, with what 3-D programs show."""
+        """Write a frame; contacts whenever they change, and periodically, with messages for 3-D programs."""
         known_s = [one for one in (zones.host_time_s, zones.arrived_s) if one is not None]
         sampled_s = known_s[0] if known_s else clock_s
         head = convert.header(self._link.time_ns(sampled_s), self._frame)

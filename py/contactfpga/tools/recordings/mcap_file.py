@@ -1,4 +1,4 @@
-"""An MCAP file that is being written, of whole pieces only, whatever happens to the program or to the disk."""
+"""An MCAP file under construction, with whole pieces only, whatever happens to the program or the disk."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class RecordingFailed(ContactFPGAError):
-    """A recording could not be written any further; what was written is whole. ``reason``: why."""
+    """A recording could not be continued; its written part is whole. ``reason``: why."""
 
     def __init__(self, message: str, reason: str):
         super().__init__(message)
@@ -27,7 +27,7 @@ class RecordingFailed(ContactFPGAError):
 
 
 class WholeFile:
-    """A new file: writes the bytes up to each :meth:`flush` together; where that fails none of them are left."""
+    """A new file that writes the bytes up to each :meth:`flush` together; on failure it keeps none of them."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -43,16 +43,16 @@ class WholeFile:
             raise RecordingFailed(f"{path} cannot be written: {reason}", reason) from None
 
     def tell(self) -> int:
-        """Bytes so far, also those that wait."""
+        """Number of bytes so far, including buffered ones."""
         return self._whole + len(self._waiting)
 
     def write(self, data: bytes) -> int:
-        """Add bytes to what waits."""
+        """Buffer bytes."""
         self._waiting += data
         return len(data)
 
     def flush(self) -> None:
-        """Hand everything that waits to the system, which keeps it if this program dies."""
+        """Pass buffered bytes to the system, which keeps them if this program dies."""
         left = memoryview(bytes(self._waiting))
         self._waiting.clear()
         count = len(left)
@@ -64,7 +64,7 @@ class WholeFile:
         self._whole += count
 
     def close(self) -> None:
-        """May be called twice; what still waits is left out."""
+        """Close the file; may be called twice. Buffered bytes are dropped."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
@@ -83,14 +83,14 @@ class WholeFile:
 
 CHUNK_BYTES = 1 << 16
 FLUSH_S = 0.1
-"""No more than so many bytes wait to be written, and none for longer: what is lost if the program dies. Half of what
-we promise, as nobody knows when the system lets us run."""
+"""Largest number of waiting bytes, and their longest wait: the loss if the program dies. Half of our promise, as the
+system may delay us."""
 _MESSAGE_BYTES = 31
-"""Of a message's record besides its data."""
+"""Bytes of a message's record besides its data."""
 
 
 class McapFile:
-    """One file; not for several threads."""
+    """One file, for a single thread."""
 
     def __init__(self, path: Path):
         try:
@@ -113,21 +113,21 @@ class McapFile:
 
     @property
     def seconds(self) -> float:
-        """From its first message to its last one."""
+        """Time from the first to the last message."""
         return (self._last_ns - self._first_ns) / 1e9
 
     @property
     def size(self) -> int:
-        """Bytes in the file, and those that wait, before they are compressed."""
+        """Bytes in the file, and buffered ones before compression."""
         return self._file.tell() + self._waiting
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add texts that stand outside of the messages."""
+        """Add texts outside of the messages."""
         self._writer.add_metadata(name, dict(values))
         self.flush()
 
     def write(self, topic: str, kind: str, link: str, time_ns: int, data: bytes, now_s: float) -> None:
-        """Add a message of a type such as ``contactfpga_msgs/Zones``; ``now_s`` is of ``time.monotonic``."""
+        """Add a message of a type such as ``contactfpga_msgs/Zones``; ``now_s`` is from ``time.monotonic``."""
         self._make_room(data)
         channel = self._channels.get(topic)
         if channel is None:
@@ -161,17 +161,17 @@ class McapFile:
         self.messages += 1
 
     def flush_old(self, now_s: float) -> None:
-        """Write what waits if it waits for long enough."""
+        """Write buffered messages if they are old enough."""
         if now_s - self._since_s >= FLUSH_S:
             self.flush()
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write buffered messages."""
         self._waiting, self._since_s = 0, math.inf
         self._guarded(self._writer.flush)
 
     def close(self) -> None:
-        """Write what waits, and the index; may be called twice."""
+        """Write buffered messages and the index; may be called twice."""
         try:
             if not self._failed:
                 self._failed = True  # whatever comes of it, there is no second time

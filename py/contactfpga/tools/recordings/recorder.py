@@ -1,4 +1,4 @@
-"""Writes what boards say into an MCAP file, or into several one after the other."""
+"""Writes boards' data into one or successive MCAP files."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Cutter, Hello
 
 PATIENCE_S = 2.0
-"""How long a new file waits for hellos to begin with; boards say one twice per second."""
+"""Wait of a new file for hellos at its beginning; boards send two per second."""
 BYTES = f"{PACKAGE}/Bytes"
-"""Type of the messages that hold a board's bytes."""
+"""Type of the messages with a board's bytes."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Split:
-    """When a new file begins: the first of the two, or never."""
+    """Limits after which a new file begins: the first to be reached, or never."""
 
     bytes: float | None = None
     seconds: float | None = None
 
     def due(self, file: McapFile) -> bool:
-        """Whether this file is full, or holds as much time."""
+        """Whether this file has reached a limit."""
         full = self.bytes is not None and file.size >= self.bytes
         return file.messages > 0 and (full or (self.seconds is not None and file.seconds >= self.seconds))
 
 
 class Recorder:
-    """The files, and the links that are recorded. Safe for several threads."""
+    """The files, and the recorded links. Thread-safe."""
 
     def __init__(self, path: str | Path, split: Split | None = None):
         self.path = Path(path)
@@ -50,7 +50,7 @@ class Recorder:
         self._old: McapFile | None = None
         self._sizes: dict[Path, int] = {}  # of the files that are closed
         self.files: list[Path] = []
-        """In order."""
+        """Files in order."""
         self.file = self._begin()
 
     @property
@@ -61,7 +61,7 @@ class Recorder:
             return sum(self._sizes.values()) + sum(file.size for file in files if file.path not in self._sizes)
 
     def add(self, name: str, board: Board) -> LinkFile:
-        """A link, by its name, whose board is open."""
+        """Add a link by name; its board is open."""
         with self.lock:
             if name in {link.name for link in self._links}:
                 raise ContactFPGAError(f"two links are named {name!r}; give their Skins different names")
@@ -71,12 +71,12 @@ class Recorder:
             return link
 
     def about(self, name: str, values: Mapping[str, str]) -> None:
-        """Keep texts in every file."""
+        """Store texts in every file."""
         self._about.append((name, values))
         self.file.metadata(name, values)
 
     def poll(self) -> None:
-        """Write what waits for long enough, and begin a new file where one is due. Call it often."""
+        """Write old buffers, and begin a new file if due. Call it often."""
         now_s = time.monotonic()
         with self.lock:
             for file in (self._old, self.file):
@@ -129,7 +129,7 @@ class Recorder:
 
 
 class LinkFile:
-    """What one link writes, into the file that is its own at the moment."""
+    """One link's output into its current file."""
 
     def __init__(self, recorder: Recorder, name: str, facts: dict[str, str], epoch_ns: int):
         self.name = name
@@ -141,11 +141,11 @@ class LinkFile:
         self._cutter: Cutter | None = None
 
     def time_ns(self, clock_s: float) -> int:
-        """Since 1970, of a moment on the board's :meth:`~contactfpga.Board.clock`."""
+        """Time in ns since 1970, of a moment on the board's :meth:`~contactfpga.Board.clock`."""
         return self._epoch_ns + round(clock_s * 1e9)
 
     def take_bytes(self, data: bytes, clock_s: float) -> None:
-        """Bytes that came until then."""
+        """Add bytes that arrived by then."""
         with self._recorder.lock:
             before, after = (data, b"") if self._cutter is None else self._cutter.take(data)
             self._bytes(before, clock_s)
@@ -155,22 +155,22 @@ class LinkFile:
             self._recorder.poll()
 
     def write(self, what: str, kind: str, data: bytes, clock_s: float) -> None:
-        """A message; ``what`` ends its topic, or is all of it if it begins with a slash."""
+        """Add a message; ``what`` ends its topic, or with a leading slash is all of it."""
         topic = what if what.startswith("/") else f"{self._topic}/{what}"
         link = "" if what.startswith("/") else self.name
         with self._recorder.lock:
             self.file.write(topic, kind, link, self.time_ns(clock_s), data, time.monotonic())
 
     def poll(self) -> None:
-        """Nothing comes at the moment: write what waits."""
+        """Write buffers while nothing arrives."""
         self._recorder.poll()
 
     def wait_for_hello(self) -> None:
-        """Go on in the recorder's newest file with the next hello."""
+        """Continue in the recorder's newest file with the next hello."""
         self._cutter = Cutter()
 
     def switch(self) -> None:
-        """Go on there now."""
+        """Continue in the newest file now."""
         cutter, self._cutter = self._cutter, None
         if cutter is not None and cutter.held:
             self._bytes(cutter.held, self._last_s)
@@ -184,13 +184,13 @@ class LinkFile:
 
 
 def topic_of(link: str) -> str:
-    """Of a link's messages: what ROS does not allow in a name becomes a low line."""
+    """Topic of a link's messages, with underscores for characters that ROS does not allow."""
     name = re.sub(r"\W", "_", link, flags=re.ASCII)
     return f"/{name}" if name and not name[0].isdigit() else f"/_{name}"
 
 
 def facts(name: str, board: Board) -> dict[str, str]:
-    """What a reader wants to know before the first byte."""
+    """Metadata for readers before the first byte."""
     hello = board.hello
     try:
         skin = board.skin.to_toml()
@@ -206,15 +206,15 @@ def facts(name: str, board: Board) -> dict[str, str]:
 
 
 def link_name(hello: Hello) -> str:
-    """What a board is called that no one named otherwise."""
+    """Default name of a board."""
     return hello.name or "skin"
 
 
 def _epoch_ns(board: Board) -> int:
-    """What the board's clock has to be added to."""
+    """Offset of the board's clock from 1970."""
     return time.time_ns() - round(board.clock() * 1e9)
 
 
 def of_bytes(data: bytes, time_ns: int, frame: str) -> bytes:
-    """Bytes of which the last one came then."""
+    """A message of bytes of which the last arrived then."""
     return encode(BYTES, {"header": header(time_ns, frame), "data": data})

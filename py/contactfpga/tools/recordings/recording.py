@@ -1,4 +1,4 @@
-"""Reads a recording: what each link said, and when."""
+"""Reads a recording: each link's data with times."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ Timed = tuple[float, str, Zones]
 """Seconds since the recording's beginning, the link, and its frame."""
 
 LAST_S = 0.2
-"""So long before the end of a recording each board has sent a frame: a keep-alive at least."""
+"""Time before the end of a recording within which each board has sent a frame, at least a keep-alive."""
 
 
 class Recording:
-    """What `contactfpga record` wrote, closed or recovered; of files that are split all, by the name recorded to.
+    """The output of `contactfpga record`, closed or recovered; split files by the name recorded to.
 
-    Every call reads the file, of which it keeps nothing in memory. Frames are made of the board's own bytes, as by the
-    driver. Raises :class:`ContactFPGAError` where the file cannot be read.
+    Every call reads the file anew, without caching. Frames are made of the board's own bytes, as by the driver. Raises
+    :class:`ContactFPGAError` for an unreadable file.
     """
 
     def __init__(self, path: str | Path):
@@ -40,7 +40,7 @@ class Recording:
 
     @property
     def start_s(self) -> float:
-        """When it begins, in seconds since 1970."""
+        """Beginning, in seconds since 1970."""
         return self._file.start_ns / 1e9
 
     @property
@@ -50,9 +50,8 @@ class Recording:
 
     @functools.cached_property
     def links(self) -> dict[str, Hello]:
-        """The first hello of each link, whose ``sheet`` has lines and lengths, in the order in which they were added. A
-        link that said none is left out: its frames cannot be read. Raises :class:`ContactFPGAError` where there is no
-        other."""
+        """The first hello of each link, whose ``sheet`` has lines and lengths, in order of addition. Links without a
+        hello are omitted: their frames are unreadable. Raises :class:`ContactFPGAError` if none is left."""
         found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
         if not found:
             raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
@@ -60,17 +59,17 @@ class Recording:
 
     @functools.cached_property
     def skins(self) -> dict[str, Skin | None]:
-        """The Skin of each link; None where only its hello is known."""
+        """The Skin of each link; None if only its hello is known."""
         texts = {facts.get("link"): facts.get("skin", "") for facts in self.texts(METADATA)}
         return {link: _skin(texts.get(link, "")) for link in self.links}
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds, and what that names."""
+        """Texts stored by name; ``robot``: the `robot.toml` of its links, with the files it names."""
         return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:
         """(seconds since the beginning, link, :class:`Zones`) from ``start_s`` on and before ``end_s``, in order; with
-        ``link`` of this one alone."""
+        ``link`` only of this one."""
         for name, value in (("start_s", start_s), ("end_s", 0.0 if end_s is None else end_s)):
             if not is_finite(value) or value < 0:
                 raise ValueError(f"{name} is {value!r}; it must be a number of seconds, 0 or more")
@@ -90,7 +89,7 @@ class Recording:
         return table + notebook.beside((link, zones.svg()) for link, zones in last.items())
 
     def raw_bytes(self, link: str | None = None) -> Iterator[tuple[float, bytes]]:
-        """(seconds since the beginning, bytes that had come by then) of a link: all that came over its port."""
+        """(seconds since the beginning, bytes arrived by then) of a link: everything that came over its port."""
         return ((self._seconds(moment_ns), data) for moment_ns, data in self._file.pieces(link))
 
     def _seconds(self, moment_ns: int) -> float:

@@ -1,4 +1,4 @@
-"""Closes a recording whose program was killed or whose disk was full: copies all that is whole into a new file."""
+"""Closes a recording whose program was killed or whose disk was full: copies all whole parts into a new file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
 
 @dataclasses.dataclass
 class RecoveryReport:
-    """What was found."""
+    """Result of a recovery."""
 
     path: Path
     """The new file."""
@@ -26,21 +26,21 @@ class RecoveryReport:
     seconds: float = 0.0
     """From the first message to the last one."""
     damaged: int = 0
-    """Pieces in the middle that were left out, as they are damaged or larger than they may be."""
+    """Inner pieces omitted because they are damaged or too large."""
     cut: int = 0
-    """Bytes of a piece at the end that is not whole."""
+    """Bytes of an incomplete final piece."""
     closed: bool = False
-    """It was closed as it should be; of several, the last one."""
+    """Whether it was properly closed; of several, the last one."""
     recordings: int = 1
-    """Recordings in the file, one after the other."""
+    """Consecutive recordings in the file."""
     beyond: int = 0
-    """Bytes after the end of the last one that are no recording."""
+    """Trailing bytes that are no recording."""
 
 
 def recover(path: str | Path, into: str | Path | None = None) -> RecoveryReport:
-    """Copy what is whole into a new file, by default ``touches_recovered.mcap`` for ``touches.mcap``; the old one stays
-    as it is. The new one is there once it is whole. Raises :class:`RecordingError` where there is nothing to copy, no
-    room, or a file of the new one's name."""
+    """Copy the whole parts into a new file, by default ``touches_recovered.mcap`` for ``touches.mcap``, which appears
+    once complete; the old one is unchanged. Raises :class:`RecordingError` if there is nothing to copy, no room, or
+    such a file already."""
     source = Path(path)
     target = source.parent / f"{source.stem}_recovered{source.suffix}" if into is None else Path(into)
     try:
@@ -91,14 +91,14 @@ def _copy_all(file: BinaryIO, new: Path, found: RecoveryReport) -> None:
 
 
 class _Definitions:
-    """Schemas and channels of one recording, by their numbers."""
+    """Schemas and channels of one recording, by number."""
 
     def __init__(self) -> None:
         self.schemas: dict[int, Any] = {}
         self.channels: dict[int, Any] = {}
 
     def take(self, record: Any) -> None:
-        """A record that may be one of them."""
+        """Add a record if it is one of them."""
         from mcap.records import Channel, Schema
 
         if isinstance(record, Schema):
@@ -113,11 +113,11 @@ class _Copy:
     def __init__(self, path: Path):
         self._file = McapFile(path)
         self.definitions: list[_Definitions] = []
-        """Of each recording that has begun; numbers of the last one count."""
+        """Definitions of each recording so far; the last one's numbers count."""
         self._first_ns: int | None = None
 
     def take(self, record: Any, found: RecoveryReport) -> None:
-        """Add a record of the old one."""
+        """Add a record of the old file."""
         from mcap.records import Message, Metadata
 
         known = self.definitions[-1]
@@ -136,8 +136,8 @@ class _Copy:
 
 
 def _definitions(file: BinaryIO) -> list[_Definitions]:
-    """Of each recording in the file. A closed one repeats its schemas and channels at its end: else all is lost where
-    their first piece is damaged."""
+    """Definitions of each recording in the file. A closed one repeats them at its end, without which damage to their
+    first piece would lose all."""
     from mcap.opcode import Opcode
 
     found: list[_Definitions] = []
@@ -155,7 +155,7 @@ def _definitions(file: BinaryIO) -> list[_Definitions]:
 
 
 def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, bytes]]:
-    """(number of the recording, kind, content) of records up to the end of the last recording, or of what is whole."""
+    """(number of the recording, kind, content) of records up to the end of the last recording, or of the whole part."""
     from mcap.opcode import Opcode
 
     number = 0
@@ -187,7 +187,7 @@ def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, byt
 
 
 def _inside(kind: int, data: bytes) -> Iterator[Any]:
-    """The records that a copy needs. Raises :class:`Unreadable`."""
+    """The records needed for a copy. Raises :class:`Unreadable`."""
     from mcap.opcode import Opcode
     from mcap.records import Channel, Chunk, Metadata, Schema
 

@@ -1,4 +1,4 @@
-"""A recording that is under way: one thread for each board."""
+"""A recording in progress, with one thread per board."""
 
 from __future__ import annotations
 
@@ -38,10 +38,9 @@ class _OpenLink:
 class Session:
     """Records boards into ``path``: :meth:`add` each of them, then :meth:`start`; a context manager that ends it.
 
-    ``split``: when a new file begins; then ``touches.mcap`` becomes ``touches_0001.mcap`` and so on. ``bytes_only``
-    leaves messages out: about a fifth of the size, and nothing is lost, as they can be made of the bytes. The file must
-    not be there yet. ``about``: texts that are kept in it by name, beside those of each link.
-    Raises :class:`ContactFPGAError`.
+    ``split``: limits of a file; then ``touches.mcap`` becomes ``touches_0001.mcap`` and so on. ``bytes_only`` omits
+    messages: about a fifth of the size, without loss, as they can be made of the bytes. The file must not exist yet.
+    ``about``: texts to store by name, beside those of each link. Raises :class:`ContactFPGAError`.
     """
 
     def __init__(
@@ -84,8 +83,8 @@ class Session:
     ) -> None:
         """Open a board, as :func:`contactfpga.open` does.
 
-        ``name``: of its link; by default that of its Skin. ``mount``: where its sheet lies on a robot. ``felt``: from
-        the open board to what says the forces at a frame's zones.
+        ``name``: of its link, by default its Skin's. ``mount``: place of its sheet on a robot. ``felt``: from the open
+        board to a function for the forces at a frame's zones.
         """
         if self._begun is not None:
             raise ContactFPGAError("this recording has begun; add all boards before start()")
@@ -101,8 +100,8 @@ class Session:
         )
 
     def start(self, seconds: float | None = None) -> None:
-        """Make the file, and record for so long, or until :meth:`stop`. Raises ValueError, and
-        :class:`ContactFPGAError` where there is no board or it was started before."""
+        """Create the file, and record for ``seconds``, or until :meth:`stop`. Raises ValueError, and
+        :class:`ContactFPGAError` without a board or if started before."""
         if seconds is not None and (not is_finite(seconds) or seconds <= 0):
             raise ValueError(f"seconds is {shown(seconds)}; it must be a positive number, or None until stop()")
         if self._begun is not None:
@@ -154,11 +153,11 @@ class Session:
         return not self._ended.is_set()
 
     def wait(self, seconds: float) -> None:
-        """At most until all has ended."""
+        """Wait until all has ended, at most this long."""
         self._ended.wait(seconds)
 
     def stop(self) -> None:
-        """End all, and close the file; may be called twice. Raises why a link ended that was to go on."""
+        """End all, and close the file; may be called twice. Raises the error that ended a link early."""
         self._stop.set()
         if self._begun is not None:
             self._begun.wait()
@@ -177,19 +176,19 @@ class Session:
                 raise link.error
 
     def forked(self) -> None:
-        """In a child process nothing is recorded; its parent goes on."""
+        """Stop recording in a child process; the parent goes on."""
         self._stop, self._ended, self._begun = threading.Event(), threading.Event(), None
         self._ended.set()
         self._opened, self.links, self._threads, self._recorder = [], [], [], None
 
     @property
     def seconds(self) -> float:
-        """How long it has been recorded."""
+        """Recorded time."""
         return max((link.seconds for link in self.links), default=0.0)
 
     @property
     def frames(self) -> int:
-        """Frames that were taken."""
+        """Frames read."""
         return sum(link.frames for link in self.links)
 
     @property

@@ -1,1 +1,1 @@
-"""A live view in the browser: the sheet in 3-D, pressed with the mouse where it is a virtual one."""
+"""A live view in the browser: the sheet in 3-D, pressed with the mouse if virtual."""

@@ -1,4 +1,4 @@
-"""A robot with sheets on its links, live or from a recording: each link's newest frame, and sliders for its joints."""
+"""A robot with sheets on its links, live or recorded: each link's newest frame, and sliders for its joints."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ class RobotSource(Protocol):
     title: str
     body: Body
     angles: dict[str, float]
-    """In rad, of prismatic joints in m; what the sliders set."""
+    """Angles set by the sliders, in rad, in m for prismatic joints."""
     virtual: dict[str, Touchable]
-    """Virtual boards, by their links."""
+    """Virtual boards by link."""
 
     def states(self) -> dict[str, LinkState]:
-        """Of all links, now."""
+        """Current states of all links."""
 
 
 class BodySource:
@@ -86,16 +86,16 @@ class BodySource:
         return driver.open(virtual, plan.skin, timeout=self._timeout)
 
     def states(self) -> dict[str, LinkState]:
-        """Of all links, now."""
+        """Current states of all links."""
         return self._open.latest().links
 
     def close(self) -> None:
-        """Give all ports back."""
+        """Release all ports."""
         self._open.close()
 
 
 class DrawnRobot:
-    """A robot's sheets with what touches them, one frame after the other."""
+    """A robot's sheets with their touches, frame by frame."""
 
     def __init__(self, stage: RobotStage, links: Mapping[str, Plan]):
         self.stage, self._links = stage, links
@@ -113,11 +113,11 @@ class DrawnRobot:
         """A link's newest frame; returns its contacts.
 
         Args:
-            name: of the link.
-            state: what is known of it.
-            truth: (rows, columns) switches that are closed, where that is known.
-            arrows: (n, 2, 3) forces in m in the sheet's frame, in the place of those that units measure.
-            label: what the contacts' rows call the link.
+         name: of the link.
+         state: its state.
+         truth: (rows, columns) closed switches, if known.
+         arrows: (n, 2, 3) forces in m in the sheet's frame, replacing those that units measure.
+         label: the link's name in the contacts' rows.
         """
         stage, plan = self.stage.stages[name], self._links[name]
         if state.zones is None:
@@ -132,7 +132,7 @@ class DrawnRobot:
         return contacts.rows(moment, name if label is None else label)
 
     def _measured(self, plan: Plan, newest: LinkState) -> list[LinkContact] | None:
-        """The contacts of the newest frame, or of the one before, where its readings have not come yet."""
+        """The contacts of the newest frame, or before its readings arrive, of the previous one."""
         before, self._felt[plan.name] = self._felt.get(plan.name), newest
         if plan.units is None:
             return None
@@ -143,13 +143,13 @@ class DrawnRobot:
 
 
 class RobotView(abc.ABC):
-    """A robot in a server's page: its picture, the table of its contacts, and what is known of it."""
+    """A robot in a server's page: its picture, the table of its contacts, and further facts."""
 
     stage: RobotStage
-    """Of the robot, or of the first of several."""
+    """Stage of the robot, or of the first of several."""
 
     def __init__(self, server: viser.ViserServer, points: Callable[[], np.ndarray]):
-        """``points``: (n, 3) in m, what cameras are to hold."""
+        """``points``: (n, 3) in m, for cameras to hold."""
         page.dress(server)
         light(server, (1.0, -0.5, 1.0))
         self.cameras = Cameras(server, dict(ROBOT_SIDES), points)
@@ -158,7 +158,7 @@ class RobotView(abc.ABC):
         self._table = server.gui.add_html(contacts.table(()))
 
     def _add_rest(self, server: viser.ViserServer, title: str) -> None:
-        """To the panel: sides to look from, and what is known."""
+        """Add sides to look from, and facts, to the panel."""
         controls.add(server, self.cameras, lambda: (f"contactfpga: {shortened(title)}", self._rows))
         self._facts = server.gui.add_markdown("")
 
@@ -173,16 +173,16 @@ class RobotView(abc.ABC):
 
     @abc.abstractmethod
     def draw(self) -> list[contacts.Row]:
-        """The next moment; returns all contacts."""
+        """Draw the next moment; returns all contacts."""
 
     def tell(self) -> None:
-        """In the panel."""
+        """Write the panel."""
         self._table.content = contacts.table(self._rows)
         self._facts.content = as_markdown(self.facts())
 
     @abc.abstractmethod
     def facts(self) -> list[tuple[str, str]]:
-        """Names and values, as the panel shows them."""
+        """Names and values in the panel."""
 
 
 class BodyView(RobotView):
@@ -217,7 +217,7 @@ class BodyView(RobotView):
         return [row for name, state in self._states.items() for row in self._draw(name, state)]
 
     def _move(self) -> None:
-        """Draw the links where they are now."""
+        """Draw the links at their current poses."""
         if self._source.angles != self._moved:
             self._moved = dict(self._source.angles)
             self.stage.move(self._moved)
@@ -245,14 +245,14 @@ class BodyView(RobotView):
 
 
 def told(state: LinkState) -> str:
-    """Of a link, for the panel."""
+    """A link's state for the panel."""
     found = 0 if state.zones is None else len(state.zones)
     zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
     return f"{state}{zones}"
 
 
 def pushes(plan: Plan, contacts: Iterable[LinkContact]) -> np.ndarray:
-    """(n, 2, 3) arrows in m in the sheet's own frame, one for each contact with a force, from outside to its point."""
+    """(n, 2, 3) arrows in m in the sheet's own frame, one per contact with a force, from outside to its point."""
     arrows = []
     for one in contacts:
         if one.point_m is None or one.force_n is None or np.linalg.norm(one.force_n) < picture.LEAST_N:
@@ -264,7 +264,7 @@ def pushes(plan: Plan, contacts: Iterable[LinkContact]) -> np.ndarray:
 
 
 class BodyPlayer(Playback[tuple[str, Zones]]):
-    """Plays all links of a robot. Raises :class:`~contactfpga.ContactFPGAError` where the recording holds no robot."""
+    """Plays all links of a robot. Raises :class:`~contactfpga.ContactFPGAError` for a recording without a robot."""
 
     def __init__(self, recording: Recording, clock: Callable[[], float] = time.monotonic):
         super().__init__(recording.duration_s, clock)
@@ -291,7 +291,7 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
             self._newest[link] = seconds, zones
 
     def states(self) -> dict[str, LinkState]:
-        """Of all links, at the next moment."""
+        """States of all links at the next moment."""
         self.step()
         return {name: self._state(plan) for name, plan in self.body.links.items()}
 
@@ -312,6 +312,6 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
 
 
 def holds_robot(recording: Recording) -> bool:
-    """Whether a recording holds a robot with all files of its table; those of earlier versions hold the table alone."""
+    """Whether a recording has a robot with all files of its table; earlier versions stored the table alone."""
     texts = recording.texts(packed.ROBOT)
     return bool(texts) and set(texts[0]) != {packed.TOML}

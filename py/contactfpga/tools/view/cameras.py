@@ -1,4 +1,4 @@
-"""Cameras that hold what is shown in full, however large the window is, and the sides it can be looked at from."""
+"""Cameras that hold the whole scene in any window, and the sides to look from."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 FOV_RAD = math.radians(32)
 """Vertical field of view."""
 ROOM = 1.04
-"""What is fitted may fill the window but for this much."""
+"""Margin of the window left free."""
 FIRST = 1.6
-"""Width over height of a window that has not told its size yet."""
+"""Aspect ratio of a window of unknown size."""
 NEAR = 0.02
-"""The nearest that is drawn, of the distance."""
+"""Nearest drawn depth over the distance."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Side:
-    """Where a camera looks from."""
+    """A viewing direction."""
 
     toward: np.ndarray
-    """(3,) from what is shown toward the camera."""
+    """(3,) from the scene toward the camera."""
     up: np.ndarray
-    """(3,) what is up in its picture, not parallel to the other one."""
+    """(3,) up in its picture, not parallel to ``toward``."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,15 +40,14 @@ class Placed:
 
     position: np.ndarray
     look_at: np.ndarray
-    """In the middle of its picture, as deep as the middle of what is fitted."""
+    """Middle of its picture, at the depth of the scene's middle."""
 
 
 def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_RAD) -> Placed:
-    """The nearest camera on this side whose picture holds all (n, 3) points, in the middle; ``aspect``: its width over
-    its height.
+    """The nearest camera on this side whose picture holds all (n, 3) points, centered; ``aspect``: width over height.
 
-    A camera at c sees a point p where ``|(p - c) . right| <= t (p - c) . ahead``, and the same upward. Along each of
-    both, the two outermost points bound how far ahead c may be, and then c lies midway between them.
+    A camera at c sees a point p where ``|(p - c) . right| <= t (p - c) . ahead``, and the same upward. In each
+    direction, the two outermost points bound how far ahead c may be, and c is midway between them.
     """
     ahead = -side.toward / np.linalg.norm(side.toward)
     right = np.cross(ahead, side.up)
@@ -70,8 +69,7 @@ def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_R
 
 
 def sides_of(tiles: Tiles) -> dict[str, Side]:
-    """Of a sheet: obliquely, straight at it, along it, and from behind. One around a limb lies, with row 0 on the
-    left."""
+    """Views of a sheet: oblique, frontal, along it, and from behind. One around a limb lies, with row 0 on the left."""
     if tiles.sheet.radius_mm is None:
         normal, away, aside = (each.mean(0) for each in (tiles.normals, tiles.along_y, tiles.along_x))
         return {
@@ -92,7 +90,7 @@ def sides_of(tiles: Tiles) -> dict[str, Side]:
 
 
 class Cameras:
-    """Sets the camera of each browser: first, when its window changes its size, and to a side that is asked for."""
+    """Sets the camera of each browser: at first, on a change of its window, and on request."""
 
     def __init__(self, server: viser.ViserServer, sides: dict[str, Side], points: Callable[[], np.ndarray]):
         self.sides, self._points = sides, points
@@ -112,7 +110,7 @@ class Cameras:
         self.look(client.camera, self.sides[name])
 
     def look(self, camera: Any, side: Side) -> None:
-        """Have this camera hold all that is shown, from there."""
+        """Fit the scene in this camera, from a side."""
         placed = fitted(self._points(), side, camera.aspect, camera.fov)
         with camera.client.atomic():
             camera.up_direction = side.up
@@ -120,7 +118,7 @@ class Cameras:
             camera.look_at = placed.look_at
 
     def fit(self, camera: Any) -> None:
-        """Have this camera hold all that is shown, from where it looks."""
+        """Fit the scene in this camera, from its direction."""
         self.look(camera, Side(camera.position - camera.look_at, camera.up_direction))
 
     def _follow(self, client: Any) -> None:
@@ -129,7 +127,7 @@ class Cameras:
         client.camera.on_update(self._resized)
 
     def _resized(self, camera: Any) -> None:
-        """Fit again from where it looks, where the window's size is another one."""
+        """Fit again from its direction, if the window's size changed."""
         size = _size(camera)
         if self._sizes.get(camera.client.client_id) != size:
             self._sizes[camera.client.client_id] = size

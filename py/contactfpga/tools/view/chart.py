@@ -12,18 +12,18 @@ from contactfpga.tools.view.sources import CHART_S, Strip
 
 WIDTH, HEIGHT = 310, 150
 LEFT, RIGHT, TOP, BOTTOM = 26, 34, 24, 118
-"""Of the plot within the picture, in its units, about a pixel each."""
+"""Plot within the picture, in its units of about a pixel."""
 SECONDS = (-10, -8, -6, -4, -2, 0)
 AREA = "#2b8fd0"
-"""Lighter than the pressed cells', to be read on a dark panel too."""
+"""Lighter than the pressed cells' color, for dark panels."""
 FORCES = ((picture_style.VERMILLION, ""), ("#d99000", "5 2"), (AREA, ""))
 """Colors and dashes of the curves of :func:`force_chart`."""
 LEGEND = 14
-"""Height of one of its lines."""
+"""Height of a line of the legend."""
 
 
 def chart(strip: Strip) -> str:
-    """SVG."""
+    """The strip chart as SVG."""
     most, area_cm2 = top(strip.zones, 2), strip.area_mm2 / 100
     most_cm2 = top(area_cm2, 10)
     parts = [
@@ -39,8 +39,8 @@ def chart(strip: Strip) -> str:
 
 
 def force_chart(forces_n: np.ndarray, seconds: float, curves: Sequence[tuple[int, str]]) -> str:
-    """SVG of (curves, n) forces in N over so many seconds from a touch on, nan where nothing is known yet; ``curves``:
-    of each the number of its color and dashes in :data:`FORCES`, and its name."""
+    """SVG of (curves, n) forces in N over ``seconds`` from a touch, nan where unknown; ``curves``: of each the number
+    of its color and dashes in :data:`FORCES`, and its name."""
     most = top(np.nan_to_num(forces_n), 5, (1, 2, 3, 4, 6, 8, 10))
     shift = LEGEND * len(curves) - TOP + 18
     parts = []
@@ -67,7 +67,7 @@ def _svg(parts: Sequence[str], height: float, label: str) -> str:
 
 
 def top(values: np.ndarray, least: int, steps: Sequence[int] = (1, 2, 5, 10)) -> int:
-    """One of the steps times a power of ten, at least the largest value: the axis changes seldom."""
+    """One of the steps times a power of ten, at least the largest value, so that the axis seldom changes."""
     wanted = max(least, math.ceil(values.max(initial=0.0)))
     power = int(10 ** (len(str(wanted)) - 1))
     return next(times * power for times in steps if times * power >= wanted)
@@ -87,7 +87,7 @@ def _y(share: float) -> float:
 
 
 def _axis(most: int, x: float, anchor: str) -> Iterator[str]:
-    """Numbers at 0, half and the top; lines across from the left one."""
+    """Numbers at 0, half and the top, and horizontal lines."""
     for share in (0.0, 0.5, 1.0):
         y = _y(share)
         yield from _text(x, y + 3.5, f"{share * most:g}", anchor)
@@ -96,7 +96,7 @@ def _axis(most: int, x: float, anchor: str) -> Iterator[str]:
 
 
 def _times(marks: Iterable[tuple[float, str]], name: str) -> Iterator[str]:
-    """Numbers below shares of the plot's width, and what they count."""
+    """Numbers below shares of the plot's width, and their unit."""
     for share, mark in marks:
         yield from _text(_x(share), BOTTOM + 13, mark, "middle")
     yield from _text((LEFT + WIDTH - RIGHT) / 2, BOTTOM + 27, name, "middle")
@@ -107,7 +107,7 @@ def _text(x: float, y: float, text: str, anchor: str) -> Iterator[str]:
 
 
 def _line(across: np.ndarray, upward: np.ndarray, color: str, dashes: str = "") -> str:
-    """Through shares of the plot's width and height."""
+    """A line through shares of the plot's width and height."""
     points = " ".join(f"{_x(x):.1f},{_y(y):.1f}" for x, y in zip(across, upward))
     return f'<polyline points="{points}" fill="none" stroke-linejoin="round" {_stroke(color, dashes)}/>'
 

@@ -1,4 +1,4 @@
-"""What is known of each contact, in words: beside it on the sheet, and in the panel's table."""
+"""Descriptions of contacts, beside them on the sheet, and in the panel's table."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from contactfpga.tracking.tracks import Track
 from contactfpga.zones.zone import Zone
 
 MOST = 8
-"""Contacts that have all that is known written beside them; where there are more, the others have their ids alone."""
+"""Contacts with a full description; further ones have ids alone."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One contact, or a zone that no contact is followed in."""
+    """One contact, or a zone without a track."""
 
     id: int | None
     x_mm: float | None
@@ -27,24 +27,24 @@ class Row:
     area_cells: int
     age_s: float | None
     force_n: float | None = None
-    """None: nobody measures it."""
+    """None: not measured."""
     link: str = ""
 
     @property
     def place(self) -> str:
-        """In mm."""
+        """Place in mm."""
         if self.y_mm is None or math.isnan(self.y_mm):
             return "nowhere"
         return f"{'all round' if self.x_mm is None else f'{self.x_mm:.1f}'}, {self.y_mm:.1f}"
 
     @property
     def name(self) -> str:
-        """Its link, where there are several, and its id."""
+        """Its link, if several, and its id."""
         return f"{self.link} {'' if self.id is None else f'#{self.id}'}".strip()
 
     @property
     def lines(self) -> tuple[str, str]:
-        """Name and place; what else is known."""
+        """Name and place; further facts."""
         parts = [f"{self.area_mm2:,.0f} mm²"]
         parts += [] if self.age_s is None else [f"{self.age_s:.1f} s"]
         parts += [] if self.force_n is None else [f"{self.force_n:.1f} N"]
@@ -52,7 +52,7 @@ class Row:
 
 
 def rows(moment: Moment, link: str = "") -> list[Row]:
-    """Of a moment's contacts in order of their ids, then of the zones without one."""
+    """Rows of a moment's contacts by id, then of zones without one."""
     found = [_row(track.zone, link, track, moment) for track in moment.tracks.active]
     return found + [_row(zone, link) for zone in moment.tracks.unsure]
 
@@ -66,8 +66,7 @@ def _row(zone: Zone, link: str, track: Track | None = None, moment: Moment | Non
 
 
 def force_at(zone: Zone, pushes: Sequence[tuple[Zone, float | None]]) -> float | None:
-    """The push of the measured zone that is nearest, and no further off than this zone is wide: what was measured is
-    some milliseconds older."""
+    """The push of the nearest measured zone within this zone's width, as the measurement is some milliseconds older."""
     if zone.x_mm is None or zone.y_mm is None:
         return None
     away = [(math.hypot((o.x_mm or 0.0) - zone.x_mm, (o.y_mm or 0.0) - zone.y_mm), n) for o, n in pushes]
@@ -76,7 +75,7 @@ def force_at(zone: Zone, pushes: Sequence[tuple[Zone, float | None]]) -> float |
 
 
 def table(found: Sequence[Row], no_data: bool = False) -> str:
-    """HTML. Names of links come from strangers and are escaped."""
+    """HTML of the table. Names of links come from strangers and are escaped."""
     if no_data:
         return _framed("No data", "")
     count = len(found)

@@ -1,4 +1,4 @@
-"""Fingers that the mouse puts on a virtual board."""
+"""Fingers of the mouse on a virtual board."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.zones.around import across
 
 FINGER = 0.9
-"""Radius of the mouse's finger, of the pitch."""
+"""Radius of the mouse's finger over the pitch."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,14 +21,14 @@ class Finger:
     """A round contact."""
 
     x_mm: float
-    """Along the columns, on the sheet laid flat."""
+    """Position along the columns, on the sheet laid flat."""
     y_mm: float
-    """Along the rows."""
+    """Position along the rows."""
     radius_mm: float
     force_n: float
 
     def covers(self, x_mm: float, y_mm: float, around_mm: float | None = None) -> bool:
-        """Whether this place lies under it; ``around_mm``: as :attr:`contactfpga.skin.sheet.Sheet.around_mm`."""
+        """Whether this place is under it; ``around_mm``: see :attr:`contactfpga.skin.sheet.Sheet.around_mm`."""
         off_mm = across(self.x_mm - x_mm, around_mm)
         return off_mm**2 + (self.y_mm - y_mm) ** 2 <= self.radius_mm**2
 
@@ -37,11 +37,11 @@ class Pressable(Protocol):
     """What fingers can press."""
 
     def touch(self, fingers: Sequence[Finger]) -> None:
-        """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
+        """Touch the sheet with these fingers, besides its scene, until the next call; from any thread."""
 
     @property
     def by_force(self) -> bool:
-        """Whether it depends on a finger's force which switches close."""
+        """Whether a finger's force matters."""
 
 
 class Touchable(Pressable, Protocol):
@@ -49,15 +49,15 @@ class Touchable(Pressable, Protocol):
 
     @property
     def pressed(self) -> np.ndarray:
-        """(rows, columns) bool: the switches that are closed."""
+        """(rows, columns) bool: the closed switches."""
 
     def clock(self) -> float:
         """Simulated seconds since power-up."""
 
 
 class Hand:
-    """What the mouse does, as fingers. A click puts one down where none is and lifts the one that is there; a drag
-    moves the one where it begins, or else one that is lifted at its end. Safe for several threads.
+    """The mouse's fingers. A click adds one or lifts the one there; a drag moves one from its start, or else one that
+    is lifted at its end. Thread-safe.
 
     :attr:`radius_mm` and :attr:`force_n` are those of the next finger.
     """
@@ -73,17 +73,17 @@ class Hand:
 
     @classmethod
     def on(cls, board: Pressable, sheet: Sheet) -> Hand:
-        """With a finger that suits this board's sheet."""
+        """A hand with a finger that suits this board's sheet."""
         return cls(board, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm), around_mm=sheet.around_mm)
 
     @property
     def fingers(self) -> list[Finger]:
-        """All that touch the sheet."""
+        """All fingers on the sheet."""
         with self._lock:
             return self._all()
 
     def click(self, x_mm: float, y_mm: float) -> None:
-        """Put a finger down, or lift those that are there."""
+        """Put a finger down, or lift those there."""
         with self._lock:
             left = [finger for finger in self._down if not finger.covers(x_mm, y_mm, self._around_mm)]
             if len(left) == len(self._down):
@@ -92,14 +92,14 @@ class Hand:
             self._tell()
 
     def drag(self, who: object, x_mm: float, y_mm: float) -> None:
-        """Begin or go on; ``who``: whose mouse it is."""
+        """Begin or continue a drag; ``who``: whose mouse it is."""
         with self._lock:
             before = self._dragged.get(who) or self._taken(who, x_mm, y_mm)
             self._dragged[who] = dataclasses.replace(before, x_mm=x_mm, y_mm=y_mm)
             self._tell()
 
     def drop(self, who: object) -> None:
-        """End of a drag."""
+        """End a drag."""
         with self._lock:
             finger = self._dragged.pop(who, None)
             if finger is not None and who in self._stays:
@@ -108,7 +108,7 @@ class Hand:
             self._tell()
 
     def resize(self, radius_mm: float | None = None, force_n: float | None = None) -> None:
-        """Also of those that are down."""
+        """Resize all fingers, and future ones."""
         self.radius_mm = self.radius_mm if radius_mm is None else radius_mm
         self.force_n = self.force_n if force_n is None else force_n
         with self._lock:
@@ -117,7 +117,7 @@ class Hand:
             self._tell()
 
     def lift(self) -> None:
-        """Lift all."""
+        """Lift all fingers."""
         with self._lock:
             self._down, self._dragged, self._stays = [], {}, set()
             self._tell()

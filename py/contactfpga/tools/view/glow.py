@@ -1,4 +1,4 @@
-"""The light of closed cells, which shines through the foam."""
+"""The light of closed cells through the foam."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import viser
 
 PARTS = ((0.30, 0.5, 0.75), (0.85, 0.0, 0.2))
-"""Of each cell's light, from the middle out: spread in pitches, how much whiter than the cell it is, opacity."""
+"""Parts of each cell's light, from the middle out: spread in pitches, whitening, opacity."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Blobs:
 
 
 def blobs(tiles: Tiles, lift_mm: float) -> Blobs:
-    """Of all cells, over the sheet by ``lift_mm``."""
+    """Blobs of all cells, ``lift_mm`` above the sheet."""
     sheet = tiles.sheet
     axes = np.stack([tiles.along_x, tiles.along_y, tiles.normals], -1)
     size = np.array([sheet.pitch_x_mm, sheet.pitch_y_mm, 0.3 * min(sheet.pitch_x_mm, sheet.pitch_y_mm)])
@@ -45,7 +45,8 @@ def shine(colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Glow:
-    """Draws it. All blobs are there from the beginning: new ones would be drawn before the page knows their place."""
+    """Draws the light. All blobs exist from the beginning: new ones would be drawn before the page knows their
+    place."""
 
     def __init__(self, server: viser.ViserServer, name: str, tiles: Tiles, lift_mm: float):
         self._blobs = found = blobs(tiles, lift_mm)
@@ -53,5 +54,5 @@ class Glow:
         self._handle = server.scene.add_gaussian_splats(name, found.centers_mm, found.spreads_mm2, *dark, scale=MM)
 
     def show(self, colors: np.ndarray) -> None:
-        """Of cells with these colors."""
+        """Show cells with these colors."""
         self._handle.set_gaussians(self._blobs.centers_mm, self._blobs.spreads_mm2, *shine(colors))

@@ -1,4 +1,4 @@
-"""What a sheet is drawn on: a forearm with foam where it runs round a cylinder, else a plate under it."""
+"""The carrier of a drawn sheet: a forearm with foam for a cylinder, else a plate."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     import viser
 
 FOAM_MM = 5.0
-"""Thickness of the foam, which is drawn and presses nothing: the default of a Skin's `[cover]`."""
+"""Thickness of the drawn foam, without effect: the default of a Skin's `[cover]`."""
 UNDER_MM = 1.2
-"""From the cells to what carries them."""
+"""Distance from the cells to their carrier."""
 LEFT_MM = 1.0
-"""What is left of it over a closed cell."""
+"""Remaining foam over a closed cell."""
 REACH = 1.6
-"""From a closed cell to where the foam is whole, in pitches."""
+"""Distance from a closed cell to undented foam, in pitches."""
 SIDES = 72
-"""Of a solid of revolution."""
+"""Sides of a solid of revolution."""
 
 CORE, COLLAR, JOINT, FOAM, PLATE = (52, 58, 67), (176, 183, 192), (96, 104, 115), (228, 234, 240), (52, 58, 67)
 
@@ -41,7 +41,7 @@ class Limb:
         vertices, faces = revolved(self._profile)
         self._foam: Any = _add(server, f"{node}/foam", vertices, faces, FOAM, opacity=0.38)
         self.points_mm = np.concatenate([revolved(profile)[0] for profile, _ in parts.values()])
-        """(n, 3) of all that is drawn."""
+        """(n, 3) points of everything drawn."""
 
     def press(self, closed: np.ndarray) -> None:
         """Dent the foam over these cells, (n,) bool row by row."""
@@ -64,7 +64,7 @@ def forearm(radius: float, low: float, high: float) -> dict[str, tuple[np.ndarra
 
 
 def foam_profile(radius: float, low: float, high: float) -> np.ndarray:
-    """(n, 2) radius and z in mm: its outside, and round edges down to the core."""
+    """(n, 2) radius and z in mm: the outside, with round edges down to the core."""
     turn = np.linspace(0, np.pi / 2, 5)
     edge = FOAM_MM * 0.8
     begin = np.stack([radius + FOAM_MM - edge + edge * np.sin(turn), low + edge - edge * np.cos(turn)], -1)
@@ -74,7 +74,7 @@ def foam_profile(radius: float, low: float, high: float) -> np.ndarray:
 
 
 def dented(vertices: np.ndarray, tiles: Tiles, closed: np.ndarray) -> np.ndarray:
-    """The same (n, 3) mm, toward the axis over closed cells and a little around them."""
+    """(n, 3) vertices in mm, moved toward the axis over closed cells and slightly around."""
     sheet = tiles.sheet
     assert sheet.radius_mm is not None
     turns = np.arctan2(vertices[:, 1], vertices[:, 0])
@@ -92,7 +92,7 @@ def dented(vertices: np.ndarray, tiles: Tiles, closed: np.ndarray) -> np.ndarray
 
 
 def plate(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices in mm and faces of a thin plate that follows the surface under all cells and a little beyond."""
+    """Vertices in mm and faces of a thin plate along the surface under all cells and slightly beyond."""
     sheet = tiles.sheet
     beyond = 0.35
     x_mm = np.linspace(-0.5 - beyond, sheet.columns - 0.5 + beyond, 2 * sheet.columns + 1) * sheet.pitch_x_mm
@@ -103,13 +103,13 @@ def plate(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
 
 
 def add_plate(server: viser.ViserServer, tiles: Tiles, node: str) -> None:
-    """Draw it."""
+    """Draw the plate."""
     _add(server, f"{node}/plate", *plate(tiles), PLATE)
 
 
 def revolved(profile: np.ndarray, sides: int = SIDES, first: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and outward faces of a profile (k, 2), radius and z in one unit, turned about z in so many steps
-    from the angle ``first`` in rad on."""
+    """Vertices (n, 3) and outward faces of a profile (k, 2), radius and z in one unit, revolved about z in ``sides``
+    steps from the angle ``first`` in rad."""
     angles = first + np.linspace(0, 2 * np.pi, sides + 1)
     radius, height = profile[:, :1], profile[:, 1:]
     rings = np.stack([radius * np.cos(angles), radius * np.sin(angles), height + 0 * angles], -1)
@@ -117,7 +117,7 @@ def revolved(profile: np.ndarray, sides: int = SIDES, first: float = 0.0) -> tup
 
 
 def _grid(rows: int, columns: int) -> np.ndarray:
-    """Two triangles for each cell of a grid of vertices, row by row."""
+    """Two triangles per cell of a grid of vertices, row by row."""
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.stack([first, first + 1, first + columns + 1], -1)
     upper = np.stack([first, first + columns + 1, first + columns], -1)

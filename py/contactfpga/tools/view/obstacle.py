@@ -1,4 +1,4 @@
-"""A ball or a hand that the mouse puts in a simulated robot's way."""
+"""A ball or a hand that the mouse places in a simulated robot's way."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import numpy as np
 
 NOTHING, BALL, HAND = OBSTACLES = ("none", "ball", "hand")
 FASTEST_M_S = 0.5
-"""It follows the mouse no faster, as MuJoCo's contacts know no speed of what is put somewhere."""
+"""Largest speed of following the mouse, as MuJoCo's contacts ignore the speed of placed bodies."""
 AWAY_M = np.array([0.0, 0.0, 100.0])
-"""Where what is not chosen waits."""
+"""Waiting place of unchosen obstacles."""
 AHEAD_M = 0.06
-"""In front of a sheet, along x, at first."""
+"""Initial place in front of a sheet, along x."""
 BALL_M = 0.03
 """Radius."""
 STEEP = 1 / 3
-"""Sine of the elevation from which on one looks down."""
+"""Sine of the elevation from which the view counts as downward."""
 FARTHEST = 3.0
-"""The mouse moves it at most this many times as deep as it was taken."""
+"""Largest depth over that of the grip."""
 COLORS = {BALL: (0.87, 0.56, 0.02, 1.0), HAND: (0.89, 0.67, 0.54, 1.0)}
 ALL_BITS = 2**31 - 1
-"""Of a geom that touches whatever touches anything."""
+"""Collision bits of a geom that touches everything touchable."""
 
 FINGERS_M = (-0.033, -0.011, 0.011, 0.033)
-"""Their places along x on the palm, which is across y; they point up."""
+"""Places of fingers along x on the palm, which is across y; they point up."""
 
 
 def add(spec: Any) -> None:
-    """To a ``mujoco.MjSpec``: bodies that nothing moves but :class:`Obstacle`."""
+    """Add to a ``mujoco.MjSpec`` bodies that only :class:`Obstacle` moves."""
     import mujoco
 
     sphere, capsule = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -48,7 +48,7 @@ def add(spec: Any) -> None:
 
 
 class Obstacle:
-    """Where it is, and where the mouse wants it."""
+    """An obstacle's place, and the mouse's target."""
 
     def __init__(self) -> None:
         self.kind = NOTHING
@@ -56,34 +56,34 @@ class Obstacle:
         self.wanted_m = self.at_m = AWAY_M
 
     def put(self, kind: str, at_m: np.ndarray) -> None:
-        """At once, of this kind."""
+        """Place an obstacle of this kind at once."""
         self.kind, self.wanted_m, self.at_m = kind, at_m, at_m
 
     def go_on(self, seconds: float) -> None:
-        """Toward where the mouse wants it, for so long."""
+        """Move toward the mouse's target for this time."""
         way = self.wanted_m - self.at_m
         far, most = float(np.linalg.norm(way)), FASTEST_M_S * seconds
         self.at_m = self.wanted_m if far <= most else self.at_m + way * (most / far)
 
     def place(self, model: Any, data: Any) -> None:
-        """In one copy of the robot."""
+        """Place it in one copy of the robot."""
         for name in (BALL, HAND):
             number = model.body(f"obstacle {name}").mocapid[0]
             data.mocap_pos[number] = self.at_m if name == self.kind else AWAY_M
 
 
 class Grip:
-    """A drag: in the horizontal plane as seen from above, else in that of two axes which faces the camera."""
+    """A drag in the horizontal plane seen from above, else in the plane of two axes that faces the camera."""
 
     def __init__(self, obstacle: Obstacle, eye_m: np.ndarray, grabbed_m: np.ndarray):
-        """(3,) places of the camera, and of where the mouse took it."""
+        """(3,) places of the camera, and of the grip."""
         self._obstacle, self._grabbed_m, self._began_m = obstacle, grabbed_m, obstacle.at_m
         ray = grabbed_m - eye_m
         above = abs(ray[2]) >= STEEP * np.linalg.norm(ray)
         self._axis = 2 if above else int(np.abs(ray[:2]).argmax())
 
     def drag(self, eye_m: np.ndarray, to_m: np.ndarray) -> None:
-        """The mouse's ray now: from the camera through a point as deep as the place that was taken."""
+        """Follow the mouse's ray, from the camera through a point at the grip's depth."""
         ray, axis = to_m - eye_m, self._axis
         reach = (self._grabbed_m - eye_m)[axis]
         if reach * ray[axis] > 0 and abs(reach) < FARTHEST * abs(ray[axis]):

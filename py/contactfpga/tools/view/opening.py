@@ -1,4 +1,4 @@
-"""From what the user names to a view of it."""
+"""From the user's request to its view."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import viser
 
 PANEL_S = 0.25
-"""How often the panel is written."""
+"""Interval of writing the panel."""
 
 
 class View:
@@ -75,28 +75,27 @@ FOREARM = Skin(rows=16, columns=16, closed=True, surface="cylinder", radius_mm=4
 
 
 def own_skin(flat: bool = False) -> Skin:
-    """Of the virtual sheet that is shown where nothing is named: at a third of the usual clock, to keep up with real
-    time."""
+    """The default virtual sheet's Skin, at a third of the usual clock to keep up with real time."""
     return (Skin() if flat else FOREARM).replace(clock_hz=4_000_000, baud=2_000_000, send="on_change")
 
 
 @dataclasses.dataclass(frozen=True)
 class ServedView:
-    """A view that is being served."""
+    """A view in service."""
 
     web: viser.ViserServer
     guard: Guard
     view: View | RobotView
     source: Source | BodySource | BodyPlayer | SimulatedSource
     hand: Hand | None
-    """The mouse's, on a virtual board."""
+    """The mouse's hand, on a virtual board."""
     url: str
-    """With the token: whoever has it can read and press."""
+    """Address with the token, which permits reading and pressing."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ViewRequest:
-    """What a user asks to see."""
+    """The user's request."""
 
     port: str | None = None
     """A port, ``sim://``, a recording; None: a virtual sheet."""
@@ -105,27 +104,27 @@ class ViewRequest:
     timeout: float = 1.0
     """Seconds for the hello."""
     link: str | None = None
-    """Of a recording of several boards."""
+    """Link of a recording of several boards."""
     units: str | Path | None = None
-    """File of the pressure units; by default what ``sim://`` names."""
+    """File of the pressure units; by default from ``sim://``."""
     flat: bool = False
-    """With nothing named: a flat sheet in place of the one around a forearm."""
+    """By default show a flat sheet instead of one around a forearm."""
     reading: Reading = silent
-    """Told how far a recording is read that has no index."""
+    """Receives the progress of reading a recording without index."""
     mujoco: str | None = None
-    """File of a MuJoCo model, which wears the sheets of the robot that :attr:`port` names."""
+    """File of a MuJoCo model that wears the sheets of the robot of :attr:`port`."""
     reflex: str | None = None
-    """Python file of reflexes that move it."""
+    """Python file of its reflexes."""
     gateware: bool = False
-    """With it the compiled gateware, not the golden model."""
+    """Use the compiled gateware, not the golden model."""
 
 
 @contextlib.contextmanager
 def opened(
     named: ViewRequest | None = None, host: str = server.LOCAL, http_port: int | None = None
 ) -> Iterator[ServedView]:
-    """Open what is named, a virtual board by default, and serve a view of it; raises what :func:`contactfpga.open`
-    does."""
+    """Open the request, a virtual board by default, and serve a view of it; raises the errors of
+    :func:`contactfpga.open`."""
     named = named or ViewRequest()
     _check(named)
     source, hand = _source(named)
@@ -146,14 +145,14 @@ def opened(
 
 
 def run(shown: ServedView, seconds: float | None = None) -> None:
-    """Draw moment after moment, for so long; None: until it is interrupted."""
+    """Draw moments for this long; None: until interrupted."""
     until = math.inf if seconds is None else time.monotonic() + seconds
     while time.monotonic() < until:
         shown.view.step()
 
 
 def _check(named: ViewRequest) -> None:
-    """Raises :class:`~contactfpga.ContactFPGAError` for what is named and would be left out."""
+    """Raises :class:`~contactfpga.ContactFPGAError` for options that would be ignored."""
     port = named.port
     is_body = names_robot(port)
     recorded = port is not None and not is_body and is_recording(port)
@@ -196,7 +195,7 @@ def _is_virtual(port: str) -> bool:
 
 
 def _cells(named: ViewRequest) -> LoadCells | None:
-    """Raises :class:`~contactfpga.robot.haptics.HapticsError`."""
+    """The units of the request. Raises :class:`~contactfpga.robot.haptics.HapticsError`."""
     path = named.units
     if path is None and named.port is not None and _is_virtual(named.port):
         path = Sim.parse(named.port).units
@@ -204,7 +203,7 @@ def _cells(named: ViewRequest) -> LoadCells | None:
 
 
 def _virtual(named: ViewRequest) -> Any:
-    """A virtual board; with nothing named an untouched one of the Skin, or a sheet around a forearm."""
+    """A virtual board; by default an untouched one of the Skin, or a sheet around a forearm."""
     if named.port is not None:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
@@ -213,8 +212,7 @@ def _virtual(named: ViewRequest) -> Any:
 
 
 def browse(url: str) -> None:
-    """Open it in the user's browser, by way of a page that only this user can read: all can read what a program is
-    called with."""
+    """Open it in the user's browser, through a page that only this user can read, since command lines are public."""
     with tempfile.NamedTemporaryFile("w", suffix=".html", prefix="contactfpga-", delete=False) as file:
         file.write(f"<!doctype html><title>contactfpga</title><script>location.replace({url!r})</script>\n")
     atexit.register(Path(file.name).unlink, missing_ok=True)

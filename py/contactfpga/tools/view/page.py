@@ -1,5 +1,5 @@
-"""How viser's page looks here: its panel under the sheet on a phone, and none of its own marks over the sheet;
-and a picture of it."""
+"""Changes of viser's page: its panel under the sheet on a phone, none of its own marks over the sheet; and a
+picture."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ SCRIPT = """
   };
 })();
 """
-"""Before a drag: without viser's arrow from its beginning to the mouse, and without the cross it turns around. And a
-picture of what is seen, in the page's colors, with lines of text under it."""
+"""Script that removes viser's drag arrow and rotation cross, and saves a picture of the view, in the page's colors,
+with lines of text below."""
 
 
 def dress(server: viser.ViserServer) -> None:
-    """For all who come. viser has no setting for any of this, but sends a script to the page where a part of it asks
-    for one."""
+    """Apply the changes for all clients. viser has no setting for them, but sends a script where a part of the page
+    asks for one."""
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.set_panel_label("contactfpga")
     server.gui.main_panel.dock_right()
@@ -81,7 +81,7 @@ def dress(server: viser.ViserServer) -> None:
 
 
 def picture(client: Any, lines: Sequence[str]) -> None:
-    """Have this browser save what it shows as `contactfpga.png`, with these lines under it."""
+    """Make this browser save its view as `contactfpga.png`, with these lines below."""
     _run(client._websock_connection, f"window.contactfpgaPicture({json.dumps(list(lines))})")
 
 

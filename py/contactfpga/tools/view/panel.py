@@ -1,4 +1,4 @@
-"""The panel beside the sheet: counters, chart, what the mouse presses with, a recording's timeline."""
+"""The panel beside the sheet: counters, chart, the mouse's finger, a recording's timeline."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ TRUTH = (
     "■",
     "cells that are really pressed; the virtual board reports only zones",
 )
-"""Of the legend: name and value of a color, its mark, what it means."""
+"""Legend: name and value of a color, its mark and meaning."""
 
 FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {picture.MM_PER_N:g} mm per newton")
 TITLE = 36
 MOST_N = 30.0
-"""Of the mouse's finger."""
+"""Largest force of the mouse's finger."""
 
 
 class Panel:
-    """Writes what a source says besides its zones."""
+    """Writes a source's further data."""
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None, cameras: Cameras):
         self._source = source
@@ -85,7 +85,7 @@ class Panel:
         return f"{title}, {self._moment.zones.time_us / 1e6:.6f} s since power-up", contacts.rows(self._moment)
 
     def write(self, moment: Moment | None) -> None:
-        """What is known now."""
+        """Write the current facts."""
         self._moment = moment
         self._table.content = contacts.table(() if moment is None else contacts.rows(moment))
         self._facts.content = as_markdown(facts(self._source, moment))
@@ -95,7 +95,7 @@ class Panel:
 
 
 class TimelineControls:
-    """Where a recording is, and how fast it goes on."""
+    """Position and speed of a recording."""
 
     def __init__(self, server: viser.ViserServer, player: Playback[Any]):
         self._player = player
@@ -114,14 +114,14 @@ class TimelineControls:
             player.speed = SPEEDS[speed.value]
 
     def write(self) -> None:
-        """Where it is now."""
+        """Write the current position."""
         if self._player.playing:
             self._place.value = self._player.position_s
         self._button.label = "Pause" if self._player.playing else "Play"
 
 
 def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
-    """Names and values, as the panel shows them."""
+    """Names and values in the panel."""
     rows = [("source", shortened(source.title)), ("sends", paced(source.meter.frames_per_s))]
     if moment is not None:
         rows.append(("pressed", f"{moment.zones.pressed} cells"))
@@ -131,8 +131,8 @@ def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
 
 
 def as_markdown(rows: Iterable[tuple[str, str]]) -> str:
-    """Names and values, a line each. Both are shown as they are written: names of links, files and Skins come from
-    strangers, and the page would otherwise run the HTML in them and load the pictures that they name."""
+    """Names and values, a line each, shown verbatim: names of links, files and Skins come from strangers, and the page
+    would otherwise run their HTML and load their pictures."""
     return "\n".join(f"**{_plain(name)}** {_plain(value)}  " for name, value in rows)
 
 
@@ -142,12 +142,12 @@ def _plain(text: str) -> str:
 
 
 def shortened(title: str) -> str:
-    """At most a line; the end of a long name says most."""
+    """At most a line, keeping the end of a long name."""
     return title if len(title) <= TITLE else f"… {title[-TITLE:]}"
 
 
 def legend(source: Source, virtual: bool) -> str:
-    """What each color means, in HTML and Markdown."""
+    """Meaning of each color, in HTML and Markdown."""
     rows = [ZONES, WAY]
     cells = source.sheet.report == "cells"
     rows += [REPORTED] if cells else []

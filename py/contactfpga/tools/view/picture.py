@@ -1,4 +1,4 @@
-"""What is drawn of a frame, as plain arrays: colors of the cells, circles, barycenters, trails."""
+"""The drawing of a frame as plain arrays: cell colors, circles, barycenters, trails."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIDES = 48
 
 
 def rgb(color: str) -> tuple[int, int, int]:
-    """Of ``#rrggbb``."""
+    """RGB of ``#rrggbb``."""
     value = int(color[1:], 16)
     return value >> 16, value >> 8 & 0xFF, value & 0xFF
 
@@ -36,8 +36,8 @@ OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
         picture_style.INK,
     )
 )
-"""Cells: open; closed on a virtual board that sends zones only, which is its own truth; closed, as the board reports;
-perhaps made by other closed ones; of a link without data."""
+"""Cells: open; closed on a virtual board that sends zones only, by its own truth; closed by the board's report;
+possibly ghosts of other closed ones; of a link without data."""
 
 CIRCLE, TRAIL, PUSH, AXIS = (
     rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE, picture_style.GRAY)
@@ -45,7 +45,7 @@ CIRCLE, TRAIL, PUSH, AXIS = (
 
 
 def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:
-    """(n, 3) uint8, row by row. ``truth``: the cells that are closed on a virtual board."""
+    """(n, 3) uint8, row by row. ``truth``: closed cells of a virtual board."""
     shape = (zones.sheet.rows, zones.sheet.columns)
     colors = np.empty((*shape, 3), np.uint8)
     colors[:] = OPEN
@@ -60,23 +60,23 @@ def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:
 
 
 def lit(colors: np.ndarray) -> np.ndarray:
-    """(n,) bool: the cells that are closed, or may be, by their colors."""
+    """(n,) bool: the closed, or possibly closed, cells by color."""
     found: np.ndarray = (colors != np.array(OPEN, np.uint8)).any(-1) & (colors != np.array(UNKNOWN, np.uint8)).any(-1)
     return found
 
 
 @dataclasses.dataclass(frozen=True)
 class Spots:
-    """Barycenters and circles of a frame's zones, in m, lifted off the sheet."""
+    """Barycenters and circles of a frame's zones, in m, above the sheet."""
 
     points: np.ndarray
     """(n, 3)"""
     circles: np.ndarray
-    """(m, 2, 3) lines around them: each circle has its zone's area."""
+    """(m, 2, 3) lines of circles with the zones' areas."""
 
 
 def spots(zones: Zones, surface: Surface, lift_mm: float) -> Spots:
-    """Of all zones that lie somewhere."""
+    """Spots of all zones with a place."""
     placed = [zone for zone in zones if zone.x_mm is not None]
     if not placed:
         return Spots(np.zeros((0, 3)), np.zeros((0, 2, 3)))
@@ -86,7 +86,7 @@ def spots(zones: Zones, surface: Surface, lift_mm: float) -> Spots:
 
 
 def radius_mm(zone: Zone) -> float:
-    """Of the circle that has the zone's area."""
+    """Radius of the circle with the zone's area."""
     return math.sqrt(zone.area_mm2 / math.pi)
 
 
@@ -105,16 +105,16 @@ def _lifted(surface: Surface, x_mm: np.ndarray, y_mm: np.ndarray, lift_mm: float
 
 
 MM_PER_N = 4.0
-"""Length of an arrow."""
+"""Length of an arrow per newton."""
 LEAST_N = 0.02
-"""Weaker forces have no arrow."""
+"""Weakest force with an arrow."""
 
 
 def pushes(contacts: Contacts, zones: Zones, cells: LoadCells, surface: Surface) -> np.ndarray:
     """(n, 2, 3) arrows in m, one for each contact with a force, from outside to its zone's barycenter.
 
-    The units' surface has its own frame, and may be the outside of a foam: forces are taken along normal, rows and
-    columns there, and drawn along those of the sheet.
+    The units' surface has its own frame, and may be the outside of a foam: forces are resolved along its normal, rows
+    and columns, and drawn along those of the sheet.
     """
     placed = [zone for zone in zones if zone.x_mm is not None]
     arrows = []
@@ -134,7 +134,7 @@ def pushes(contacts: Contacts, zones: Zones, cells: LoadCells, surface: Surface)
 
 
 def _directions(surface: Any, x: float, y: float, unit: float) -> np.ndarray:
-    """(3, 3) unit vectors at a place: the normal, and the ways in which x and y grow."""
+    """(3, 3) unit vectors at a place: the normal, and the directions of growing x and y."""
     point, normal = (np.array(each) for each in surface.place(x, y))
     step = 1e-4 * unit
     across = np.array(surface.place(x, y + step)[0]) - point
@@ -144,14 +144,14 @@ def _directions(surface: Any, x: float, y: float, unit: float) -> np.ndarray:
 
 
 class Trails:
-    """The ways of the contacts over the last moments, in m."""
+    """Recent paths of the contacts, in m."""
 
     def __init__(self, surface: Surface, lift_mm: float, seconds: float = 1.0):
         self._surface, self._lift_mm, self._us = surface, lift_mm, seconds * 1e6
         self._ways: dict[int, list[tuple[int, np.ndarray]]] = {}
 
     def add(self, tracks: Tracks) -> None:
-        """The contacts of the next frame."""
+        """Add the contacts of the next frame."""
         if tracks.restarted:
             self._ways.clear()
         for track in tracks.active:
@@ -167,6 +167,6 @@ class Trails:
 
     @property
     def lines(self) -> np.ndarray:
-        """(n, 2, 3)"""
+        """(n, 2, 3) line segments."""
         found = [[one[1], other[1]] for way in self._ways.values() for one, other in itertools.pairwise(way)]
         return np.array(found) if found else np.zeros((0, 2, 3))

@@ -1,4 +1,4 @@
-"""What plays: a recording as fast as asked, from where one is led to; and one of a board."""
+"""Playback at a chosen speed from a chosen position; and of one board."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from contactfpga.zones.zone import Zones
 Item = TypeVar("Item")
 
 SPEEDS = {"1/1000": 0.001, "1/100": 0.01, "1/10": 0.1, "1/4": 0.25, "1": 1.0, "4": 4.0, "16": 16.0}
-"""By the names that the panel gives them, the seconds of the recording that pass in one."""
+"""Recording seconds per second, by name in the panel."""
 
 BEFORE_S = 0.25
-"""So much before the place that one is led to is read as well: what was there then, a keep-alive later at most."""
+"""Time before the chosen position that is read as well, which contains at least a keep-alive."""
 
 
 class Playback(abc.ABC, Generic[Item]):
-    """Plays a recording; :meth:`play`, :meth:`pause`, :meth:`seek` and :attr:`speed` are for any thread."""
+    """Plays a recording; :meth:`play`, :meth:`pause`, :meth:`seek` and :attr:`speed` are thread-safe."""
 
     def __init__(self, duration_s: float, clock: Callable[[], float] = time.monotonic):
         self.duration_s = duration_s
         self.position_s = 0.0
-        """The moment that is shown."""
+        """The shown moment."""
         self.playing = True
         self.speed = 1.0
         self._clock = clock
@@ -44,14 +44,14 @@ class Playback(abc.ABC, Generic[Item]):
 
     @abc.abstractmethod
     def begin(self, start_s: float) -> Iterator[tuple[float, Item]]:
-        """What there is from this moment on, with its times; what was seen before counts no more."""
+        """Timed items from this moment on; earlier ones are forgotten."""
 
     @abc.abstractmethod
     def follow(self, seconds: float, item: Item) -> None:
-        """Take the next one, which is to be seen now or was meanwhile."""
+        """Add the next item, visible now or earlier."""
 
     def play(self) -> None:
-        """Go on; from the beginning where it has ended."""
+        """Continue; from the beginning if ended."""
         with self._lock:
             if self.position_s >= self.duration_s and self._led_to is None:
                 self._led_to = 0.0
@@ -62,12 +62,12 @@ class Playback(abc.ABC, Generic[Item]):
         self.playing = False
 
     def seek(self, seconds: float) -> None:
-        """Show this moment, and go on from there if it plays."""
+        """Show this moment, and continue from it if playing."""
         with self._lock:
             self._led_to = min(max(0.0, seconds), self.duration_s)
 
     def step(self) -> None:
-        """Wait for the next step, and follow what came up to its moment."""
+        """Wait for the next step, and add the items up to its moment."""
         left = STEP_S - (self._clock() - self._stepped_s)
         if left > 0:
             time.sleep(left)
@@ -89,7 +89,7 @@ class Playback(abc.ABC, Generic[Item]):
             self.position_s = self._next[0]
 
     def _take(self, until_s: float, deadline: float) -> None:
-        """What there is up to that moment, until the deadline at least one."""
+        """Add items up to that moment, at least one before the deadline."""
         while self._next is not None and self._next[0] <= until_s:
             self.follow(*self._next)
             self._next = next(self._items, None)
@@ -97,7 +97,7 @@ class Playback(abc.ABC, Generic[Item]):
                 break
 
     def close(self) -> None:
-        """Let the recording go."""
+        """Release the recording."""
         self._items = iter(())
 
 
@@ -115,7 +115,7 @@ class Player(Playback[Zones]):
         self._tracks: Tracks | None = None
 
     def poll(self) -> Moment | None:
-        """The frame that is to be shown now, after those before it have been counted and followed."""
+        """The current frame, after counting and tracking those before it."""
         self._taken = []
         self.step()
         if not self._taken or self._tracks is None:

@@ -1,4 +1,4 @@
-"""The picture of a recording; needs matplotlib. The same recording gives the same file."""
+"""The picture of a recording, by matplotlib. The same recording gives the same file."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def draw(recording: BoardRecording, path: Path) -> Path:
 
 
 def title(recording: BoardRecording, touches: Touches) -> str:
-    """What it is of."""
+    """Title of the picture."""
     sheet = touches.sheet
     name = recording.title.rpartition("/")[2]
     return f"{name}: {sheet.rows}x{sheet.columns} cells, {touches.frames:,} frames in {touches.duration_s:.1f} s"
@@ -101,34 +101,33 @@ def _losses(axes: Axes, touches: Touches, recording: BoardRecording) -> None:
 
 STEPS = 600
 CHUNK = 2000
-"""Frames that are looked at together."""
+"""Frames per batch."""
 LONGEST_S = 0.25
-"""What a frame shows counts for no longer than this: a board with ``send = "on_change"`` speaks at least that often."""
+"""Longest validity of a frame: a board with ``send = "on_change"`` sends at least that often."""
 
 
 class Touches:
-    """What a recording of one sheet holds, gathered for a plot of any length: a fixed number of steps in time, and the
-    sheet's cells."""
+    """A recording of one sheet, gathered for a plot: a fixed number of time steps, and the sheet's cells."""
 
     def __init__(self, sheet: Sheet, duration_s: float, steps: int = STEPS):
         self.sheet, self.duration_s = sheet, max(duration_s, 1e-6)
         self.frames = 0
         self.zones = np.zeros(steps, int)
-        """The most in each step."""
+        """Most zones in each step."""
         self.area_mm2 = np.zeros(steps)
-        """Likewise."""
+        """Largest total area in each step."""
         self.rows = np.zeros((sheet.rows, steps))
-        """The largest area in mm2 by the row of its barycenter; with ``report = "cells"`` pressed cells of each row."""
+        """Largest area in mm2 by the row of its barycenter; with ``report = "cells"`` pressed cells of each row."""
         self.touched_s = np.zeros((sheet.rows, sheet.columns))
-        """For how long a barycenter lay in each cell; with ``report = "cells"``, how long each cell was pressed."""
+        """Time of a barycenter in each cell; with ``report = "cells"``, time for which each cell was pressed."""
         self.lost = np.zeros(steps, int)
-        """Frames that the board sent and that are not there."""
+        """Sent frames that are missing."""
         self._before: Zones | None = None
         self._before_s = 0.0
 
     @classmethod
     def of(cls, recording: BoardRecording) -> Touches:
-        """A whole recording."""
+        """Gather a whole recording."""
         found = cls(recording.sheet, recording.duration_s)
         same = ((seconds, zones) for seconds, zones in recording.frames() if zones.sheet == recording.sheet)
         for chunk in _chunks(same):
@@ -137,7 +136,7 @@ class Touches:
 
     @property
     def seconds(self) -> np.ndarray:
-        """(steps + 1,) where each step begins, and where the last one ends."""
+        """(steps + 1,) beginnings of the steps, and the last end."""
         return np.linspace(0, self.duration_s, len(self.zones) + 1)
 
     def _take(self, chunk: list[tuple[float, Zones]]) -> None:
@@ -173,7 +172,7 @@ class Touches:
                 self.rows[:, step] = np.maximum(self.rows[:, step], cells.sum(1))
 
     def _hold(self, zones: Zones, since_s: float, until_s: float) -> None:
-        """What the last frame of a chunk shows lasts until the next one's first."""
+        """Extend the last frame of a chunk to the next one's first."""
         held_s = min(until_s - since_s, LONGEST_S)
         if zones.cells is not None:
             self.touched_s += zones.cells * held_s

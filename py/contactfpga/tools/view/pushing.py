@@ -1,4 +1,4 @@
-"""A simulated robot in a server's page, or copies of it side by side: what the mouse does to it, and the forces."""
+"""A simulated robot, or copies side by side, in a server's page: the mouse's actions, and the forces."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     import viser
 
 PUSH_N = 5.0
-"""Of the mouse's finger, at first."""
+"""Initial force of the mouse's finger."""
 APART = 2.3
-"""From one copy to the next, in radii of a robot as it starts."""
+"""Distance of copies, in radii of a robot at its start."""
 ABOVE = 0.1
-"""A copy's name over it, in the same."""
+"""Height of a copy's name above it, in these radii."""
 ABREAST = Side(np.array([1.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]))
-"""Where one looks from at several."""
+"""Viewing direction for several copies."""
 
 
 class SimulatedView(RobotView):
@@ -41,7 +41,7 @@ class SimulatedView(RobotView):
             hand.force_n = PUSH_N
         self._grips: dict[int, obstacle.Grip] = {}
         self._put_s = np.inf
-        """When an obstacle was chosen that is not drawn yet."""
+        """Time of choosing an obstacle not yet drawn."""
         self._drawn: list[RobotCopy] = []
         self._robots: list[DrawnRobot] = []
         self._arrange()
@@ -56,7 +56,7 @@ class SimulatedView(RobotView):
         return np.concatenate([robot.stage.points_m() for robot in self._robots])
 
     def _arrange(self) -> None:
-        """New copies have come: a stage for each, next to one another."""
+        """Make adjacent stages for new copies."""
         self._drawn = copies = self._source.copies
         while len(self._stages) < len(copies):
             self._add_stage()
@@ -118,14 +118,14 @@ class SimulatedView(RobotView):
         return rows
 
     def _look_again(self) -> None:
-        """Cameras hold all copies."""
+        """Let cameras hold all copies."""
         sides = self.cameras.sides
         sides[OVERVIEW] = ROBOT_SIDES[OVERVIEW] if len(self._drawn) == 1 else ABREAST
         for client in self._server.get_clients().values():
             self.cameras.show(client, OVERVIEW)
 
     def _draw(self, number: int) -> list[contacts.Row]:
-        """One of the copies."""
+        """Draw one copy."""
         copy, robot, name = self._drawn[number], self._robots[number], self._names[number]
         robot.stage.place(copy.poses())
         several = len(self._drawn) > 1
@@ -145,7 +145,7 @@ class SimulatedView(RobotView):
     # ---- the panel
 
     def _add_pushing(self) -> None:
-        """How hard the mouse pushes, what is in the way, what the robot feels, which reflex acts, and a new start."""
+        """Add the mouse's force, the obstacle, the felt forces, the reflex, and a restart."""
         source, gui = self._source, self._server.gui
         with gui.add_folder("Robot"):
             skin = gui.add_dropdown("skin", (*SKINS, ALL), initial_value=source.skin)
@@ -174,7 +174,7 @@ class SimulatedView(RobotView):
         server.on_client_connect(lambda _: source.restart() if len(server.get_clients()) == 1 else None)
 
     def put(self, kind: str) -> None:
-        """An obstacle in front of the first sheet, or none."""
+        """Place an obstacle in front of the first sheet, or none."""
         plan = next(iter(self._source.body.links.values()))
         sheet, frame = self.stage.stages[plan.name], self._source.copies[0].poses()[plan.frame] @ plan.pose
         points = frame.apply(sheet.tiles.points_mm * MM)

@@ -1,4 +1,4 @@
-"""Recordings of one board, which can be played from any moment on: files of its bytes, and MCAP files."""
+"""Recordings of one board, playable from any moment: byte files, and MCAP files."""
 
 from __future__ import annotations
 
@@ -30,35 +30,35 @@ class BoardRecording(Protocol):
 
     @property
     def duration_s(self) -> float:
-        """How long it is."""
+        """Duration of the recording."""
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """Time from its beginning in s and frame, in order, from ``start_s`` on and at most up to ``end_s``."""
+        """Seconds from its beginning and frame, in order, from ``start_s`` up to ``end_s``."""
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """Time from its beginning in s, and how much later than the earliest, in s, bytes came that ended a frame.
-        Nothing where times of arrival are not in the file."""
+        """Seconds from its beginning, and delay in s of bytes that ended a frame beyond the earliest. Empty without
+        arrival times in the file."""
 
 
 Reading = Callable[[int, int], object]
-"""Takes the bytes that have been read of a file, and those in it."""
+"""Receives the number of bytes read of a file, and its size."""
 
 
 def silent(done: int, of: int) -> None:
-    """Tells nobody."""
+    """Ignore the progress."""
 
 
 def is_recording(name: str) -> bool:
-    """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
+    """Whether a name is a recording, not a port: ``replay://FILE``, or a file."""
     return name.startswith(REPLAY) or name.endswith(SUFFIX) or Path(name).is_file()
 
 
 def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Reading = silent) -> BoardRecording:
-    """A recording by its path, or by ``replay://FILE``; ``link``: of several in the file. ``reading``: told how far a
-    file is read that has no index.
+    """A recording by its path, or by ``replay://FILE``; ``link``: one of several in the file. ``reading``: receives the
+    progress for a file without index.
 
-    Raises :class:`~contactfpga.ContactFPGAError`, and :class:`~contactfpga.MissingExtra` for an MCAP file where
-    ``[record]`` is absent.
+    Raises :class:`~contactfpga.ContactFPGAError`, and :class:`~contactfpga.MissingExtra` for an MCAP file without
+    ``[record]``.
     """
     port = name if name.startswith(REPLAY) else f"{REPLAY}{name}"
     asked = Replay.parse(port)
@@ -81,14 +81,14 @@ def _is_mcap(path: Path) -> bool:
 
 
 class Clock:
-    """Device times in us as seconds since the first one. They go on where a board was started again."""
+    """Device times in us as seconds since the first, continued over restarts of a board."""
 
     def __init__(self) -> None:
         self._before_us: int | None = None
         self._passed_us = 0
 
     def take(self, time_us: int) -> float:
-        """The next frame's."""
+        """Seconds of the next frame."""
         if self._before_us is not None:
             self._passed_us += max(0, time_us - self._before_us)
         self._before_us = time_us
@@ -97,14 +97,14 @@ class Clock:
 
 @dataclasses.dataclass(frozen=True)
 class _Piece:
-    """What one read of the file gives."""
+    """Result of one read of the file."""
 
     frames: int
     last_s: float
 
 
 class ByteRecording:
-    """What ``contactfpga zones --record FILE`` writes: ``replay://FILE``."""
+    """The output of ``contactfpga zones --record FILE``: ``replay://FILE``."""
 
     def __init__(self, port: str, timeout: float = 1.0, reading: Reading = silent):
         self.title = self.port = port
@@ -128,14 +128,14 @@ class ByteRecording:
 
     @property
     def count(self) -> int:
-        """Frames in all."""
+        """Total number of frames."""
         return sum(piece.frames for piece in self._pieces)
 
     def lateness(self) -> Iterator[tuple[float, float]]:
         return iter(())
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """As :meth:`BoardRecording.frames`. Frames before ``start_s`` are skipped at once."""
+        """:meth:`BoardRecording.frames`; earlier frames are skipped at once."""
         clock = Clock()
         with self._opened() as board:
             for piece in self._pieces:
@@ -152,12 +152,12 @@ class ByteRecording:
 
 
 class LinkRecording:
-    """A board in what ``contactfpga record`` writes."""
+    """A board in the output of ``contactfpga record``."""
 
     def __init__(self, recording: Recording, link: str | None = None):
         links = recording.links
         self.named = link is not None
-        """Whether this link was asked for, or is the first one."""
+        """Whether this link was requested, or is the first."""
         if link is None:
             link = next(iter(links))
         if link not in links:
@@ -171,11 +171,11 @@ class LinkRecording:
         return self.recording.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """As :meth:`BoardRecording.frames`."""
+        """:meth:`BoardRecording.frames` of the link."""
         return ((seconds, zones) for seconds, _, zones in self.recording.frames(start_s, end_s, self._link))
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """As :meth:`BoardRecording.lateness`."""
+        """:meth:`BoardRecording.lateness` of the link."""
         conversation = Conversation(self.title, live=False)
         found = []
         for seconds, data in self.recording.raw_bytes(self._link):

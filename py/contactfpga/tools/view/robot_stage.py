@@ -32,7 +32,7 @@ BONE = rgb(picture_style.GRAY)
 MESHES = (*mesh_file.SUFFIXES, mesh_file.COLLADA)
 MAX_MESHES = 1000
 MAX_MESH_BYTES = 100_000_000
-"""Of all meshes of a robot; they may have as many triangles as one alone."""
+"""Most bytes of all meshes of a robot; the triangle limit is that of a single mesh."""
 REST = "what is beyond the limit of all meshes"
 
 
@@ -47,8 +47,7 @@ class Visual:
 
 
 def visuals(urdf: Path) -> list[Visual]:
-    """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out. Raises
-    :class:`BodyError`, OSError."""
+    """The existing meshes of a URDF, without boxes, spheres and cylinders. Raises :class:`BodyError`, OSError."""
     found = []
     links = urdf_file.tree(urdf).findall("link")
     try:
@@ -78,17 +77,17 @@ def _path(name: str, folder: Path) -> Path | None:
 
 
 class RobotStage:
-    """Links as meshes where these can be read, else as lines between joints; and a stage for each sheet."""
+    """Links as readable meshes, else as lines between joints; and a stage for each sheet."""
 
     def __init__(self, server: viser.ViserServer, body: Body, solids: Sequence[Solid] = (), node: str = ROOT):
-        """``solids``: what is drawn in the place of the URDF's links."""
+        """``solids``: drawn in place of the URDF's links."""
         self._server, self._body, self._node = server, body, node
         self._root = server.scene.add_frame(node, show_axes=False)
         self.at_m = np.zeros(3)
-        """Where the robot's base is drawn."""
+        """Drawn position of the robot's base."""
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
-        """Kinds of mesh files that could not be read."""
+        """Kinds of unreadable mesh files."""
         self._meshes = self._mesh_bytes = self._triangles = 0
         self._corners: list[tuple[str, np.ndarray]] = []
         """Links with the corners of a box around a mesh, (8, 3) in m in the link's frame."""
@@ -151,7 +150,7 @@ class RobotStage:
         return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node, carried=False)
 
     def move(self, angles: Mapping[str, float]) -> None:
-        """Draw all links at these angles."""
+        """Draw all links at these joint angles."""
         kinematics = self._body.kinematics
         if kinematics is None:
             return
@@ -179,24 +178,24 @@ class RobotStage:
                 frame.wxyz, frame.position = wxyz, pose.point_m
 
     def shift(self, at_m: np.ndarray) -> None:
-        """Draw the robot's base at (3,) ``at_m`` from now on; takes effect with the next poses."""
+        """Draw the robot's base at (3,) ``at_m`` from the next poses on."""
         self.at_m = at_m
         self._root.position = at_m
 
     def show(self, visible: bool = True, link: str | None = None) -> None:
-        """Draw all of it or not, or one link of it."""
+        """Show or hide all of it, or one link."""
         (self._root if link is None else self._frames[link]).visible = visible
         if link is not None:
             (self._hidden.discard if visible else self._hidden.add)(link)
 
     def on_drag(self, link: str, follow: Callable[[Any], Any]) -> None:
-        """Have the left mouse button on a link's meshes call this with viser's event."""
+        """Call ``follow`` with viser's event when the left mouse button drags a link's meshes."""
         for name, mesh in self._frames.items():
             if name.startswith(f"{link}#"):
                 mesh.on_drag("left")(follow)
 
     def points_m(self) -> np.ndarray:
-        """(n, 3) around all that is drawn, where the joints put it."""
+        """(n, 3) points around everything drawn, at the current angles."""
         sheets = [stage.tiles.points_mm * MM @ stage.rotation.T + stage.point_m for stage in self.stages.values()]
         seen = [(link, corners) for link, corners in self._corners if link not in self._hidden]
         meshes = [self._poses[link].apply(corners) + self.at_m for link, corners in seen]

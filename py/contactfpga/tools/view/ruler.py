@@ -1,4 +1,4 @@
-"""Rows, columns, origin and scale of a sheet, beside it."""
+"""Rows, columns, origin and scale beside a sheet."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 BEYOND = 1.1
 """Distance from the outermost cells to the numbers, in pitches."""
 MARKS = 4
-"""How many numbers an edge has, about."""
+"""Approximate count of numbers along an edge."""
 AXIS = 2.5
 """Length of an axis, in pitches."""
 
@@ -40,7 +40,7 @@ class Ruler:
 
 
 def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
-    """Of a sheet. Where its ends meet, the rows' numbers stand along the seam and opposite to it."""
+    """Ruler of a sheet. For a sheet whose ends meet, row numbers are along the seam and opposite."""
     sheet = tiles.sheet
     pitch_x, pitch_y = sheet.pitch_x_mm, sheet.pitch_y_mm
 
@@ -59,7 +59,7 @@ def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
 
 
 def add(server: viser.ViserServer, node: str, tiles: Tiles, lift_mm: float) -> None:
-    """Draw it. What is behind a limb is hidden by it."""
+    """Draw it; a limb hides what is behind."""
     drawn, scene = ruler(tiles, lift_mm), server.scene
     scene.add_line_segments(f"{node}/axes", drawn.axes, picture.AXIS, thickness=2.5, thickness_units="screen")
     for number, mark in enumerate(drawn.marks):

@@ -1,6 +1,7 @@
-"""viser's server with a guard in front of it.
+"""viser's server behind a guard.
 
-Only a browser that was given the token may read and press, on a page that this server sent."""
+Only a browser with the token may read and press, on a page of this server.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ TOKEN_BYTES = 16
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """What is answered in place of the page."""
+    """An answer instead of the page."""
 
     status: int
     text: str
@@ -36,21 +37,21 @@ class Response:
 
 
 class Guard:
-    """Decides for each request whether it is served.
+    """Decides whether each request is served.
 
-    A page of another site can make this browser send requests, also to 127.0.0.1. It cannot choose the Host and Origin
-    that the browser sends with them, and it does not know the token: so all three are checked. The token comes once in
-    the address, and from then on in a cookie, which the browser does not send for other sites.
+    Another site's page can make this browser send requests, even to 127.0.0.1, but cannot choose their Host and Origin,
+    and does not know the token: so all three are checked. The token is in the first address, then in a cookie, which
+    browsers do not send for other sites.
     """
 
     def __init__(self, host: str, token: str | None = None):
         self.host = host
-        """The address that is listened on."""
+        """The listening address."""
         self.token = token or secrets.token_urlsafe(TOKEN_BYTES)
 
     def check(self, path: str, headers: Mapping[str, str], port: int, upgrade: bool) -> Response | None:
-        """What to answer instead; None: the request may pass. ``headers``: by name, the case does not matter;
-        ``upgrade``: it asks for a WebSocket, over which all is read and pressed."""
+        """A refusing answer; None: the request may pass. ``headers``: by name, in any case; ``upgrade``: it requests a
+        WebSocket, which carries all reading and pressing."""
         host = _one(headers, "Host")
         if not self._is_ours(host, port):
             return Response(403, f"Host {host!r} is not this server's name; use the address that it printed.\n")
@@ -64,7 +65,7 @@ class Guard:
         return None if self._is_token(_cookie(headers, self.cookie(port))) else _NO_TOKEN
 
     def page_headers(self, headers: Mapping[str, str]) -> dict[str, str]:
-        """What goes with a page: no other page may frame it, and it loads nothing from elsewhere."""
+        """Headers of a page: no other page may frame it, and it loads nothing from elsewhere."""
         here = f"ws://{_one(headers, 'Host')}"
         policy = (
             "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
@@ -86,12 +87,12 @@ class Guard:
 
     @staticmethod
     def cookie(port: int) -> str:
-        """Its name: browsers keep one jar for all ports of a host."""
+        """Name of the cookie, by port, as browsers keep one jar for all ports of a host."""
         return f"contactfpga-view-{port}"
 
     def _is_ours(self, host: str, port: int) -> bool:
-        """Whether the browser was led here by a name that nobody can point elsewhere: a site that lets its own name
-        resolve to 127.0.0.1 would otherwise count as this server's page."""
+        """Whether the browser used a host name that nobody can point elsewhere: a site whose name resolves to 127.0.0.1
+        would otherwise count as this server."""
         try:
             found = urlsplit(f"http://{host}")
             name, given = found.hostname or "", found.port or 80
@@ -105,8 +106,8 @@ class Guard:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     def _welcome(self, port: int) -> Response:
-        """Lead the browser to the same page without the token, so that it stays out of the address line. The page does
-        it by itself: after a redirect a browser that came by a link of another site would keep its cookie back."""
+        """Lead the browser to the page without the token in the address. The page does it by itself: after a redirect,
+        a browser from another site's link would withhold its cookie."""
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         dark = "matchMedia('(prefers-color-scheme: dark)').matches"
         page = (
@@ -122,7 +123,7 @@ _NO_TOKEN = Response(403, "The token is missing or is another one; open the whol
 
 
 def _one(headers: Mapping[str, str], name: str) -> str:
-    """A header's value; "" where it is absent."""
+    """A header's value; "" if absent."""
     return next((value for key, value in headers.items() if key.lower() == name.lower()), "")
 
 
@@ -145,13 +146,13 @@ def _is_address(name: str) -> bool:
 LOCAL = "127.0.0.1"
 PORT = 8080
 PORTS_TRIED = 20
-"""Where no port was asked for, this many from :data:`PORT` on."""
+"""Number of ports tried from :data:`PORT` on by default."""
 
 
 def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None) -> tuple[viser.ViserServer, Guard]:
-    """Start a server that nobody gets past without the guard's leave; returns both. ``port``: 0 is any free one.
+    """Start a server behind the guard; returns both. ``port``: 0 is any free one.
 
-    Raises :class:`~contactfpga.ContactFPGAError` where it cannot listen there, :class:`~contactfpga.MissingExtra`.
+    Raises :class:`~contactfpga.ContactFPGAError` if it cannot listen there, :class:`~contactfpga.MissingExtra`.
     """
     try:
         import viser
@@ -171,7 +172,7 @@ def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None
 
 
 def _free_port(host: str, port: int | None) -> int:
-    """One that can be listened on: viser would try 1000 others, or wait forever for a host that is not here."""
+    """A free port: viser would try 1000 others, or wait forever for a foreign host."""
     reason = ""
     for candidate in [port] if port is not None else range(PORT, PORT + PORTS_TRIED):
         try:
@@ -189,8 +190,7 @@ def _free_port(host: str, port: int | None) -> int:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[Callable[[], bool]]:
-    """While viser starts, have its listener ask the guard first. viser hands its own check to websockets and has no
-    setting for another one."""
+    """While viser starts, make its listener ask the guard first; viser has no setting for this."""
     import websockets.asyncio.server as listening
 
     serve = listening.serve
@@ -234,7 +234,7 @@ def _response(answer: Response) -> Any:
 
 
 def _forget_tunnel(server: viser.ViserServer) -> None:
-    """viser can open a tunnel to a server of its authors, at a client's wish; here nobody asks it to."""
+    """Disable viser's tunnel to a server of its authors, which a client could request."""
     from viser import _messages
 
     handlers = server._websock_server
@@ -243,6 +243,6 @@ def _forget_tunnel(server: viser.ViserServer) -> None:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End it; it prints a farewell of its own."""
+    """End the server, which prints its own farewell."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()

@@ -1,6 +1,7 @@
 """A robot in MuJoCo that wears sheets, in real time: the mouse pushes it, and a reflex moves it.
 
-Copies of it, each with another skin, run in lockstep."""
+Copies with different skins run in lockstep.
+"""
 
 from __future__ import annotations
 
@@ -24,27 +25,28 @@ from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.sources import SimulatedPace
 
 REFLEX_S = 1e-3
-"""A reflex is asked this often."""
+"""Interval of calling a reflex."""
 NO_REFLEX = "none"
 BARE, LATE, KIT = SKINS = ("without skin", "6 ms late", "with the kit")
 ALL = "side by side"
 LATE_S = 6e-3
-"""From the sheet's scan to the reflex; what the paper takes for screening the sensors and computing (section IV A)."""
+"""Delay from the sheet's scan to the reflex: the paper's time for screening the sensors and computing (section IV
+A)."""
 SWEEP_S, SWEEP_STEPS = 0.1, 100
-"""Of forces from a touch on."""
+"""Duration and steps of a force sweep."""
 
 Reflex = Callable[[Snapshot, float], float]
-"""From what is felt and the joint's angle to how fast to turn."""
+"""From the felt contacts and the joint's angle to a joint speed."""
 
 
 class RobotCopy:
-    """One of the robots, with what it wears and what moves it."""
+    """One robot with its skin and reflex."""
 
     def __init__(self, skin: str, sheets: Any, acts: Reflex | None):
-        """``skin``: one of :data:`SKINS`; without one ``acts`` is never asked."""
+        """``skin``: one of :data:`SKINS`; without one ``acts`` is never called."""
         self.skin, self.sheets = skin, sheets
         self.most_n = dict.fromkeys(sheets, 0.0)
-        """By link the largest force in N since the start."""
+        """Largest force in N since the start, by link."""
         self._acts = None if skin == BARE else acts
         self._asked = 0
         self._coming: collections.deque[tuple[float, Snapshot]] = collections.deque()
@@ -52,7 +54,7 @@ class RobotCopy:
             worn.dead = skin == BARE
 
     def step(self, fingers: Mapping[str, Sequence[Finger]]) -> None:
-        """MuJoCo's next step, while these fingers push its links."""
+        """MuJoCo's next step, with these fingers on its links."""
         sheets, data = self.sheets, self.sheets.data
         if self._acts is not None and (tick := int(data.time / REFLEX_S + 1e-6)) > self._asked:
             self._asked = tick
@@ -65,7 +67,7 @@ class RobotCopy:
             self.most_n[name] = max(self.most_n[name], self.force_n(name))
 
     def _seen(self) -> Snapshot | None:
-        """What the reflex knows now; None: nothing has come yet."""
+        """The reflex's current knowledge; None: nothing yet."""
         now: Snapshot = self.sheets.snapshot()
         if self.skin != LATE:
             return now
@@ -78,25 +80,25 @@ class RobotCopy:
         return seen if due_s <= now.host_time_s else None
 
     def _angle(self) -> float:
-        """Of the joint that the first actuator turns."""
+        """Angle of the first actuator's joint."""
         model = self.sheets.model
         return float(self.sheets.data.qpos[model.jnt_qposadr[model.actuator_trnid[0, 0]]])
 
     def force_n(self, link: str) -> float:
-        """All that presses on a link now."""
+        """Total current force on a link."""
         return float(sum(touch.push_n for touch in self.sheets[link].touches))
 
     def told(self, link: str) -> str:
-        """Of a link's forces, for the panel."""
+        """A link's forces for the panel."""
         return f"pressed by {self.force_n(link):.1f} N, most so far {self.most_n[link]:.1f} N"
 
     def states(self) -> dict[str, LinkState]:
-        """Of all links, as the kit's bytes tell of them."""
+        """States of all links, from the kit's bytes."""
         links: dict[str, LinkState] = self.sheets.snapshot().links
         return links
 
     def poses(self) -> dict[str, Pose]:
-        """Of MuJoCo's bodies, by their names."""
+        """Poses of MuJoCo's bodies by name."""
         model, data = self.sheets.model, self.sheets.data
         return {
             solids.named(model, number): Pose(data.xmat[number].reshape(3, 3).copy(), data.xpos[number].copy())
@@ -105,17 +107,17 @@ class RobotCopy:
 
 
 class Sweep:
-    """The largest forces of each copy over the time since a touch; the next touch after :data:`SWEEP_S` starts it over.
-    As an oscilloscope does, so that it stands while one looks at it."""
+    """The largest forces of each copy since a touch, restarted by the first touch after :data:`SWEEP_S`, like an
+    oscilloscope."""
 
     def __init__(self, copies: int):
         self.forces_n = np.full((copies, SWEEP_STEPS), np.nan)
-        """(copies, SWEEP_STEPS) in N; nan where the time has not come, or nothing touched yet."""
+        """(copies, SWEEP_STEPS) in N; nan for future times, or before a touch."""
         self._began_s: float | None = None
         self._before = np.zeros(copies)
 
     def add(self, seconds: float, forces_n: Sequence[float]) -> None:
-        """Of all copies, at a time."""
+        """Add the forces of all copies at a time."""
         forces = np.array(forces_n)
         ended = self._began_s is None or seconds - self._began_s >= SWEEP_S - 1e-9
         if ended and ((forces > 0) & (self._before == 0)).any():
@@ -129,7 +131,7 @@ class Sweep:
 
 
 class SharedLink:
-    """A link of all copies, as the mouse presses it."""
+    """A link of all copies under the mouse."""
 
     by_force = True
 
@@ -137,27 +139,27 @@ class SharedLink:
         self.fingers: tuple[Finger, ...] = ()
 
     def touch(self, fingers: Sequence[Finger]) -> None:
-        """From the next step on these push it in every copy."""
+        """Push it in every copy from the next step on."""
         self.fingers = tuple(fingers)
 
 
 class SimulatedSource:
-    """A robot of MuJoCo in real time, or as near to it as the machine can."""
+    """A robot of MuJoCo in real time, or slower on a slow machine."""
 
     def __init__(self, robot: str, model: str, reflex: str | None = None, gateware: bool = False):
-        """``model``: MJCF or URDF; its first keyframe is where it starts. ``reflex``: a Python file, whose classes with
+        """``model``: MJCF or URDF, starting at its first keyframe. ``reflex``: a Python file, whose classes with
         ``__call__(snapshot, angle)`` can each set the first actuator.
 
-        Raises :class:`~contactfpga.ContactFPGAError` for a model that cannot be read, what
-        :class:`contactfpga.mujoco.Sheets` raises, and :class:`~contactfpga.MissingExtra`.
+        Raises :class:`~contactfpga.ContactFPGAError` for an unreadable model, the errors of
+        :class:`contactfpga.mujoco.Sheets`, and :class:`~contactfpga.MissingExtra`.
         """
         self._parts: Any = import_module("contactfpga.mujoco")
         self._robot, self._gateware = robot, gateware
         self.title = model
         self.reflexes = _reflexes(reflex)
-        """By name what makes a reflex of a speed; without :data:`NO_REFLEX`."""
+        """Makers of reflexes by name, taking a speed; without :data:`NO_REFLEX`."""
         self.reflex = next(iter(self.reflexes), NO_REFLEX)
-        """The name of the one that acts; :data:`NO_REFLEX`: the model's first command stays."""
+        """Name of the acting reflex; :data:`NO_REFLEX`: the model's first command stays."""
         self.skin = KIT
         """One of :data:`SKINS`, or :data:`ALL`."""
         self.body = Body.load(robot)
@@ -165,16 +167,16 @@ class SimulatedSource:
         if self.reflexes and not self._model.nu:
             raise ContactFPGAError(f"{model} has no actuator; --reflex needs one, a <velocity> servo of a joint")
         self.copies: list[RobotCopy] = []
-        """As :attr:`skin` says; new ones after each start."""
+        """Copies by :attr:`skin`, renewed at each start."""
         self.links = {name: SharedLink() for name in self.body.links}
         self.obstacle = obstacle.Obstacle()
         self.simulated_s = 0.0
-        """In all, over all starts."""
+        """Total simulated time over all starts."""
         self.pace = SimulatedPace(self.simulated_s)
         self._restart()
 
     def restart(self) -> None:
-        """Put the robot back to where it started, and its reflex as well, before the next moment."""
+        """Put the robot and its reflex back to their start before the next moment."""
         self._stale = True
 
     def _restart(self) -> None:
@@ -200,7 +202,7 @@ class SimulatedSource:
         return RobotCopy(skin, sheets, None if made is None else made(float(data.ctrl[0])))
 
     def advance(self) -> None:
-        """Go on to the next moment."""
+        """Advance to the next moment."""
         if self._stale:
             self._restart()
         pace = self.pace
@@ -212,7 +214,7 @@ class SimulatedSource:
             pace.ran(self.simulated_s - began_s, time.monotonic() - began)
 
     def _step(self) -> None:
-        """All copies feel the same fingers and the same obstacle."""
+        """Step all copies, with the same fingers and obstacle."""
         step_s = float(self._model.opt.timestep)
         fingers = {name: link.fingers for name, link in self.links.items()}
         self.obstacle.go_on(step_s)
@@ -224,11 +226,11 @@ class SimulatedSource:
 
     @property
     def share(self) -> float:
-        """Of real time."""
+        """Share of real time reached."""
         return self.pace.share
 
     def solids(self) -> list[solids.Solid]:
-        """All geoms that can be drawn."""
+        """All drawable geoms."""
         return solids.solids_of(self._model, self.body.links)
 
     def close(self) -> None:
@@ -238,7 +240,7 @@ class SimulatedSource:
 
 
 def _compiled(parts: Any, path: str, robot: str, body: Body) -> Any:
-    """The model, with its sheets' shapes where a link has none, and with obstacles."""
+    """The model, with shapes of sheets whose links have none, and with obstacles."""
     import mujoco
 
     if not Path(path).is_file():
@@ -257,7 +259,7 @@ def _compiled(parts: Any, path: str, robot: str, body: Body) -> Any:
 
 
 def _reflexes(path: str | None) -> dict[str, Callable[[float], Reflex]]:
-    """The classes of a file that are reflexes. The file is run, as `python FILE` would."""
+    """The reflex classes of a file, which is run like `python FILE`."""
     if path is None:
         return {}
     if not Path(path).is_file():

@@ -1,4 +1,4 @@
-"""What MuJoCo's geoms look like."""
+"""The looks of MuJoCo's geoms."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from contactfpga.surfaces import mesh_file
 from contactfpga.tools.view.limb import revolved
 
 UNDER = 0.96
-"""Size of the geom that wears a sheet, so that the cells are seen on it."""
+"""Scale of the geom under a sheet, so that the cells are visible."""
 PLANE_M = 1.0
-"""Half a side of a plane without an end."""
+"""Half a side of an infinite plane."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Solid:
-    """A part of a link that is drawn."""
+    """A drawn part of a link."""
 
     link: str
     pose: Pose
@@ -35,8 +35,8 @@ class Solid:
 
 
 def solids_of(model: Any, worn: Collection[str]) -> list[Solid]:
-    """All geoms that can be drawn; ``worn``: names of those that wear a sheet. Raises
-    :class:`~contactfpga.ContactFPGAError` for a mesh with too many triangles."""
+    """All drawable geoms; ``worn``: names of those that wear a sheet. Raises :class:`~contactfpga.ContactFPGAError` for
+    a mesh with too many triangles."""
     found = [_solid(model, number, worn) for number in range(model.ngeom)]
     return [solid for solid in found if solid is not None]
 
@@ -47,7 +47,7 @@ def named(model: Any, number: int) -> str:
 
 
 def _solid(model: Any, number: int, worn: Collection[str]) -> Solid | None:
-    """None for a kind of geom that is not drawn: a height field, a field of distances."""
+    """A geom; None for kinds not drawn: height fields, distance fields."""
     import mujoco
 
     geom = model.geom(number)

@@ -1,4 +1,4 @@
-"""What is shown: a board, a virtual one, or a recording of one, one moment after the other."""
+"""Sources of the view: a board, a virtual one, or a recording, moment by moment."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zone, Zones
 
 MAX_LAG_S = 0.1
-"""A board that is later than this does not catch up any more: its time has slipped."""
+"""Largest lag of a board that is caught up; beyond it, time slips."""
 
 MOMENT_S = 0.04
-"""What one moment may take to simulate."""
+"""Computing time of one moment."""
 LEAST_S = 0.0005
 SMOOTHING = 0.2
 
 WINDOW_S = 2.0
-"""Over which the share of real time is told."""
+"""Window of the reported share of real time."""
 
 
 class SimulatedPace:
-    """Says how much simulated time may pass, so that a board runs in real time, or as near to it as the machine can."""
+    """Rations simulated time, so that a board runs in real time, or slower on a slow machine."""
 
     def __init__(self, simulated_s: float, clock: Callable[[], float] = time.monotonic):
         self._clock = clock
         self._begin = clock() - simulated_s  # when simulated time was 0, slip taken out
         self.slip_s = 0.0
-        """Seconds by which simulated time has fallen behind for good."""
+        """Seconds of simulated time lost for good."""
         self._speed = 1.0
         self._seen: collections.deque[tuple[float, float]] = collections.deque([(clock(), simulated_s)])
 
     def due(self, simulated_s: float) -> float:
-        """Seconds of simulated time that are to pass now; below 0: so long nothing is to."""
+        """Seconds of simulated time due now; below 0: none for that long."""
         now = self._clock()
         behind = now - self._begin - simulated_s
         if behind > MAX_LAG_S:
@@ -59,78 +59,78 @@ class SimulatedPace:
         return behind
 
     def ran(self, simulated_s: float, seconds: float) -> None:
-        """So long it took to simulate so much."""
+        """Report the computing time of a simulated duration."""
         if seconds > 0:
             self._speed += SMOOTHING * (simulated_s / seconds - self._speed)
 
     @property
     def most_s(self) -> float:
-        """Seconds of simulated time that this machine simulates within :data:`MOMENT_S`. Where it is slow a moment
-        holds less, so that it is shown as soon."""
+        """Seconds of time that this machine simulates within :data:`MOMENT_S`, so that slow machines show shorter
+        moments."""
         return max(MOMENT_S * self._speed, LEAST_S)
 
     @property
     def share(self) -> float:
-        """Of real time that the board reached over the last seconds; 1: it keeps up."""
+        """Share of real time over the last seconds; 1: it keeps up."""
         (first, began), (last, ended) = self._seen[0], self._seen[-1]
         return min(1.0, (ended - began) / (last - first)) if last - first > 0.2 else 1.0
 
 
 STEP_S = 0.02
-"""A moment is shown for so long."""
+"""Duration of a shown moment."""
 
 SILENT_S = 0.5
-"""After so long without a frame it is said; a board that works sends one at least every 0.1 s."""
+"""Silence that is reported; a working board sends a frame at least every 0.1 s."""
 
 KEEPS_UP = 0.97
-"""A board that reaches this share of real time is said to keep up."""
+"""Share of real time that counts as keeping up."""
 
 WAITING = 65_536
-"""Frames that may wait for a moment's end."""
+"""Most frames that wait for a moment's end."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Moment:
-    """What there is to draw."""
+    """Content of a drawing."""
 
     zones: Zones
     """The newest frame."""
     tracks: Tracks
     truth: np.ndarray | None = None
-    """(rows, columns) bool: what is closed on a virtual board."""
+    """(rows, columns) bool: closed switches of a virtual board."""
     felt: tuple[Contacts, Zones] | None = None
-    """The newest forces that are known, with their frame, which is some milliseconds older than :attr:`zones`: the
-    readings after it have to come first."""
+    """The newest known forces with their frame, some milliseconds older than :attr:`zones`, as later readings must
+    arrive first."""
     pushes: Sequence[tuple[Zone, float | None]] = ()
-    """Zones of the measured frame that lie somewhere, each with the push in N where it is known."""
+    """Zones of the measured frame with a place, each with the push in N if known."""
     arrows: np.ndarray | None = None
-    """(n, 2, 3) in m, in the sheet's frame: the same of a link of a robot, whose units count in the link's frame."""
+    """(n, 2, 3) in m, in the sheet's frame: pushes on a robot's link, whose units use the link's frame."""
 
 
 class Source(Protocol):
-    """Where moments come from."""
+    """A source of moments."""
 
     title: str
     sheet: Sheet
     meter: Meter
 
     def poll(self) -> Moment | None:
-        """Wait for a while, and return what is new; None: nothing is. Raises what a board does."""
+        """Wait briefly for a new moment; None: nothing new. Raises the board's errors."""
 
     def told(self) -> list[tuple[str, str]]:
-        """Further facts to show, as name and value."""
+        """Further facts, as name and value."""
 
     @property
     def cells(self) -> LoadCells | None:
-        """Where pressure units are; None: there are none, or nothing is known of them."""
+        """Places of the pressure units; None: none, or unknown."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""
 
 
 class BoardSource:
-    """A board, or a virtual one in simulated time, which passes here as real time does: with ``virtual`` one that can
-    be touched, and that knows which switches are closed; else with ``simulated``."""
+    """A board, or a virtual one whose simulated time passes like real time: with ``virtual`` one that can be touched
+    and knows its closed switches; else with ``simulated``."""
 
     def __init__(
         self,
@@ -142,7 +142,7 @@ class BoardSource:
     ):
         self.title, self.sheet = title, board.sheet
         self.cells = cells
-        """Where the pressure units are, if they are known."""
+        """Places of the pressure units, if known."""
         self._felt_in: Zones | None = None
         self.meter = Meter()
         self._board, self._virtual = board, virtual
@@ -160,7 +160,7 @@ class BoardSource:
         return Moment(zones, self._tracker.update(zones), truth, felt, () if felt is None else pushes(*felt))
 
     def _felt(self, newest: Zones) -> tuple[Contacts, Zones] | None:
-        """Of the frame that was the newest a moment before."""
+        """The forces of the previously newest frame."""
         before, self._felt_in = self._felt_in, newest
         if self.cells is None or before is None or before.units is None:
             return None
@@ -187,7 +187,7 @@ class BoardSource:
         return came
 
     def frames(self, seconds: float) -> Batch:
-        """All that come meanwhile. Raises :class:`~contactfpga.ReadTimeout` where none does."""
+        """All frames that arrive meanwhile. Raises :class:`~contactfpga.ReadTimeout` without any."""
         return self._frames.batch(seconds, seconds)
 
     def told(self) -> list[tuple[str, str]]:
@@ -210,17 +210,17 @@ class BoardSource:
 
 
 def pushes(contacts: Contacts, zones: Zones) -> list[tuple[Zone, float | None]]:
-    """Each zone that lies somewhere, with its push."""
+    """Each zone with a place, with its push."""
     placed = [zone for zone in zones if zone.x_mm is not None]
     return [(zone, contact.normal_n) for zone, contact in zip(placed, contacts)]
 
 
 AT_REST = 15.0
-"""Frames per second of a board that sends what changes, and a keep-alive where nothing does: one each 0.1 s at most."""
+"""Frame rate of an unchanged board that sends changes and keep-alives, at least one each 0.1 s."""
 
 
 def paced(frames_per_s: float) -> str:
-    """How often frames come."""
+    """The frame rate in words."""
     if not frames_per_s:
         return "nothing yet"
     if frames_per_s > AT_REST:
@@ -234,27 +234,27 @@ CHART_STEP_S = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Strip:
-    """The last seconds, a value for each step; the most that was there within it, so that no short touch is missed."""
+    """The last seconds, the maximum of each step, so that no short touch is missed."""
 
     seconds: np.ndarray
-    """Of device time, the newest at 0."""
+    """Device time, the newest at 0."""
     zones: np.ndarray
     area_mm2: np.ndarray
 
 
 class Meter:
-    """Counts of frames over the last second, and the lines of the strip chart. Times are the device's."""
+    """Frame counters over the last second, and the lines of the strip chart, in device time."""
 
     def __init__(self) -> None:
         self.stats = Stats()
         self.dropped = 0
-        """Frames that came faster than they could be shown."""
+        """Frames that arrived faster than they could be shown."""
         self._times_us: collections.deque[tuple[int, int]] = collections.deque()
         self._late_s: collections.deque[float] = collections.deque(maxlen=50)
         self._steps: collections.deque[tuple[int, int, float]] = collections.deque(maxlen=int(CHART_S / CHART_STEP_S))
 
     def take(self, batch: Batch, stats: Stats, dropped: int) -> None:
-        """Frames that came, and the port's counters after them."""
+        """Add frames, and the port's counters after them."""
         self.stats, self.dropped = stats, dropped
         times_us = batch.frames["time_us"]
         if self._times_us and times_us[0] < self._times_us[-1][0]:  # it started again
@@ -280,7 +280,7 @@ class Meter:
             self._steps.append((int(step), int(count), float(area)))
 
     def take_latency(self, batch: Batch, virtual: bool) -> None:
-        """The same frames; ``virtual``: the board's clock is that of its arrivals, and need not be estimated."""
+        """Add their latencies; ``virtual``: the board's clock is that of arrivals, without estimation."""
         frames = batch.frames
         sampled_s = frames["time_us"] / 1e6 if virtual else frames["host_time_s"]
         late_s = frames["arrived_s"] - sampled_s
@@ -289,12 +289,12 @@ class Meter:
 
     @property
     def late_s(self) -> float | None:
-        """Median time in s from a frame's first sample to its arrival; None: it is not known."""
+        """Median time in s from a frame's first sample to its arrival; None: unknown."""
         return float(np.median(self._late_s)) if self._late_s else None
 
     @property
     def frames_per_s(self) -> float:
-        """Over the last second."""
+        """Frame rate over the last second."""
         if len(self._times_us) < 2:
             return 0.0
         passed_us = self._times_us[-1][0] - self._times_us[0][0]
@@ -302,7 +302,7 @@ class Meter:
 
     @property
     def strip(self) -> Strip:
-        """What the chart shows."""
+        """Data of the chart."""
         steps = np.array([step for step, _, _ in self._steps], float)
         seconds = (steps - steps[-1]) * CHART_STEP_S if len(steps) else steps
         kept = seconds > -CHART_S

@@ -1,4 +1,4 @@
-"""The sheet and what touches it, in viser's scene."""
+"""The sheet and its touches, in viser's scene."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 NODE = "/sheet"
 FILLED = 0.86
-"""Share of the pitch that a tile takes."""
+"""Width of a tile over the pitch."""
 THICK = 0.08
-"""Its height, of the pitch."""
+"""Height of a tile over the pitch."""
 LABELS = 24
-"""Contacts that have their number written beside them."""
+"""Contacts with a number beside them."""
 
 BOX = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-1.0, 0.0)])
 FACES = np.array(
@@ -42,11 +42,11 @@ class Stage:
         node: str = NODE,
         carried: bool = True,
     ):
-        """``carried``: drawn on a limb or a plate, with its rows and columns numbered."""
+        """``carried``: on a limb or a plate, with numbered rows and columns."""
         self._load_cells = load_cells
         self._arrows: Any = None
         self.rotation, self.point_m = np.eye(3), np.zeros(3)
-        """Where the sheet's own frame lies in the world."""
+        """Pose of the sheet's own frame in the world."""
         self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
@@ -70,7 +70,7 @@ class Stage:
         self._points: Any = None
         self._labels: list[Any] = []
         self.told = contacts.MOST
-        """Contacts that have all that is known written beside them."""
+        """Contacts with a full description."""
         self._glow = glow.Glow(server, f"{node}/glow", tiles, under_mm) if carried else None
         self._trails = picture.Trails(tiles.surface, self._lift_mm + 0.03 * self._pitch_mm)
         self._colors: np.ndarray | None = None
@@ -78,7 +78,7 @@ class Stage:
             self._carry(under_mm)
 
     def _carry(self, under_mm: float) -> None:
-        """Draw what the sheet is on, its rows, columns and origin."""
+        """Draw the carrier, rows, columns and origin."""
         if self.limb is None:
             add_plate(self._server, self.tiles, self._node)
         ruler.add(self._server, self._node, self.tiles, under_mm + 0.2 * self._pitch_mm)
@@ -86,7 +86,7 @@ class Stage:
 
     @property
     def points_m(self) -> np.ndarray:
-        """(n, 3) of all that is to be in view."""
+        """(n, 3) points to keep in view."""
         tiles = self.tiles
         if self.limb is not None:
             return self.limb.points_mm * MM
@@ -97,7 +97,7 @@ class Stage:
         return np.concatenate([points, tiles.points_mm]) * MM
 
     def draw(self, moment: Moment) -> None:
-        """Show it. Only what differs is sent."""
+        """Draw a moment, sending only changes."""
         zones = moment.zones
         self._color(picture.tile_colors(zones, moment.truth))
         found = picture.spots(zones, self.tiles.surface, self._lift_mm)
@@ -109,7 +109,7 @@ class Stage:
         self._draw_arrows(self._forces(moment))
 
     def draw_no_data(self, arrows: np.ndarray | None = None) -> None:
-        """Dark cells and nothing on them but these forces: nobody knows what touches."""
+        """Draw dark cells and only these forces: touches are unknown."""
         self._color(np.tile(np.array(picture.UNKNOWN, np.uint8), (len(self.tiles.points_mm), 1)))
         for handle in (*self._lines.values(), self._points, *self._labels, self._arrows):
             if handle is not None:
@@ -190,11 +190,11 @@ class Stage:
             label.visible = False
 
     def _met(self, origin_m: Any, direction: np.ndarray) -> tuple[float, float] | None:
-        """Where a ray of the world meets the sheet."""
+        """Place where a world ray meets the sheet."""
         return self.tiles.met((np.array(origin_m) - self.point_m) @ self.rotation / MM, direction @ self.rotation)
 
     def press_with(self, hand: Hand) -> None:
-        """Have the mouse press this sheet."""
+        """Let the mouse press this sheet."""
 
         @self.cells.on_click
         async def click(event: Any) -> None:
@@ -216,11 +216,11 @@ class Stage:
 
 
 EVERYWHERE, KEY, RIM = 0.9, 2.0, 0.8
-"""How strong the lights are."""
+"""Strengths of the lights."""
 
 
 def light(server: viser.ViserServer, side: tuple[float, float, float]) -> None:
-    """From all sides, from this one and less from the opposite one, so that forms show."""
+    """Light from all sides, most from this one and least from the opposite, to show forms."""
     scene = server.scene
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.configure_environment_map(None)

@@ -1,4 +1,4 @@
-"""Where the cells of a sheet lie in space, and which place a ray of the mouse meets."""
+"""Places of a sheet's cells in space, and the place that a mouse ray meets."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contactfpga import surfaces
 from contactfpga.skin.sheet import Sheet
 
 MM = 1e-3
-"""The scene counts in m."""
+"""Meters per mm, as the scene is in m."""
 
 
 class Tiles:
@@ -21,11 +21,11 @@ class Tiles:
         self.surface = surface or surfaces.of(sheet)
         rows, columns = np.divmod(np.arange(sheet.rows * sheet.columns), sheet.columns)
         self.x_mm, self.y_mm = columns * sheet.pitch_x_mm, rows * sheet.pitch_y_mm
-        """(n,) of each on the sheet laid flat."""
+        """(n,) positions on the sheet laid flat."""
         self.points_mm, self.normals = self.surface.place(self.x_mm, self.y_mm)
-        """(n, 3) in mm, and outward."""
+        """(n, 3) points in mm, and outward normals."""
         self.along_x = self._along(0.5 * sheet.pitch_x_mm, 0.0)
-        """(n, 3) unit vectors in which x grows."""
+        """(n, 3) unit vectors of growing x."""
         self.along_y = np.cross(self.normals, self.along_x)
         sense = np.sign((self.along_y * self._along(0.0, 0.5 * sheet.pitch_y_mm)).sum(-1, keepdims=True))
         self.along_y = self.along_y * np.where(sense == 0, 1, sense)
@@ -40,13 +40,13 @@ class Tiles:
 
     @property
     def wxyzs(self) -> np.ndarray:
-        """(n, 4) quaternions that turn z into each tile's normal and x into the way in which x grows."""
+        """(n, 4) quaternions that turn z into each tile's normal and x into the direction of growing x."""
         across = np.cross(self.normals, self.along_x)
         return quaternions(np.stack([self.along_x, across, self.normals], -1))
 
     @property
     def middle_mm(self) -> np.ndarray:
-        """(3,) of the box around the sheet."""
+        """(3,) middle of the box around the sheet."""
         middle: np.ndarray = (self.points_mm.min(0) + self.points_mm.max(0)) / 2
         return middle
 
@@ -57,9 +57,9 @@ class Tiles:
         return float(np.linalg.norm(reach)) + max(self.sheet.pitch_x_mm, self.sheet.pitch_y_mm)
 
     def met(self, origin_mm: np.ndarray, direction: np.ndarray) -> tuple[float, float] | None:
-        """The place, x and y in mm, where a ray meets the sheet from outside; None: it misses it.
+        """The place, x and y in mm, where a ray meets the sheet from outside; None: it misses.
 
-        The tile nearest to the ray is taken as flat, so that this works on any surface.
+        The tile nearest to the ray counts as flat, so that this works on any surface.
         """
         direction = direction / np.linalg.norm(direction)
         facing = self.normals @ direction < -1e-6

@@ -1,4 +1,4 @@
-"""The arm over touches anywhere, by what the sheet is built of: which part of it takes how many newtons."""
+"""Touches anywhere on the arm: the newtons that each part of the sheet costs."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
 from contactfpga_sim.lab.flips.campaign import wilson
 
 TOUCHES = 120
-"""Of each geometry."""
+"""Touches of each geometry."""
 
 SAME = 0.03
-"""A worst value of one half of the touches that differs by more from that of the other is not printed."""
+"""A worst value is printed only if both halves of the touches agree within this share."""
 
 QUANTILE = 0.95
 
 
 class Geometry(NamedTuple):
-    """What a sheet is built of."""
+    """The parts that a sheet is built of."""
 
     face: str
     """One of :data:`FACES`."""
     pitch_mm: float
     threshold_n: float
-    """Closing force of a switch."""
+    """Closing force of a switch, in N."""
     foam_mm: float
 
     def case(self) -> Case:
@@ -66,7 +66,7 @@ FACES: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "caps": _CAP,
     "tiles": _CAP,
 }
-"""Changes to the paper's case by what takes the foam's force, for a pitch in mm and a closing force in N."""
+"""Changes to the paper's case by the parts that take the foam's force, for a pitch in mm and a closing force in N."""
 
 PAPER = Geometry("flush, point force", 10.0, 1.0, 5.0)
 BEST = Geometry("tiles", 6.4, 0.4, 5.0)
@@ -86,7 +86,7 @@ _CHANGES = (
 
 
 def _around(base: Geometry) -> list[Geometry]:
-    """It and all that differ from it in one thing."""
+    """The geometry and all that differ from it in one thing."""
     return list(dict.fromkeys([base, *(base._replace(**change) for change in _CHANGES)]))
 
 
@@ -96,18 +96,18 @@ WAYS = ("6 ms", "UART", "pin", "limit alone")
 
 
 def ways(case: Case, skin: Skin, latency_s: float = 6e-3) -> tuple[Latencies, ...]:
-    """Latencies of :data:`WAYS`: a fixed one, two as the gateware took them, none."""
+    """Latencies of :data:`WAYS`: a fixed one, two measured through the gateware, none."""
     return ((latency_s,), *(places.measured_s(case, skin, way) for way in ("uart", "pin")), ())
 
 
 Found = list[Sequence[Peaks]]
-"""For each of :data:`WAYS` the peaks by seed."""
+"""Peaks by seed for each of :data:`WAYS`."""
 
 
 def touched(
     batches: Sequence[Batch], executor: Executor, step: Callable[[str, int], None] = lambda name, of: None
 ) -> Found:
-    """What comes of the batches of one case."""
+    """Peaks of the batches of one case."""
     return many({"": batches}, executor, step)[""]
 
 
@@ -116,7 +116,7 @@ def many(
     executor: Executor,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> dict[Any, Found]:
-    """What comes of the batches of several cases, by their keys."""
+    """Peaks of the batches of several cases, by their keys."""
     futures = {executor.submit(places.work, batch): batch for batches in tasks.values() for batch in batches}
     done = {}
     for future in as_completed(futures):
@@ -130,7 +130,7 @@ def many(
 
 
 def study() -> dict[Geometry, list[Batch]]:
-    """The batches of every geometry. The board is the reference Skin's; its pitch changes nothing of its times."""
+    """The batches of every geometry. Times are the reference Skin's; the pitch does not change them."""
     known = ways(Case.load("paper"), Skin())
     return {
         geometry: places.batches(
@@ -146,8 +146,8 @@ def mean_n(halves: Sequence[Peaks]) -> float:
 
 
 def worst_text(halves: Sequence[Peaks]) -> str:
-    """The largest peak force in N where both halves of the touches agree on it; else the 95 % quantile with the 95 %
-    interval of its rank."""
+    """The largest peak force in N if both halves of the touches agree on it; else the 95 % quantile with its 95 %
+    interval."""
     most = [float(half.force_n.max()) for half in halves]
     if max(most) <= (1 + SAME) * min(most):
         return f"{max(most):.1f}"
@@ -174,7 +174,7 @@ HEADINGS = ("way", "touches", "mean peak force, N", "worst, N", "torque limit fi
 
 
 def lines(case: Case, found: Found, first: str) -> list[list[str]]:
-    """Headings and a line per way of one case; ``first``: the name of the fixed latency."""
+    """Headings and a line per way of one case; ``first`` names the fixed latency."""
     told = [list(HEADINGS)]
     for name, halves in zip((first, *WAYS[1:]), found):
         count = sum(len(half.force_n) for half in halves)
@@ -184,7 +184,7 @@ def lines(case: Case, found: Found, first: str) -> list[list[str]]:
 
 
 def as_json(found: Found, first: str) -> dict[str, Any]:
-    """The same in SI units, touch by touch."""
+    """The peaks in SI units, touch by touch."""
     return {
         name: {
             "peak_force_n": np.concatenate([half.force_n for half in halves]).tolist(),
@@ -196,7 +196,7 @@ def as_json(found: Found, first: str) -> dict[str, Any]:
 
 
 def _deep(thickness_m: float, halves: Sequence[Peaks]) -> str:
-    """How far the foam is pressed in at most, and how often to its base."""
+    """The foam's largest indentation, and how often it reaches the base."""
     deep = np.concatenate([half.indentation_m for half in halves])
     flat = deep > thickness_m
     return f"{1e3 * deep.max():.1f}" + (f", flat {share_text(flat)}" if flat.any() else "")
@@ -224,7 +224,7 @@ FACTORS = {"face": "face", "pitch_mm": "pitch, mm", "threshold_n": "threshold, N
 
 
 class Effect(NamedTuple):
-    """What a change of one thing does to the mean peak force."""
+    """Effect of one change on the mean peak force."""
 
     factor: str
     before: str
@@ -233,7 +233,7 @@ class Effect(NamedTuple):
 
 
 def effects(found: Mapping[Geometry, Found], base: Geometry) -> list[Effect]:
-    """Every geometry that differs from ``base`` in one thing, by UART; and the base with the least latency in place of
+    """Effects, by UART, of every geometry that differs from ``base`` in one thing; and of the least latency in place of
     the paper's 6 ms."""
     uart = WAYS.index("UART")
     told = []
@@ -262,7 +262,7 @@ def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
 
 
 def matters(found: Mapping[Geometry, Found]) -> str:
-    """A sentence on what takes the most newtons from the paper's sheet, and what the best one comes to."""
+    """A sentence on the change that saves the paper's sheet the most newtons, and on the best sheet."""
     least: dict[str, Effect] = {}
     for one in effects(found, PAPER):
         if one.factor not in least or one.newtons < least[one.factor].newtons:

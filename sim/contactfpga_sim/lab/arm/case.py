@@ -17,13 +17,13 @@ from contactfpga_sim.lab.arm.parts import BEHAVIORS, ArmLink, Contacts, Control,
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz", "bonded", "frictionless")
 MAX_STEPS = 1_000_000
-"""In a run."""
+"""Largest number of steps in a run."""
 STEPS_A_TIME_CONSTANT = 4
-"""Steps that the current's time constant, the plant's shortest, has to have."""
+"""Steps required in the current's time constant, the plant's shortest."""
 
 
 class CaseError(ContactFPGAError, ValueError):
-    """A case that cannot be; the message names the field, its value and the limit."""
+    """An impossible case; the message names the field, its value and the limit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,10 +39,10 @@ class Case:
     usb: Usb = dataclasses.field(default_factory=Usb)
     run: Run = dataclasses.field(default_factory=Run)
     model: str = "point"
-    """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`). In all but
-    ``point`` it presses as wide as Hertz's patch of the foam's R*."""
+    """Force spread below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`). All but ``point``
+    press as wide as Hertz's patch of the foam's R*."""
     cap: Cap | None = None
-    """On each switch; None: the foam presses the switches' own faces, flush with what lies around them."""
+    """Cap on each switch; None: the foam presses the switches' own flush faces."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)
@@ -69,14 +69,14 @@ class Case:
 
     @functools.cached_property
     def cover(self) -> Cover:
-        """What presses on the switches."""
+        """The cover that presses on the switches."""
         foam = self.foam
         known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa, "poisson": foam.poisson}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
 
     @property
     def pressing(self) -> Pressing:
-        """The arm on a body region: driven on by what the torque limit lets through, then braked by all its current."""
+        """The arm on a body region: driven within the torque limit, then braked with full current."""
         link, motor, foam = self.link, self.motor, self.foam
         ball = Ball(foam.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, foam.poisson))
         mass = (link.inertia_kgm2 + motor.inertia_kgm2) / link.lever_m**2
@@ -84,7 +84,7 @@ class Case:
         return Pressing(mass, self.control.torque_limit_nm / link.lever_m, brake, ball, foam.thickness_m)
 
     def but(self, **changes: Any) -> Case:
-        """The same with other values: ``case.but(link={"speed_m_s": 0.4}, touch=({"x_mm": 85.0},))``."""
+        """A copy with other values: ``case.but(link={"speed_m_s": 0.4}, touch=({"x_mm": 85.0},))``."""
         new: dict[str, Any] = {}
         for name, change in changes.items():
             old = getattr(self, name)
@@ -97,8 +97,8 @@ class Case:
 
     @classmethod
     def load(cls, name: str | Path) -> Case:
-        """A case that comes with this package, by its name (:func:`names`), or a TOML file. ``like`` in it names the
-        case it differs from."""
+        """Load a packaged case by name (:func:`names`), or a TOML file, whose ``like`` names the case it differs
+        from."""
         return _case(str(name), _values(str(name)))
 
 
@@ -115,7 +115,7 @@ _PARTS = {
 
 
 def names() -> list[str]:
-    """The cases that come with this package."""
+    """Names of the packaged cases."""
     return sorted(path.stem for path in _CASES.glob("*.toml"))
 
 

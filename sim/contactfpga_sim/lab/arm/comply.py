@@ -10,18 +10,18 @@ from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.run import RunRecord, run
 
 BACK_M = 1e-3
-"""So near to where it was the arm counts as back."""
+"""Distance from its start within which the arm counts as back."""
 
 FASTEST_M_S = 5.0
-"""No faster push is looked for."""
+"""Upper end of the search for the fastest push."""
 
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
-"""Of the fastest push that the arm yields to."""
+"""Pushes shown, as shares of the fastest one that the arm yields to."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Push:
-    """What came of a push."""
+    """Result of a push."""
 
     speed_m_s: float
     peak_torque_nm: float
@@ -29,15 +29,15 @@ class Push:
     peak_force_n: float
     peak_indentation_m: float
     yields_m: float
-    """How far the arm gave way, at the lever."""
+    """Largest yield of the arm, at the lever."""
     back_s: float | None
-    """From the first touch until it was back for good; None: not in this run."""
+    """Time from the first touch until the arm is back for good; None: not in this run."""
     stopped: bool
     """The torque limit ended the compliance."""
 
 
 def pushed(case: Case, speed_m_s: float) -> tuple[Push, RunRecord]:
-    """The case's push at another speed."""
+    """Run the case's push at another speed."""
     if case.control.behavior != "comply":
         raise CaseError(f"behavior is {case.control.behavior!r}; a push needs 'comply'")
     touch = dataclasses.replace(case.touch[0], push_m_s=speed_m_s)
@@ -75,6 +75,6 @@ def fastest_m_s(case: Case, resolution: float = 0.005) -> float:
 
 
 def pushes(case: Case) -> tuple[float, list[Push]]:
-    """The fastest push in m/s that the arm yields to, and what happens for pushes up to it and for a faster one."""
+    """The fastest push in m/s that the arm yields to, and results up to it and for one faster push."""
     fastest = fastest_m_s(case)
     return fastest, [pushed(case, share * fastest)[0] for share in SHARES]

@@ -1,4 +1,4 @@
-"""The motor's controller: speed by PI, and what it does about a contact."""
+"""The motor's controller: a PI speed loop and its reaction to contact."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ from contactfpga_sim.lab.arm.case import Case
 
 
 class SensorReadings(NamedTuple):
-    """What the controller knows at one of its samples."""
+    """The controller's inputs at one sample."""
 
     angle_rad: float
     speed_rad_s: float
     torque_nm: float
-    """As the sensor reads it."""
+    """Torque as the sensor reads it."""
     contact: bool
-    """As it comes to the controller."""
+    """Contact as the controller receives it."""
     alive: bool
-    """Whether the host was heard of lately."""
+    """Whether the host was heard recently."""
 
 
 class Controller:
-    """Speed PI with one of two behaviors.
+    """PI speed controller with one of two behaviors.
 
-    ``reverse``, the paper's: a contact, or torque at the limit, makes the arm go back until the contact is resolved,
-    then slow down to rest. ``comply``: the arm follows the torque on it like an inertia with a damper and a spring;
-    torque at the limit makes it go back all the same. Where the host falls silent the arm stops; in a contact it first
-    goes back as far as it does at most. A contact that is still there then, and may be one that nobody tells the end
-    of, is not gone back from again before it was away once; the torque limit is.
+    ``reverse``, the paper's: on contact, or torque at the limit, the arm goes back until the contact is resolved, then
+    slows to rest. ``comply``: the arm follows the torque like an inertia with damper and spring, but still goes back at
+    the torque limit. If the host falls silent, the arm stops; in a contact it first retreats the full distance. A
+    contact that persists then may be stale: it causes no second retreat until it was away once; the torque limit does.
     """
 
     def __init__(self, case: Case):
@@ -48,7 +47,7 @@ class Controller:
         self._old: collections.deque[SensorReadings] = collections.deque()
 
     def sample(self, seconds: float, now: SensorReadings) -> float:
-        """The current in A to ask for until the next sample."""
+        """The current in A to request until the next sample."""
         sensed = self._late(now)
         over = abs(sensed.torque_nm) >= self._control.torque_limit_nm
         if now.contact:

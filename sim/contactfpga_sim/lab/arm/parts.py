@@ -1,4 +1,4 @@
-"""What a case of the arm is made of: link, motor, controller, foam, switches, what is touched, and the host's link."""
+"""Parts of a case of the arm: link, motor, controller, foam, switches, touched things, and the host's link."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BEHAVIORS = ("reverse", "comply")
 
 
 class _Checked:
-    """Fields are numbers in SI units: above 0, or where ``_zero`` names them 0 or above."""
+    """Fields are numbers in SI units: above 0, or, if ``_zero`` names them, 0 or above."""
 
     _zero: tuple[str, ...] = ()
 
@@ -37,9 +37,9 @@ class ArmLink(_Checked):
     inertia_kgm2: float
     """J about the joint, in kg m2, without the motor."""
     lever_m: float
-    """From the joint to where speeds are measured, in m; a touch lies there too unless it says where."""
+    """Distance in m from the joint to where speeds are measured, and to touches without a lever of their own."""
     speed_m_s: float
-    """With which the arm comes, in m/s."""
+    """Speed of approach, in m/s."""
     _zero = ("speed_m_s",)
 
 
@@ -48,7 +48,7 @@ class Motor(_Checked):
     """A direct-current gear motor in a current loop: u = gain (i_ref - i) + R i_ref + k N omega, within the supply."""
 
     gear: float
-    """Turns of the motor a turn of the joint."""
+    """Motor turns per turn of the joint."""
     torque_constant: float
     """k in Nm/A, and in V s/rad."""
     rotor_kgm2: float
@@ -56,78 +56,78 @@ class Motor(_Checked):
     inductance_h: float
     supply_v: float
     current_a: float
-    """The most the current is asked for, in A."""
+    """Largest requested current, in A."""
     current_gain: float
-    """Of the current loop, in V/A."""
+    """Gain of the current loop, in V/A."""
 
     @property
     def torque_nm_a(self) -> float:
-        """At the joint, in Nm/A."""
+        """Torque at the joint, in Nm/A."""
         return self.gear * self.torque_constant
 
     @property
     def inertia_kgm2(self) -> float:
-        """The rotor's, seen from the joint."""
+        """Rotor inertia seen from the joint."""
         return self.gear**2 * self.rotor_kgm2
 
     @property
     def time_constant_s(self) -> float:
-        """Of the current in its loop, away from the supply's limit."""
+        """Time constant of the closed current loop, within the supply."""
         return self.inductance_h / (self.resistance_ohm + self.current_gain)
 
 
 @dataclasses.dataclass(frozen=True)
 class Control(_Checked):
-    """Speed controller, behavior, and what it trusts."""
+    """Speed controller, behavior, and trusted inputs."""
 
     period_s: float
-    """Between two samples, in s."""
+    """Sampling period, in s."""
     proportional: float
     """Current for an error of the joint's speed, in A s/rad."""
     integral: float
-    """In A/rad. It does not grow while the current is at its limit."""
+    """Integral gain in A/rad, held while the current is at its limit."""
     reverse_m_s: float
-    """With which it goes back from a contact, at the lever, in m/s."""
+    """Speed of the retreat from a contact, at the lever, in m/s."""
     slowing_m_s2: float
-    """With which it slows down after a contact was resolved, in m/s2."""
+    """Deceleration after a contact is resolved, in m/s2."""
     torque_limit_nm: float
-    """Torque between motor and arm at which it goes back whatever the sheet says, in Nm."""
+    """Torque between motor and arm that causes a retreat whatever the sheet reports, in Nm."""
     sensor_nm: float = 3.0
-    """Range of the torque sensor; it reads no more than that."""
+    """Range at which the torque sensor saturates."""
     clear_s: float = 1e-3
-    """How long there must be no contact before it counts as resolved, in s."""
+    """Time without contact after which it counts as resolved, in s."""
     retreat_m: float = 0.01
-    """How far it goes back at most, and how far after the torque limit, which cannot tell when a contact ends."""
+    """Longest retreat, and the retreat after the torque limit, which cannot detect the end of a contact."""
     watchdog_s: float = 20e-3
-    """The host may be silent for this long, in s; then the arm stops."""
+    """Host silence after which the arm stops, in s."""
     delay_s: float = 0.0
-    """Age of the measured speed and torque, in s, where the loop is closed over a link."""
+    """Age of the measured speed and torque, in s, if the loop runs over a link."""
     behavior: str = "reverse"
     """One of :data:`BEHAVIORS`."""
     virtual_kgm2: float = 0.02
     """``comply``: inertia of the admittance, in kg m2."""
     virtual_damping: float = 0.5
-    """``comply``: its damping, in Nm s/rad."""
+    """``comply``: damping of the admittance, in Nm s/rad."""
     virtual_stiffness: float = 4.0
-    """``comply``: of the spring that brings it back, in Nm/rad."""
+    """``comply``: stiffness of the return spring, in Nm/rad."""
     _zero = ("delay_s", "clear_s", "virtual_stiffness")
 
 
 @dataclasses.dataclass(frozen=True)
 class Foam(_Checked):
-    """The cover: F = K_s delta^1.5 (1 + damping d delta/dt), and below it a stiff base."""
+    """The cover: F = K_s delta^1.5 (1 + damping d delta/dt), on a stiff base."""
 
     modulus_pa: float
     poisson: float
     radius_m: float
-    """R*, in m."""
+    """Effective radius R*, in m."""
     thickness_m: float
     damping: float = 0.0
-    """In s/m, after Hunt and Crossley; 0: nothing is lost."""
+    """Damping in s/m, after Hunt and Crossley; 0: lossless."""
     base_n_m: float = 1e6
-    """What comes on top from the indentation on at which the foam is pressed flat, its thickness, in N/m."""
+    """Stiffness of the base in N/m, added once the foam is pressed flat, to its thickness."""
     cut: bool = False
-    """It is cut into tiles between the caps; the plant's spring is that of whole foam all the same."""
+    """Whether the foam is cut into tiles between the caps; the plant's spring stays that of whole foam."""
     _zero = ("damping",)
 
     @functools.cached_property
@@ -136,7 +136,7 @@ class Foam(_Checked):
         return elastic.stiffness(Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson)))
 
     def force_n(self, indentation_m: float, rate_m_s: float = 0.0) -> float:
-        """Force in N at an indentation that grows by ``rate_m_s``; it never pulls."""
+        """Force in N at an indentation that grows by ``rate_m_s``; never negative."""
         if indentation_m <= 0:
             return 0.0
         force = self.stiffness * indentation_m * math.sqrt(indentation_m) * (1 + self.damping * rate_m_s)
@@ -145,7 +145,7 @@ class Foam(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Contacts(_Checked):
-    """The switches below the cover; what is not said here is as in :class:`contactfpga.design.cover.Switch`."""
+    """The switches below the cover; defaults are those of :class:`contactfpga.design.cover.Switch`."""
 
     force_n: float
     area_m2: float
@@ -154,14 +154,14 @@ class Contacts(_Checked):
     hysteresis: float = 0.2
     preload_n: float = 0.0
     bounce_s: float = 0.0
-    """How long it bounces after closing and after opening."""
+    """Bounce time after closing and after opening."""
     bounce_period_s: float = 0.4e-3
-    """Open and closed again, while it bounces."""
+    """Period of one opening and closing while bouncing."""
     _zero = ("travel_m", "spread", "hysteresis", "preload_n", "bounce_s")
 
     @functools.cached_property
     def switch(self) -> Switch:
-        """What closes, without its bounce."""
+        """The switch without its bounce."""
         return Switch(self.force_n, self.area_m2, self.travel_m, self.spread, self.hysteresis, self.preload_n)
 
 
@@ -170,27 +170,27 @@ class Touch(_Checked):
     """Something that the arm runs into, or that pushes it."""
 
     x_mm: float = 80.0
-    """Where it presses, on the sheet laid flat: along the columns, column 0 lies at 0."""
+    """Position on the sheet laid flat, along the columns; column 0 is at 0."""
     y_mm: float = 80.0
     lever_m: float | None = None
-    """From the joint; None: that of the link."""
+    """Distance from the joint; None: the link's."""
     gap_m: float = 0.0
-    """How much farther away it is than the first that is touched."""
+    """Extra distance beyond the first thing that is touched."""
     mass_kg: float = 0.0
-    """Of what gives way; 0: it is rigid."""
+    """Mass of the part that gives way; 0: it is rigid."""
     stiffness_n_m: float = 0.0
-    """Of what holds that mass."""
+    """Stiffness of that mass's support."""
     damping_ns_m: float = 0.0
     push_m_s: float = 0.0
-    """Speed with which it comes toward the arm; 0: it stays where it is."""
+    """Speed toward the arm; 0: it stays where it is."""
     push_m: float = 0.0
-    """How far it comes."""
+    """Distance that it moves toward the arm."""
     hold_s: float = 0.0
-    """How long it stays there; then it goes back as fast."""
+    """Time at the end of the push, before it goes back as fast."""
     _zero = ("x_mm", "y_mm", "gap_m", "mass_kg", "stiffness_n_m", "damping_ns_m", "push_m_s", "push_m", "hold_s")
 
     def pushed(self, seconds: float) -> tuple[float, float]:
-        """How far it has come toward the arm, and how fast it does."""
+        """Distance and speed of its approach to the arm."""
         if seconds <= 0 or not self.push_m_s:
             return 0.0, 0.0
         takes = self.push_m / self.push_m_s
@@ -204,16 +204,16 @@ class Touch(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Usb(_Checked):
-    """How bytes come from the board's UART to the program: a USB serial chip, and the host."""
+    """Path of bytes from the board's UART to the program: a USB serial chip, and the host."""
 
     packet_bytes: float = 510
-    """The chip sends when it holds this many, or when its timer ran out."""
+    """Bytes at which the chip sends before its timer runs out."""
     timer_s: float = 1e-3
-    """Its latency timer: 1 ms is what the driver sets, 16 ms what a system has."""
+    """Latency timer: the driver sets 1 ms; an operating system's default is 16 ms."""
     frame_s: float = 125e-6
-    """Between two moments at which the host takes something."""
+    """Interval at which the host polls."""
     host_s: float = 0.1e-3
-    """From there through the host's program to the motor's controller."""
+    """Time through the host's program to the motor's controller."""
     _zero = ("timer_s", "host_s")
 
 
@@ -222,8 +222,8 @@ class Run(_Checked):
     """Times of the simulation."""
 
     step_s: float = 10e-6
-    """Of the integrator, and between two looks of gateware and plant at each other, in s."""
+    """Step of the integrator and of the exchange between gateware and plant, in s."""
     lead_s: float = 20e-3
-    """From power-up, when the controller samples first, to the touch; a whole number of steps."""
+    """Time from power-up, the controller's first sample, to the touch; a whole number of steps."""
     duration_s: float = 0.25
-    """From the touch to the end, at most."""
+    """Longest time from the touch to the end."""

@@ -1,4 +1,4 @@
-"""Pictures of a run, after the paper's Figs. 6 and 7, and what latency costs: force, speed and thickness against it."""
+"""Pictures of a run, after the paper's Figs. 6 and 7, and of force, speed and thickness against latency."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.ORANGE, "linestyle": style.DASHES[1], "linewidth": 1.5},
     {"color": style.GREEN, "linestyle": style.DASHES[3], "linewidth": 1.5},
 )
-"""Of the runs: one that takes the same course as another is seen beneath it."""
+"""Line styles of the runs; coinciding runs stay visible."""
 
 DRAWN = {"speed": ("speed_rad_s", "angular speed, rad/s"), "torque": ("sensor_nm", "torque between motor and arm, Nm")}
 NAMES = {"speed": "arm-fig6-speed", "torque": "arm-fig7-torque"}
 FROM_S, TO_S = -5e-3, 40e-3
-"""What the enlarged part shows."""
+"""Time range of the enlarged part."""
 
 
 def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
@@ -87,7 +87,7 @@ SPEEDS_M_S = tuple(0.02 * step for step in range(1, 31))
 THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
 LIMITS_N = np.linspace(4, 40, 145)
 INSTANTS = 8
-"""Touch instants by which the gateware's own runs differ, a controller period apart."""
+"""Touch instants that the gateware's own runs use, a controller period apart."""
 COLORS = {"6 ms": style.BLACK, "UART": style.VERMILLION, "pin": style.BLUE, "last byte": style.GREEN}
 BOUND: dict[str, Any] = {"linewidth": 1.2, "linestyle": style.DASHES[2]}
 TICKS_MS = (0.01, 0.1, 1, 10)
@@ -95,7 +95,7 @@ TICKS_MS = (0.01, 0.1, 1, 10)
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Every task by what it is drawn as."""
+    """All tasks by their picture."""
 
     force: tuple[SweepTask, ...]
     limited: tuple[SweepTask, ...]
@@ -105,7 +105,7 @@ class Plan:
 
     @property
     def all(self) -> list[SweepTask]:
-        """All of them."""
+        """All tasks."""
         groups = [self.force, self.limited, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
         return [task for group in groups for task in group]
 
@@ -166,7 +166,7 @@ def _axes(x: str, y: str) -> tuple[Figure, Any]:
 
 
 def _latencies(place: Any, case: Case) -> None:
-    """The axis of latencies, with the bound of each way and zero at the bottom."""
+    """The latency axis, with each way's bound, and zero at the bottom."""
     for name, bound in sweep.bounds_s(case, Skin()).items():
         place.axvline(1e3 * bound, color=COLORS[name], label=f"bound, {name}", **BOUND)
     place.set_xscale("log")

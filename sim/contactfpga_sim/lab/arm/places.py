@@ -1,7 +1,7 @@
-"""Touches anywhere on the sheet: what the arm does over many places, phases of its controller and latencies.
+"""Touches anywhere on the sheet: the arm over many places, controller phases and latencies.
 
-Places fill pitch cells in the sheet's middle evenly; with each goes a moment between two samples of the controller, and
-a latency from those that the gateware took.
+Places fill pitch cells in the sheet's middle evenly; each has a moment between two controller samples and a latency
+measured through the gateware.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S
 
 ENDS_S = 20e-3
-"""A peak is over by this time and what the arm takes for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
+"""A peak is over by this time plus the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
 
 INSTANTS = 8
-"""Touches through the gateware from which a way's latencies are taken, a controller period apart."""
+"""Touches through the gateware that measure a way's latencies, a controller period apart."""
 
 SPAN = 3
-"""Pitches along each side of what is touched, in the sheet's middle."""
+"""Pitches along each side of the touched square in the sheet's middle."""
 
 SEEDS = (0, 1)
-"""Each seed has half of the touches, so that one half tells how far the other can be trusted."""
+"""Each seed has half of the touches, so that comparing the halves shows the uncertainty."""
 
 Latencies = tuple[float, ...]
-"""In s, one as likely as another; empty: the sheet says nothing."""
+"""Equally likely latencies in s; empty: the sheet reports nothing."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Peaks:
     """Arrays (touches,) of one way."""
 
     force_n: Floats
-    """Peak."""
+    """Peak force of each touch."""
     indentation_m: Floats
-    """Peak."""
+    """Peak indentation of each touch."""
     limited: np.ndarray
-    """The torque limit reacted first."""
+    """Whether the torque limit reacted first."""
 
 
 def check(case: Case) -> None:
@@ -65,12 +65,12 @@ def check(case: Case) -> None:
 
 
 _GOLDEN = 1.32471795724
-"""Root of x^3 = x + 1: points that move on by its powers fill a square evenly (Roberts)."""
+"""Root of x^3 = x + 1: steps by its powers fill a square evenly (Roberts)."""
 
 
 def evenly(count: int, seed: int) -> Floats:
-    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, each other one takes ``count`` even shares of
-    its range in an order of its own."""
+    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others take even shares of their range in
+    random order."""
     rng = np.random.default_rng(seed)
     square = (rng.random(2) + np.outer(np.arange(count), [1 / _GOLDEN, 1 / _GOLDEN**2])) % 1
     orders = np.stack([rng.permutation(count) for _ in range(4)], axis=1)
@@ -84,8 +84,8 @@ def batches(case: Case, skin: Skin, ways: tuple[Latencies, ...], count: int) -> 
 
 
 def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
-    """Peak force in N, peak indentation in m and whether the torque limit reacted first: of each touch, for each way;
-    from the cache where the same code worked it out before."""
+    """Peak force in N, peak indentation in m and whether the torque limit reacted first, of each touch for each way.
+    Cached by code."""
     what = dataclasses.asdict(dataclasses.replace(batch, skin=None))  # type: ignore[arg-type]
     key = f"{kept.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
     found: list[list[tuple[float, float, bool]]] = kept.kept("places", key, lambda: _touched(batch))
@@ -93,7 +93,7 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def peaks(found: list[list[list[tuple[float, float, bool]]]], way: int) -> list[Peaks]:
-    """One way of the results of several batches."""
+    """The peaks of one way over several batches."""
     arrays = [np.array(one[way], float) for one in found]
     return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0) for array in arrays]
 
@@ -123,7 +123,7 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
-    """In one of the middle cells of a side, a pitch wide, by shares from 0 to 1."""
+    """A position in one of the middle cells of a side, by shares from 0 to 1."""
     span = min(SPAN, count - 1)
     if not span:
         return 0.5 * inside * pitch_mm
@@ -131,15 +131,15 @@ def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
 
 
 def _step_s(case: Case) -> float:
-    """The longest step that the case can take."""
+    """The longest integrator step for the case."""
     period = case.control.period_s / STEP_S
     fits = abs(period - round(period)) < 1e-6 and case.motor.time_constant_s / STEPS_A_TIME_CONSTANT >= STEP_S
     return STEP_S if fits else case.run.step_s
 
 
 def measured_s(case: Case, skin: Skin, way: str) -> Latencies:
-    """Times in s from a switch to the controller's input, of :data:`INSTANTS` touches on a switch through the gateware
-    by the way ``uart`` or ``pin``."""
+    """Times in s from a switch to the controller's input, of :data:`INSTANTS` touches through the gateware by the way
+    ``uart`` or ``pin``."""
     key = f"{kept.made_by(__name__, skin)} {way} {dataclasses.asdict(case.usb)} {case.control.period_s}"
     found: list[float] = kept.kept("latencies", key, lambda: _measured(case, skin, way))
     return tuple(found)

@@ -1,8 +1,15 @@
-"""Arm, gear motor, foam and what is touched, as one system of equations that a fixed step integrates.
+"""Arm, gear motor, foam and touched things as one system of equations, integrated with a fixed step.
 
 The state is (theta, omega, current, then position and speed of each thing that gives way): theta in rad from the first
-touch, positive into the obstacle; with a stiff gear (J + N^2 J_r) d omega/dt = N k i - sum d F. The torque sensor sits
-between motor and arm and reads J d omega/dt + sum d F: it falls when the motor turns back, while F still rises.
+touch, positive into the obstacle.
+
+- Joint with a stiff gear: (J + N^2 J_r) d omega/dt = N k i - sum d F.
+- Motor: L di/dt = u - R i - N k omega, with the voltage u = K (i_ref - i) + R i_ref + N k omega within the supply.
+- Foam pressed in by delta: F = K_s delta^1.5 (1 + c d delta/dt), and K_b (delta - e) more once foam of thickness e is
+  pressed flat on its base.
+
+The torque sensor sits between motor and arm and reads J d omega/dt + sum d F: it falls when the motor turns back, while
+F still rises.
 """
 
 from __future__ import annotations
@@ -17,16 +24,16 @@ State = tuple[float, ...]
 
 
 class Forces(NamedTuple):
-    """What acts at a moment."""
+    """Forces in one state."""
 
     contact_n: tuple[float, ...]
-    """Of each touch, in N."""
+    """Force of each touch, in N."""
     indentation_m: tuple[float, ...]
-    """Of the foam there, negative while it is apart."""
+    """Foam indentation at each touch, negative while apart."""
     acceleration: float
-    """Of the joint, in rad/s2."""
+    """Angular acceleration of the joint, in rad/s2."""
     sensor_nm: float
-    """True torque between motor and arm; the sensor reads no more than its range."""
+    """True torque between motor and arm, not limited to the sensor's range."""
 
 
 class Plant:
@@ -43,7 +50,7 @@ class Plant:
         self._inertia = case.link.inertia_kgm2 + case.motor.inertia_kgm2
 
     def start(self, speed_rad_s: float, lead_s: float) -> State:
-        """The arm on its way, ``lead_s`` before the touch."""
+        """The approaching arm, ``lead_s`` before the touch."""
         yielding = sum(place is not None for _, _, place in self._touches)
         return (-speed_rad_s * lead_s, speed_rad_s, 0.0, *(0.0,) * (2 * yielding))
 
@@ -63,7 +70,7 @@ class Plant:
         return Forces(tuple(forces), tuple(depths), acceleration, self._arm_inertia * acceleration + torque)
 
     def slope(self, seconds: float, state: State, wanted_a: float, forces: Forces | None = None) -> State:
-        """d state/dt while the controller asks for ``wanted_a``; ``forces``: of this state, where they are known."""
+        """d state/dt while the controller requests ``wanted_a``; ``forces``: this state's, if known."""
         motor = self._motor
         forces = forces or self.forces(seconds, state)
         back = motor.torque_constant * motor.gear * state[1]
@@ -80,7 +87,7 @@ class Plant:
         return tuple(found)
 
     def step(self, seconds: float, state: State, wanted_a: float, step_s: float, forces: Forces | None = None) -> State:
-        """The state ``step_s`` later, by the classical method of Runge and Kutta of order 4."""
+        """The state ``step_s`` later, by fourth-order Runge-Kutta."""
         half = step_s / 2
         one = self.slope(seconds, state, wanted_a, forces)
         two = self.slope(seconds + half, _moved(state, half, one), wanted_a)
@@ -90,7 +97,7 @@ class Plant:
         return tuple([y + sixth * (a + 2 * (b + c) + d) for y, a, b, c, d in zip(state, one, two, three, four)])
 
     def energy_j(self, state: State) -> float:
-        """Kinetic energy of arm and rotor, and what foam and base hold, where nothing is pushed and all is rigid."""
+        """Energy of arm, rotor, foam and base, if nothing is pushed and all is rigid."""
         held = self._inertia * state[1] ** 2 / 2
         for touch, lever, _ in self._touches:
             depth = max(0.0, lever * state[0] - touch.gap_m)

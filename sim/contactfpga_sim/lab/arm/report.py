@@ -1,4 +1,4 @@
-"""The experiment's numbers beside those that the paper prints: as a table, and as JSON in SI units."""
+"""The experiment's numbers beside the paper's: as a table, and as JSON in SI units."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class ReportLine(NamedTuple):
 
     name: str
     field: str
-    """Of :class:`contactfpga_sim.lab.arm.run.ArmResponse`."""
+    """Field of :class:`contactfpga_sim.lab.arm.run.ArmResponse`."""
     unit: str
     scale: float
-    """From SI to the unit."""
+    """Factor from SI to the unit."""
     paper: float | None
-    """What the paper states, in SI."""
+    """The paper's value, in SI."""
     stated: float | None
-    """What the consistent set is to give, in SI."""
+    """Expected value of the consistent set, in SI."""
 
 
 ROWS = (
@@ -50,7 +50,7 @@ NOTES = (
 
 
 def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -> dict[str, RunRecord]:
-    """The runs that stand side by side, by their heading."""
+    """The runs compared side by side, by heading."""
     late = f"{1e3 * latency_s:g} ms"
     found = {
         late: run(case, "latency", latency_s=latency_s, skin=skin),
@@ -72,13 +72,13 @@ def cell(row: ReportLine, outcome: ArmResponse) -> str:
 
 
 def deviation(row: ReportLine, outcome: ArmResponse) -> float | None:
-    """Ours over the paper's, less 1."""
+    """Our value over the paper's, less 1."""
     value = getattr(outcome, row.field)
     return None if value is None or row.paper is None else value / row.paper - 1
 
 
 def table(found: dict[str, RunRecord], paper: bool) -> list[list[str]]:
-    """Headings and lines; with ``paper`` its numbers and those of the consistent set stand in front."""
+    """Headings and lines; with ``paper``, the paper's numbers and the consistent set's come first."""
     first = next(iter(found.values())).outcome
     lines = [["", *(["paper", "set"] if paper else []), *found]]
     if paper:
@@ -103,7 +103,7 @@ def _reasons(found: dict[str, RunRecord], paper: bool) -> list[str]:
 
 
 def as_json(found: dict[str, RunRecord], name: str) -> dict[str, Any]:
-    """All of it in SI units."""
+    """All runs in SI units."""
     first = next(iter(found.values())).outcome
     known: dict[str, Any] = {
         "case": name,
@@ -140,14 +140,14 @@ DEFENDED: dict[str, dict[str, Any]] = {
     "that, 0.1 m from the joint": {"touch": (HALFWAY | {"lever_m": 0.1},)},
     "the patch's pressure, not a point force": {"model": "hertz"},
 }
-"""Touches, as changes to the case."""
+"""Touches for the defense table, as changes to the case."""
 
 DEFENSES = {"torque limit alone": "torque", "contact": "pin", "force threshold": "force", "both": "both"}
 DEFENSE_HEADINGS = ("touch", *(f"{name}: reacts, ms / peak, N" for name in DEFENSES))
 
 
 def defense_lines(case: Case) -> list[list[str]]:
-    """Reaction and peak force of touches by each line of defense; headings first."""
+    """Headings, then reaction and peak force of touches by each line of defense."""
     lines = [list(DEFENSE_HEADINGS)]
     for name, changes in DEFENDED.items():
         cells = []

@@ -1,4 +1,4 @@
-"""One run from power-up to rest, and what came of it."""
+"""One run from power-up to rest, and its result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, CourseStep, Faults,
 
 
 class PlantTransport:
-    """A :class:`contactfpga.driver.transport.Transport`: while the driver waits, arm and gateware go on."""
+    """A :class:`contactfpga.driver.transport.Transport`: while the driver waits, arm and gateware advance."""
 
     live, threaded = True, False
     name = "arm://"
@@ -39,51 +39,51 @@ class PlantTransport:
 
 
 AFTER_S = 0.25e-3
-"""So long after the reaction the torque is looked at again."""
+"""Time after the reaction at which the torque is read again."""
 
 SLOW_M_S = 1e-3
-"""An arm that the controller holds counts as at rest below this speed."""
+"""Speed below which a held arm counts as at rest."""
 
 WITH_UNITS = Skin(units=3, unit_sums=((1, 1, 1),), baud=6_000_000)
 """The reference Skin on three pressure units."""
 
 STAY_S = 20e-3
-"""A run ends when the arm was at rest for so long."""
+"""Time at rest after which a run ends."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ArmResponse:
-    """Times in s from the touch, None where it did not happen. The reaction is the controller's sample at which it
-    first turns the arm back or stops it."""
+    """Times in s from the touch; None: it did not happen. The reaction is the first controller sample that reverses or
+    stops the arm."""
 
     closes_s: float | None
-    """The first switch does."""
+    """The first switch closes."""
     detected_s: float | None
-    """It has come to the controller's input."""
+    """The contact reaches the controller's input."""
     reacts_s: float | None
     reason: str
-    """For the reaction: ``contact``, ``torque``, ``silence``, or none."""
+    """Reason of the reaction: ``contact``, ``torque``, ``silence``, or none."""
     positive_s: float | None
-    """From the reaction until the arm goes back."""
+    """Time from the reaction until the arm goes back."""
     torque_before_nm: float | None
-    """At the reaction, true."""
+    """True torque at the reaction."""
     torque_after_nm: float | None
-    """:data:`AFTER_S` later."""
+    """True torque :data:`AFTER_S` after the reaction."""
     force_before_n: float | None
-    """At the reaction."""
+    """Force at the reaction."""
     peak_force_n: float
     peak_torque_nm: float
-    """Its largest size, whatever its sign."""
+    """Largest magnitude of the torque."""
     peak_indentation_m: float
     bottomed: bool
-    """The foam was pressed flat."""
+    """Whether the foam was pressed flat."""
     resolved_s: float | None
-    """No switch is closed any more, and none is later."""
+    """Time from which all switches stay open."""
     rest_s: float | None
-    """From then on the arm is at rest, until the run ends."""
+    """Time from which the arm stays at rest."""
     reversals: int
     zones: int
-    """The most that the host reported at once."""
+    """The most zones that the host reported at once."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,11 +92,11 @@ class RunRecord:
 
     outcome: ArmResponse
     course: np.ndarray
-    """Structured, a :class:`contactfpga_sim.lab.arm.world.CourseStep` a step."""
+    """Structured array of a :class:`contactfpga_sim.lab.arm.world.CourseStep` per step."""
     events: tuple[tuple[float, str, str], ...]
-    """The controller's: (time in s, new state, reason)."""
+    """Controller events: (time in s, new state, reason)."""
     heard: tuple[tuple[float, int], ...]
-    """What came to it from the host: (time in s, zones)."""
+    """Reports of the host: (time in s, zones)."""
 
 
 def run(
@@ -108,12 +108,12 @@ def run(
     faults: Faults | None = None,
     to_peak: bool = False,
 ) -> RunRecord:
-    """Let the arm run into what it touches.
+    """Let the arm run into the touched things.
 
-    ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
-    the sheet, by default the reference Skin, with units where the way needs them; ``to_peak``: end once the force has
-    fallen to half of its peak after the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both``
-    compiles its gateware.
+    ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: by
+    default the reference Skin, with units if the way needs them; ``to_peak``: end once the force has fallen to half of
+    its peak after the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its
+    gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")
@@ -149,7 +149,7 @@ def _on_sheet(case: Case, skin: Skin) -> None:
 
 
 def _host(world: World) -> None:
-    """The program at the other end of the port: says of every frame how many zones it holds."""
+    """The host's program: reports each frame's number of zones."""
     with driver.Board(PlantTransport(world)) as board:
         board.greet(world.case.run.lead_s)
         while not _over(world) and not _host_dead(world):
@@ -216,7 +216,7 @@ def _outcome(world: World) -> ArmResponse:
 
 
 def _until_back(course: np.ndarray, start: int | None) -> float | None:
-    """From the step ``start`` until the speed is 0, between two steps by the straight line through them."""
+    """Time from step ``start`` until the speed is 0, interpolated between steps."""
     if start is None:
         return None
     speed, time = course["speed_rad_s"], course["time_s"]

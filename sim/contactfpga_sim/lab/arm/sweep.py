@@ -1,4 +1,4 @@
-"""The points of the charts: many short runs, worked out in pieces by any executor."""
+"""The points of the charts: many short runs, in pieces for any executor."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from contactfpga_sim.lab.arm.report import UNLIMITED
 from contactfpga_sim.lab.arm.run import run
 
 STEP_S = 25e-6
-"""Of the integrator where no gateware runs along; half of it changes no result by more than a hundredth."""
+"""Integrator step for runs without gateware; halving it changes no result by more than 1 %."""
 
 ENDS_S, ENDS_M = 60e-3, 4e-3
-"""An arm has gone back from what it ran into by this time and what it takes for this way."""
+"""An arm has retreated by this time plus the time for this distance."""
 
 RESOLUTION_M = 0.02e-3
-"""To which a thickness is found."""
+"""Resolution of a thickness."""
 
 THINNEST_M, THICKEST_M = 0.05e-3, 40e-3
 
@@ -43,20 +43,20 @@ class SweepTask:
 
 @dataclasses.dataclass(frozen=True)
 class SweepPoint:
-    """What came of it, in SI; NaN for what did not happen."""
+    """Results in SI; NaN for an event that did not happen."""
 
     peak_force_n: float
     force_before_n: float
-    """At the reaction."""
+    """Force at the reaction."""
     peak_indentation_m: float
     closes_s: float
     takes_s: float
-    """From the switch to what the controller knows."""
+    """Time from the switch to the controller's input."""
     thickness_m: float = math.nan
 
 
 def work(task: SweepTask) -> dict[str, float]:
-    """The fields of the task's :class:`SweepPoint`, from the cache where the same code worked them out before."""
+    """The fields of the task's :class:`SweepPoint`. Cached by code."""
     key = f"{kept.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
     return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
 
@@ -67,8 +67,7 @@ def sweep(
     step: Callable[[str, int], None] = lambda name, of: None,
     so_far: dict[SweepTask, SweepPoint] | None = None,
 ) -> list[SweepPoint]:
-    """The tasks' points, in their order; ``step(name, number of all)`` is called after each, and it is in ``so_far`` at
-    once."""
+    """The tasks' points in order. After each, ``so_far`` holds it, and ``step(name, number of all)`` is called."""
     found = {} if so_far is None else so_far
     futures = {executor.submit(work, task): task for task in tasks}
     for future in as_completed(futures):
@@ -97,7 +96,7 @@ def _number(value: float | None) -> float:
 
 
 def _thinnest(task: SweepTask) -> SweepPoint:
-    """The smallest thickness at which the foam is not pressed flat; a thicker one also closes its switch later."""
+    """The smallest thickness at which the foam is not pressed flat; thicker foam also closes its switch later."""
 
     def at(thickness_m: float) -> tuple[SweepPoint, bool]:
         point = _point(dataclasses.replace(task, case=task.case.but(foam={"thickness_m": thickness_m})))
@@ -118,7 +117,7 @@ def _thinnest(task: SweepTask) -> SweepPoint:
 
 
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
-    """The longest time from a switch to the controller's input by each way, in s, for this sheet and one zone."""
+    """The longest time in s from a switch to the controller's input by each way, for one zone."""
     usb = case.usb
     scan = skin.derived.max_frame_slots * skin.derived.row_clocks / skin.clock_hz
     wire = latency_s(skin)
@@ -126,18 +125,18 @@ def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
 
 
 def unlimited(case: Case) -> Case:
-    """The same without the torque limit, so that the sheet alone is looked at."""
+    """The case without the torque limit, to judge the sheet alone."""
     return case.but(control=UNLIMITED)
 
 
 def closing_n(case: Case) -> float:
-    """The force that closes a switch right below."""
+    """The force that closes a switch directly below it."""
     return float(force_n(case.switch.switch, 0.0, case.foam.thickness_m))  # type: ignore[arg-type]
 
 
 def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
-    """The highest speed up to which no force is above the limit, between two by the straight line. NaN
-    where the slowest is too fast, and where the fastest is not fast enough to tell."""
+    """The highest speed up to which no force exceeds the limit, interpolated. NaN if the slowest is too fast, or the
+    fastest is still safe."""
     worst = np.maximum.accumulate(forces)
     above = np.flatnonzero(worst > limit_n)
     if not worst[0] <= limit_n or not len(above):
@@ -148,7 +147,7 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
 
 
 def naive_speed(case: Case, limit_n: float, latency: float) -> float:
-    """(delta(limit) - delta(closing)) / latency, at which an arm that keeps its speed has the limit's force at the
-    reaction. No safe speed: the arm goes on pressing after it."""
+    """(delta(limit) - delta(closing)) / latency, the speed that reaches the limit at the reaction. It is not safe: the
+    arm still presses on."""
     depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
     return max(0.0, depth[0] - depth[1]) / latency

@@ -16,7 +16,7 @@ from contactfpga_sim.lab.arm.world import Faults
 from contactfpga_sim.lab.pool import executor, progress
 
 STEPS_US = (25.0, 12.5, 6.25)
-"""Of the integrator; each is half of the one before."""
+"""Integrator steps, each half of the one before."""
 
 STEPPED = ("closes_s", "torque_before_nm", "peak_force_n", "rest_s")
 
@@ -24,18 +24,18 @@ LIMITS_N = (10.0, 15.0, 20.0, 30.0)
 
 
 class ArmRuns(NamedTuple):
-    """The runs that tables and pictures share."""
+    """Runs shared by tables and pictures."""
 
     plan: pictures.Plan
     points: dict[SweepTask, SweepPoint]
     columns: dict[str, RunRecord]
     """The paper's experiment by way to the controller."""
     anywhere: dict[anywhere.Geometry, anywhere.Found]
-    """Touches anywhere, by what the sheet is built of."""
+    """Touches anywhere, by geometry."""
 
 
 def compute() -> ArmRuns:
-    """Run them."""
+    """Run all simulations of the page."""
     case = Case.load("paper")
     plan = pictures.plan(case)
     with executor() as workers, progress() as step:
@@ -45,17 +45,17 @@ def compute() -> ArmRuns:
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
-    """Its runs, and force, speed and thickness against latency."""
+    """The page's runs, and force, speed and thickness against latency."""
     charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
     return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
 
 
 class Failure(NamedTuple):
-    """A run in which something is wrong."""
+    """A run with a fault."""
 
     name: str
     changes: dict[str, Any]
-    """To the case ``paper``."""
+    """Changes to the case ``paper``."""
     way: str = "uart"
     faults: Faults = Faults()
 
@@ -81,27 +81,27 @@ FAILURES = (
 
 
 def matters_text(found: ArmRuns) -> str:
-    """What matters most, in a sentence."""
+    """A sentence on the most important change."""
     return anywhere.matters(found.anywhere)
 
 
 def places_table(found: ArmRuns) -> str:
-    """Peak force over touches anywhere, by what the sheet is built of."""
+    """Peak force over touches anywhere, by geometry."""
     return writer.table_of(anywhere.geometry_lines(found.anywhere))
 
 
 def effects_table(found: ArmRuns) -> str:
-    """What each part of the sheet takes from the mean peak force, changed alone."""
+    """Reduction of the mean peak force by each part of the sheet, changed alone."""
     return writer.table_of(anywhere.effect_lines(found.anywhere))
 
 
 def set_table(found: ArmRuns) -> str:
-    """What ``contactfpga study arm`` prints."""
+    """The output of ``contactfpga study arm``."""
     return writer.table_of(report.table(found.columns, True))
 
 
 def failure_table() -> str:
-    """What happens in each of :data:`FAILURES`."""
+    """Results of each of :data:`FAILURES`."""
     lines = [["", "way", "reacts, ms", "because of", "peak force, N", "indentation, mm", "reversals", "at rest, ms"]]
     for failure in FAILURES:
         found = run(Case.load("paper").but(**failure.changes), failure.way, faults=failure.faults).outcome
@@ -114,7 +114,7 @@ def failure_table() -> str:
 
 
 def push_table() -> str:
-    """Pushes up to the fastest that the arm yields to, and a faster one."""
+    """Pushes up to the fastest that the arm yields to, and one faster."""
     return writer.table_of(report.push_lines(comply.pushes(Case.load("push"))[1]))
 
 
@@ -124,7 +124,7 @@ def defense_table() -> str:
 
 
 def step_table() -> str:
-    """The set at 6 ms and by UART over steps of the integrator, and the largest change by halving."""
+    """Results at 6 ms and by UART over integrator steps, and the largest change by halving."""
     lines = [["step, us", "way", "closes, ms", "torque before, Nm", "peak force, N", "at rest, ms", "largest change"]]
     for way in ("latency", "uart"):
         before: list[float] | None = None
@@ -139,7 +139,7 @@ def step_table() -> str:
 
 
 def sheet_table(found: ArmRuns) -> str:
-    """What the gateware's own runs take from the switch to the controller, and what that costs."""
+    """Time from the switch to the controller in the gateware's own runs, and its cost."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
     bounds = sweep.bounds_s(Case.load("paper"), pictures.Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):
@@ -152,7 +152,7 @@ def sheet_table(found: ArmRuns) -> str:
 
 
 def speed_table(found: ArmRuns) -> str:
-    """How fast the arm may be, by its peak force and, in brackets, by the force at the reaction alone."""
+    """Safe arm speed by peak force and, in brackets, by the force at the reaction."""
     lines = [["force limit, N", *found.plan.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
     for limit in LIMITS_N:
         cells = []

@@ -24,10 +24,10 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3
 _PATCH_M = 1e-3
-"""Radius of a patch where the model does not look at it."""
+"""Patch radius for models that do not use it."""
 
 _FINE = 1.1
-"""Ratio of the forces at which a wide patch is looked at; between two, what each newton presses goes straight."""
+"""Ratio of the forces at which a wide patch is computed; between them, the pressure per newton is linear."""
 
 _LEAST_N = 0.01
 
@@ -49,7 +49,7 @@ class Switches:
         self._bounces_until = -np.inf
 
     def forces_n(self, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) force in N on each switch below the forces of the touches."""
+        """(rows, columns) force in N on each switch from the touches' forces."""
         found = np.zeros(self._made.shape)
         for touch, force in zip(self._touches, forces_n):
             if force > 0:
@@ -57,8 +57,8 @@ class Switches:
         return found
 
     def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) bool: which are closed at a moment; moments come in order. The same array as long as nothing
-        changes."""
+        """(rows, columns) bool: the switches closed at a moment; moments must not go back. Unchanged results are the
+        same array."""
         if any(forces_n) or self._any:
             made = self._cells.closed_by(self.forces_n(forces_n), self._made)
             changed = made != self._made
@@ -82,7 +82,7 @@ class Switches:
         return found
 
     def _per_newton(self, touch: Touch, force_n: float) -> np.ndarray:
-        """Of a touch that presses by this much."""
+        """(rows, columns) share of each newton of this touch."""
         if self._cells.cover.model == "point":  # where it does not depend on the force
             return pressed(self._cells, touch.x_mm, touch.y_mm, _PATCH_M)
         place = max(0.0, math.log(force_n / _LEAST_N) / math.log(_FINE))
@@ -95,13 +95,13 @@ class Switches:
 
 @functools.lru_cache(maxsize=2048)
 def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarray:
-    """(rows, columns) share of a force that comes to each switch, from a round patch of this radius on the cover."""
+    """(rows, columns) share of a force that reaches each switch, from a round patch of this radius on the cover."""
     part = Ellipse(radius_m, radius_m, x_mm * _MM, y_mm * _MM)
     return cells.forces_n([Load((part,), 1.0)])
 
 
 THRESHOLD_N = 2.0
-"""Of the whole push; noise of the sum is 0.09 N."""
+"""Threshold of the whole push; noise of the sum is 0.09 N."""
 GAIN_N = 0.02
 """Newtons per step of the converter."""
 ZERO = 1000
@@ -109,11 +109,11 @@ SIGMA_N = 0.05
 RING_MM = 75.0
 
 FIRST_NUMBER = 129 * 128 + 1
-"""Of a command; each of its two digits is above 0."""
+"""First command number; each of its two digits is above 0."""
 
 
 class UnitsUnderSheet:
-    """Three units at the corners of a triangle around the sheet's middle; the bumper weighs nothing."""
+    """Three units at the corners of a triangle around the sheet's middle, under a weightless bumper."""
 
     def __init__(self, case: Case, skin: Skin):
         turn = np.radians([90, 210, 330])
@@ -125,13 +125,13 @@ class UnitsUnderSheet:
         self._skin = skin
 
     def readings(self, forces_n: Sequence[float]) -> list[int]:
-        """Of all units, while the touches push like this."""
+        """Readings of all units under these touch forces."""
         loads = self._shares @ np.maximum(forces_n, 0.0) + SIGMA_N / GAIN_N * self._rng.standard_normal(3)
         found: list[int] = np.clip(np.rint(ZERO + loads), 0, 4095).astype(int).tolist()
         return found
 
     def commands(self) -> bytes:
-        """Zeros, and the threshold of the plain sum."""
+        """Commands that set the zeros and the threshold of the plain sum."""
         derived = self._skin.derived
         facts = UnitFacts.of(derived.units)
         wanted = [zero_value(facts, unit, ZERO) for unit in range(3)]
@@ -141,9 +141,9 @@ class UnitsUnderSheet:
 
 
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
-"""How a contact comes to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;
-zones over UART and the host; not at all, so that the torque limit alone is left; the pin of a board with pressure units
-and no switches; that of one with both."""
+"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;
+zones over UART and the host; none, leaving the torque limit; the pin of a board with pressure units alone; the pin of a
+board with both."""
 
 PINS = ("pin", "force", "both")
 UNITS = ("force", "both")
@@ -151,18 +151,18 @@ UNITS = ("force", "both")
 
 @dataclasses.dataclass(frozen=True)
 class Faults:
-    """What goes wrong, in s from the touch; None: nothing does."""
+    """Injected faults, in s from the touch; None: no fault."""
 
     board_dies_s: float | None = None
-    """Its pins stay as they are from then on."""
+    """Time from which the board's pins are frozen."""
     host_dies_s: float | None = None
-    """The program reads and says nothing from then on."""
+    """Time from which the host's program is silent."""
     noise_s: tuple[float, float] | None = None
-    """Every byte whose stop bit ends in this time has its lowest bit inverted."""
+    """Interval in which every byte (by its stop bit) has its lowest bit inverted."""
 
 
 class CourseStep(NamedTuple):
-    """A step of the course."""
+    """A sample of the course."""
 
     time_s: float
     angle_rad: float
@@ -170,17 +170,17 @@ class CourseStep(NamedTuple):
     current_a: float
     sensor_nm: float
     force_n: float
-    """Of all touches."""
+    """Total force of all touches."""
     indentation_m: float
-    """The deepest."""
+    """The deepest indentation."""
     closed: bool
-    """Whether any switch is."""
+    """Whether any switch is closed."""
     contact: bool
-    """What the controller knows of it."""
+    """Whether the controller knows of the contact."""
 
 
 class World:
-    """One run. Time 0 is the first touch; :meth:`clock` counts from the board's power-up, as a port does."""
+    """One run. Time 0 is the first touch; :meth:`clock`, like a port, counts from power-up."""
 
     def __init__(self, case: Case, way: str, skin: Skin, latency_s: float = 0.0, faults: Faults | None = None):
         self.case = case
@@ -188,9 +188,9 @@ class World:
         self.controller = Controller(case)
         self.course: list[CourseStep] = []
         self.heard: list[tuple[float, int]] = []
-        """What the host said: when it came to the controller, and the number of zones."""
+        """Host reports: time of arrival at the controller, and number of zones."""
         self.detected_s: float | None = None
-        """When the first contact was known to the controller's input."""
+        """Time at which the first contact reached the controller's input."""
         self.peak_n = 0.0
         """The largest force so far."""
         self._way, self._latency_s = way, latency_s
@@ -224,7 +224,7 @@ class World:
         return self.clock() - self.case.run.lead_s
 
     def delivered(self) -> bytes:
-        """What came to the host's program since it was asked last."""
+        """Bytes that reached the host's program since the last call."""
         data, self._bytes = self._bytes, b""
         return data
 
@@ -235,13 +235,13 @@ class World:
             self._board.send(data)
 
     def say(self, zones: int) -> None:
-        """The host's program tells the controller how many zones there are; that takes its time."""
+        """Report the number of zones to the controller, after the host's delay."""
         at = self.time_s + self.case.usb.host_s
         self.heard.append((at, zones))
         self._changes.append((at, zones > 0))
 
     def step(self) -> None:
-        """Go on by one step of the integrator."""
+        """Advance by one integrator step."""
         case, now = self.case, self.time_s
         forces = self._plant.forces(now, self._state)
         self._press(self._switches.at(now, forces.contact_n))
@@ -292,21 +292,21 @@ class World:
             self._board.press(cells)
 
     def _load(self, forces_n: Sequence[float]) -> None:
-        """What the units feel changes with every step."""
+        """Apply the forces to the units, which change with every step."""
         if self._under is not None and self._board is not None and not self._dead():
             self._catch_up()
             self._board.load(self._under.readings(forces_n))
 
     def _learn(self, now: float) -> None:
-        """Bring what has come to the controller by now into its input; a pin is looked at when it samples."""
+        """Move what arrived by now into the controller's input; a pin is read at its samples."""
         while self._changes and self._changes[0][0] <= now + 1e-9:
             at, self._level = self._changes.popleft()
             if self._level and self.detected_s is None:
                 self.detected_s = at
 
     def _catch_up(self) -> None:
-        """Run the board to the plant's time, unless it died before. It need not run along with every step: nothing
-        passes between the two but at a change of the switches, a sample of the controller, a frame of the host."""
+        """Run the board to the plant's time, unless it is dead. It runs only on demand: at a switch change, a
+        controller sample or a host frame."""
         board, lead, hz = self._board, self.case.run.lead_s, self._clock_hz
         if board is None:
             return

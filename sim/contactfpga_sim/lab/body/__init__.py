@@ -1,1 +1,1 @@
-"""What docs/body.md says of links, registration and folds, by simulation."""
+"""Simulations for docs/body.md of links, registration and folds."""

@@ -1,4 +1,5 @@
-"""A cover that folds at a joint and presses switches: how much of that is marked, and which touches are by mistake."""
+"""A cover that folds at a joint and presses switches: the share of folds that is marked, and of touches marked by
+mistake."""
 
 from __future__ import annotations
 
@@ -16,15 +17,15 @@ from contactfpga_sim.model.scenes.scene import Contact, Scene
 SKIN = Skin(report="cells")
 BEGINS_RAD, RANGE_RAD = 0.6, 2.0
 OFF_RAD = 0.01
-"""Standard deviation of the angle that is told from the one at which the cover folds."""
+"""Standard deviation of the reported angle from the one at which the cover folds."""
 FLICKER = 0.3
-"""Chance of a cell at the fold's rim to be open."""
+"""Chance that a cell at the fold's rim is open."""
 FINGER_MM = 9.0
 
 
 def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray:
-    """(rows, columns) bool: from 0.6 rad on a crease across rows 0 to 3 that grows with the angle. Without ``rng`` all
-    that it can press."""
+    """(rows, columns) bool: from 0.6 rad on, a crease across rows 0 to 3 that grows with the angle. Without ``rng``:
+    all cells it can press."""
     cells = np.zeros((SKIN.rows, SKIN.columns), bool)
     if rng is not None:
         angle_rad += OFF_RAD * rng.standard_normal()
@@ -54,7 +55,7 @@ def frame_of(cells: np.ndarray, skin: Skin = SKIN) -> Zones:
 
 
 def learned(sweeps: int, rng: np.random.Generator, frames: int = 400) -> Folds:
-    """Over the joint's range, there and back so many times."""
+    """Folds learned over ``sweeps`` of the joint's range, there and back."""
     angles = np.tile(np.linspace(0, RANGE_RAD, frames), sweeps)
     return learn("joint", ((angle, frame_of(fold(angle, rng))) for angle in angles.tolist()))
 
@@ -64,19 +65,19 @@ class Rates:
     """Shares from 0 to 1."""
 
     folds: float
-    """Of zones that only the fold makes: marked, as they should be."""
+    """Share of fold-only zones that are marked, as they should be."""
     apart: float
-    """Of touches that are a zone of their own, while the cover is folded: marked by mistake."""
+    """Share of separate touches marked by mistake while the cover is folded."""
     joined: float
-    """Of touches that share a zone with the fold: marked by mistake."""
+    """Share of touches joined to the fold's zone that are marked by mistake."""
     within: float
-    """Of touches all of whose cells the fold can press: marked. No switch can tell them from the fold."""
+    """Share of touches marked whose cells the fold can all press, so that no switch can distinguish them."""
     straight: float
-    """Of touches with the joint where nothing folds, anywhere on the sheet: marked by mistake."""
+    """Share of touches anywhere marked by mistake with the joint straight."""
 
 
 def rates(sweeps: int, count: int = 400, seed: int = 1) -> Rates:
-    """Learn, then look at folds and touches that were not learned from."""
+    """Learn, then judge new folds and touches."""
     rng = np.random.default_rng(seed)
     known = learned(sweeps, rng)
     seen: dict[str, list[bool]] = {name: [] for name in ("folds", "apart", "joined", "within", "straight")}

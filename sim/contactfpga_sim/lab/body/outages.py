@@ -1,4 +1,4 @@
-"""What a body says of a link whose board is unplugged, muted or exchanged: how soon, and how soon it is back."""
+"""Status of a link whose board is unplugged, muted or exchanged: time until noticed and until restored."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BEFORE_S = 0.05
 
 
 class Socket:
-    """A port in simulated time, behind which boards come and go."""
+    """A port in simulated time at which boards are exchanged."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -33,28 +33,28 @@ class Socket:
         self._random = np.random.default_rng(1)
 
     def plug(self, skin: Skin = SKIN) -> None:
-        """A board that was just powered."""
+        """Connect a freshly powered board."""
         self.flash(skin)
         self.plugs += 1
 
     def flash(self, skin: Skin = SKIN) -> None:
-        """Another bitstream, or the same anew; the port stays."""
+        """Load a bitstream; the port stays."""
         self.board = VirtualBoard(skin, "two_fingers")
         self._held.clear()
 
     def unplug(self) -> None:
-        """Nothing is there."""
+        """Remove the board."""
         self.board = None
         self.plugs += 1
 
     def opened(self, plan: Plan) -> contactfpga.Board:
-        """What a reader opens."""
+        """Open the port, as a reader does."""
         if self.board is None:
             raise contactfpga.PortNotFound("no such port")
         return contactfpga.open(HeldPort(self), plan.skin, timeout=0.2)
 
     def pass_(self, seconds: float) -> bytes:
-        """What comes in this time at most."""
+        """Let this time pass; returns what arrived."""
         assert self.board is not None
         before = self.board.clock()
         data = self.board.read(seconds)
@@ -68,7 +68,7 @@ class Socket:
 
 
 class HeldPort:
-    """The port as long as what was behind it is."""
+    """A port that lives as long as its board."""
 
     def __init__(self, socket: Socket):
         self._socket, self._plug = socket, socket.plugs
@@ -78,7 +78,7 @@ class HeldPort:
             raise contactfpga.PortLost("the port is gone")
 
     def read(self, seconds: float) -> bytes:
-        """What comes, or nothing after this time."""
+        """Bytes that arrive within this time."""
         self._check()
         until = self._socket.now + seconds
         while not (data := self._socket.pass_(max(1e-6, until - self._socket.now))) and self._socket.now < until:
@@ -101,7 +101,7 @@ class HeldPort:
 
 @dataclasses.dataclass(frozen=True)
 class Outage:
-    """A fault, its end, and what the link is meanwhile."""
+    """A fault, its end, and the expected status in between."""
 
     name: str
     begin: Callable[[Socket], object]
@@ -129,20 +129,20 @@ OUTAGES = (
 
 @dataclasses.dataclass(frozen=True)
 class OutageTimes:
-    """What the body said."""
+    """Statuses and times that the body reported."""
 
     statuses: tuple[str, ...]
-    """In their order."""
+    """Statuses in order."""
     noticed_s: float
-    """From the fault to the status that tells it."""
+    """Time from the fault to the status that reports it."""
     back_s: float
-    """From its end to ok."""
+    """Time from the fault's end to ok."""
     stale: int
-    """Looks at which a frame from before passed for a new one, later than the link's ``late_s``."""
+    """Looks at which an old frame passed for a new one, beyond the link's ``late_s``."""
 
 
 def play(outage: Outage, folder: Path) -> OutageTimes:
-    """Run it; ``folder`` gets the Skin's file. Raises RuntimeError where the body never says so."""
+    """Run the outage; ``folder`` gets the Skin's file. Raises RuntimeError if the body never reports it."""
     (folder / "skin.toml").write_text(SKIN.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
     socket = Socket()
@@ -167,7 +167,7 @@ def play(outage: Outage, folder: Path) -> OutageTimes:
 def _until(
     reader: LinkReader, socket: Socket, status: str, seen: list[str], fresh_until_s: float = float("inf")
 ) -> int:
-    """Go on until the link has this status; at how many looks it was ok for too long."""
+    """Advance until the link has this status; returns the number of looks at which it was ok for too long."""
     end_s, stale = socket.now + LONGEST_S, 0
     while (found := reader.state().status) != status:
         if not seen or seen[-1] != found:

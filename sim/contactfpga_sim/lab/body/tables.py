@@ -28,7 +28,7 @@ from contactfpga_sim.model.scenes.scene import Contact, Scene, scene
 FINGER_MM = 9.0
 MARGIN_MM = 15.0
 PLACED_MM = 1.0
-"""Standard deviation, along each of two directions, of a finger from the point that it is to press."""
+"""Standard deviation of the finger's position, along each of two directions."""
 SKINS = {
     "plane, 16x16, 10 mm": Skin(),
     "cylinder, radius 45 mm": Skin(surface="cylinder", radius_mm=45.0, pitch_x_mm=17.0),
@@ -37,24 +37,24 @@ SKINS = {
 
 @dataclasses.dataclass(frozen=True)
 class RegistrationErrors:
-    """Of many registrations."""
+    """Errors over many registrations."""
 
     refused: float
-    """Share that was refused."""
+    """Share of registrations refused."""
     wrong: float
-    """Share of the rest with the wrong way of mounting."""
+    """Share of the accepted with the wrong mounting."""
     middle_mm: float
-    """Error of the sheet's middle, RMS."""
+    """RMS error of the sheet's middle."""
     turned_deg: float
-    """Error of its angles, RMS."""
+    """RMS error of its angles."""
     residual_mm: float
-    """That was told, RMS."""
+    """RMS of the reported residual."""
 
 
 def placement_errors(
     skin: Skin, points: int, folder: Path, *, normals: bool, count: int = 200, seed: int = 1
 ) -> RegistrationErrors:
-    """Random poses and mountings, random points, a finger that is off by a millimeter or so."""
+    """Errors over random poses, mountings and points, with an imprecise finger."""
     (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
     rng = np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def placement_errors(
 
 
 def _pressed(true: Plan, rng: np.random.Generator, normals: bool) -> Press:
-    """A point of the link that a finger is to press, and the zone that it makes."""
+    """A random point of the link, and the zone that pressing it makes."""
     skin = true.skin
     wide, high = (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm
     while True:
@@ -106,7 +106,7 @@ SWEEPS = (1, 2, 5, 10)
 
 
 def outages_table() -> str:
-    """What becomes of a link."""
+    """Table of link outages."""
     rows = [("fault", "states of the link", "reported after, s", "ok again after, s")]
     with tempfile.TemporaryDirectory() as folder:
         for outage in outages.OUTAGES:
@@ -121,7 +121,7 @@ def _seconds(value: float) -> str:
 
 
 def registration_table() -> str:
-    """How well a sheet is found."""
+    """Table of registration errors."""
     head = ("sheet", "points", "refused, %", "wrongly mirrored, %", "middle off by, mm", "turned by, degrees")
     rows: list[tuple[str, ...]] = [(*head, "residual, mm")]
     with tempfile.TemporaryDirectory() as folder:
@@ -139,7 +139,7 @@ def registration_table() -> str:
 
 
 def folds_table() -> str:
-    """How many zones are marked."""
+    """Table of marked zones."""
     head = ("times over the range", "folds, %", "touches apart from the fold, %", "touches joined with it, %")
     rows: list[tuple[str, ...]] = [(*head, "touches within it, %", "touches, joint straight, %")]
     return writer.table_of([*rows, *map(_folds, SWEEPS)])

@@ -1,4 +1,4 @@
-"""Measures what the C header takes on microcontrollers, and writes it into its page."""
+"""Measures the C header's needs on microcontrollers, and writes them into its page."""
 
 from __future__ import annotations
 

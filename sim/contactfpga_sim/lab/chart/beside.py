@@ -1,4 +1,4 @@
-"""What the chart draws beside its points: walls that no method passes, and rivals that are no method of ours."""
+"""Walls and rivals in the chart: limits that no method passes, and other kinds of sensors."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from contactfpga_sim.lab.covers import COVERS
 from contactfpga_sim.model.scenes.families import touches
 
 PITCH_MM = 6.4
-"""Of the tiles under which other ways to read a sheet are drawn."""
+"""Pitch of the tiles under which rivals are drawn."""
 
 TOUCHES = 50
-"""The most of each family for such a point; a page has a table of them in its place."""
+"""Most touches per family for a rival's point; a page has a table instead."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RivalMethod:
-    """A modeled way to read contacts that is not one of the chart's methods."""
+    """A modeled rival, which is not one of the chart's methods."""
 
     name: str
     family: str
     touch_us: Quantile
-    """Median from the first touch of the foam to what the method's points count, too."""
+    """Median from the first touch of the foam, as for the methods' points."""
     errors: dict[str, Interval]
     """By metric, against the contacts."""
 
 
 def least_mm(task: Task) -> Interval | None:
-    """The least mean error of the barycenter in mm that any method can have from this task's cells, from below; None
-    for families of several contacts, and where no contact is felt."""
+    """Lower bound in mm of the mean barycenter error of any method on this task's cells; None for several contacts, or
+    if none is felt."""
     if task.family not in floor.ONE:
         return None
     try:
@@ -49,13 +49,13 @@ def least_mm(task: Task) -> Interval | None:
 
 
 def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
-    """The same points, with the least error that any method can have from their cells."""
+    """The points with :func:`least_mm` filled in."""
     least = executor.map(least_mm, [point.task for point in points])
     return [dataclasses.replace(point, least_mm=value) for point, value in zip(points, least, strict=True)]
 
 
 def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
-    """Each other way to read a sheet, on each family, under tiles of :data:`PITCH_MM`; drawn with the word "model"."""
+    """Each rival on each family, under tiles of :data:`PITCH_MM`; drawn with the word "model"."""
     lines, cover = round(EXTENT_MM / PITCH_MM), COVERS["tiles"](PITCH_MM)
     skin = Skin(rows=lines, columns=lines, pitch_x_mm=PITCH_MM, pitch_y_mm=PITCH_MM, connectivity=4)
     found = []
@@ -69,8 +69,7 @@ def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
 
 
 def bits_us(points: Sequence[Point]) -> float:
-    """Microseconds that the bits of the shortest frame take that one of these points sends, at the baud rate that most
-    of them have."""
+    """Microseconds of the bits of the points' shortest frame, at the most common baud rate."""
     bauds = [point.task.skin.baud for point in points]
     usual = max(dict.fromkeys(bauds), key=bauds.count)
     return min(point.times.lower_bound_us for point in points if point.task.skin.baud == usual)

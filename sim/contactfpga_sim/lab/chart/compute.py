@@ -1,4 +1,4 @@
-"""The points of the chart: every method on every family of scenes, worked out in pieces by any executor."""
+"""The points of the chart: every method on every family of scenes, in pieces for any executor."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
-"""Those of the chart unless others are asked for."""
+"""Families of the chart by default."""
 
 PIECE = 100
-"""Placements that are worked out together."""
+"""Placements per piece of work."""
 
 TIMED = 200
-"""So many of the placements are also timed, each as one touch."""
+"""Placements that are also timed, each as one touch."""
 
 DEVICE = sizes.UP5K
-"""For which LUT4 and clock are given."""
+"""Device of the LUT4 counts and clocks."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,23 +48,23 @@ class Task:
     """Placements."""
     seed: int
     checked: int = 2
-    """This many of the touches go through the gateware, too."""
+    """Touches that also go through the gateware."""
 
 
 KINDS = ("total", "labeller", "sensing")
-"""Errors: of the method's zones against the contacts; of these zones against the connected pieces of the pressed cells;
-of these pieces against the contacts."""
+"""Errors: of the method's zones against the contacts; of these zones against the connected pieces of the cells; of
+these pieces against the contacts."""
 
 Found = dict[str, dict[str, list[float]]]
-"""By kind and metric, a value per scene."""
+"""A value per scene, by kind and metric."""
 
 Look = tuple[np.ndarray, list[errors.Blob]]
-"""(R, C) bool, the pressed cells, and what there is to be found."""
+"""(R, C) bool pressed cells, and the true contacts."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Point:
-    """What came of a task."""
+    """Results of a task."""
 
     task: Task
     errors: dict[str, dict[str, Interval]]
@@ -73,9 +73,9 @@ class Point:
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
-    """What the host takes to label the cells, where it does; of the machine at hand, so of two runs never the same."""
+    """Labelling time on this host, if it labels; it varies between runs."""
     least_mm: Interval | None = None
-    """The least mean error of the barycenter that any method can have from these cells, where it was worked out."""
+    """Lower bound of any method's mean barycenter error on these cells, if computed."""
 
 
 def study(
@@ -85,11 +85,11 @@ def study(
     step: Callable[[str, int], None] = lambda name, of: None,
     so_far: dict[Task, Point] | None = None,
 ) -> list[Point]:
-    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece. A point is put
-    into ``so_far`` as soon as its errors and times are known; its size comes last.
+    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece. A point enters
+    ``so_far`` once its errors and times are known, before its size.
 
-    What was worked out before with the same code is taken from the cache. ``executor`` is that of a process pool, or
-    any other with the same interface, a Dask cluster's for instance.
+    Results of the same code come from the cache. ``executor`` is a process pool's or one with its interface, for
+    instance Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
     parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {
@@ -127,7 +127,7 @@ def _sized(point: Point, size: sizes.Size) -> Point:
 
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
-    """By kind and metric, over all pieces."""
+    """Intervals by kind and metric, over all pieces."""
     return {
         kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
@@ -135,7 +135,7 @@ def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
 
 
 def accuracy(task: Task, first: int) -> Found:
-    """Errors of one piece of a task's placements once all forces have risen, by kind and metric."""
+    """Errors by kind and metric of one piece of a task's placements, once all forces have risen."""
 
     def new() -> Found:
         scenes = _touches(task, first)
@@ -158,12 +158,12 @@ def _touches(task: Task, first: int) -> list[Scene]:
 
 
 def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    """A scene at an instant."""
+    """The pressed cells and contacts of a scene at an instant."""
     return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
 
 
 def compared(looks: Iterable[Look], skin: Skin) -> Found:
-    """Errors of a Skin's zones."""
+    """Errors of a Skin's zones on these looks."""
     found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
     for cells, there in looks:
         for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):
@@ -189,7 +189,7 @@ def _key(task: Task, kind: str, number: int) -> str:
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:
-    """Numbers of the (time, error) points that no other one beats in one and equals in the other, by rising time."""
+    """Indexes of the Pareto-optimal (time, error) points, by rising time."""
     order = sorted(
         (time, error, index) for index, (time, error) in enumerate(points) if np.isfinite([time, error]).all()
     )
@@ -202,18 +202,17 @@ def front(points: Iterable[tuple[float, float]]) -> list[int]:
 
 
 def reached_us(point: Point) -> float:
-    """Median from the first touch of the foam to the zones at the host, labelled there if need be."""
+    """Median from the first touch of the foam to the zones at the host, with host labelling if needed."""
     return point.times.touch_median_us.value + point.host_us
 
 
 def covered(task: Task) -> bool:
-    """Whether there is a cover, so that forces count: all but the bare sheet."""
+    """Whether forces count: true for all but the bare sheet."""
     return not times.at_once(task.cover)
 
 
 def to_build(points: Sequence[Point]) -> str:
-    """The method under a cover that miscounts the least share of scenes, in the mean over the families; of several
-    alike the first one."""
+    """The covered method with the smallest mean share of miscounted scenes over the families; the first of equals."""
     shares: dict[str, list[float]] = {}
     for point in points:
         if covered(point.task):

@@ -1,4 +1,4 @@
-"""How far the zones of a method are from what touches the sheet, and from the cells that are pressed."""
+"""Distance of a method's zones from the contacts, and from the pressed cells."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ class Blob:
 
 @dataclasses.dataclass(frozen=True)
 class Errors:
-    """Of one scene: what was found, against what there is."""
+    """Errors of one scene, found against true."""
 
     miscounted: bool
-    """Another number of them was found."""
+    """Whether the number found is wrong."""
     missed: float
-    """Share of those there are that nothing was found for."""
+    """Share of the true ones without a partner."""
     barycenter_mm: float
-    """Mean distance between each that was found and what it was found for; NaN where there is no pair."""
+    """Mean distance of matched pairs; NaN without pairs."""
     area: float
-    """Mean of the same pairs: difference of their areas over the true one; NaN where there is no pair."""
+    """Mean area difference of matched pairs over the true area; NaN without pairs."""
 
 
 METRICS = tuple(field.name for field in dataclasses.fields(Errors))
 
 
 def errors(found: Sequence[Blob], there: Sequence[Blob]) -> Errors:
-    """Each found one is paired with one that is there, so that the distances add up to the least."""
+    """Errors under the pairing with the smallest sum of distances."""
     pairs = _pairs(found, there)
     distances = [math.dist((one.x_mm, one.y_mm), (other.x_mm, other.y_mm)) for one, other in pairs]
     areas = [abs(one.area_mm2 - other.area_mm2) / other.area_mm2 for one, other in pairs]
@@ -67,7 +67,7 @@ def _pairs(found: Sequence[Blob], there: Sequence[Blob]) -> list[tuple[Blob, Blo
 
 
 def contacts(truth: Truth) -> list[Blob]:
-    """What touches the sheet."""
+    """The contacts as blobs."""
     return [Blob(one.area_mm2, one.x_mm, one.y_mm) for one in truth.contacts]
 
 
@@ -77,7 +77,7 @@ def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
 
 
 def method_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
-    """What the Skin's labeller takes for zones, or with ``report = "cells"`` the host; rounded if the board divides."""
+    """Zones by the Skin's labeller, or by the host with ``report = "cells"``; rounded if the board divides."""
     if skin.report == "cells":
         return exact_zones(cells, skin)
     work = label.labelling(cells, skin.connectivity, skin.labeller)
@@ -92,7 +92,7 @@ def _blob(moments: tuple[int, int, int], skin: Skin) -> Blob:
 
 
 def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
-    """The same with the barycenter that a board sends with ``report = "barycenter"``."""
+    """A zone with the barycenter rounded as a board with ``report = "barycenter"`` sends it."""
     area, *sums = moments
     x, y = (barycenter(total, area, skin.barycenter_bits) / 2**skin.barycenter_bits for total in sums)
     return Blob(area * skin.pitch_x_mm * skin.pitch_y_mm, x * skin.pitch_x_mm, y * skin.pitch_y_mm)
@@ -100,7 +100,7 @@ def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
 
 @dataclasses.dataclass(frozen=True)
 class Interval:
-    """A mean with the 95 % interval in which it lies."""
+    """A mean with its 95 % interval."""
 
     mean: float
     low: float
@@ -109,7 +109,7 @@ class Interval:
 
 
 def interval(values: Sequence[float]) -> Interval:
-    """Of values, NaN left out: Student's with many degrees of freedom, or Wilson's where all are shares 0 or 1."""
+    """Interval of the values without NaN: normal approximation, or Wilson's if all are shares 0 or 1."""
     known = np.array([value for value in values if not math.isnan(value)], float)
     n = len(known)
     if not n:
@@ -125,18 +125,18 @@ def interval(values: Sequence[float]) -> Interval:
 
 @dataclasses.dataclass(frozen=True)
 class Quantile:
-    """A quantile with the 95 % interval in which that of all values lies that could have been drawn."""
+    """A quantile with its 95 % interval."""
 
     value: float
     low: float
     high: float
-    """Infinite where there are too few values to say."""
+    """Upper end; infinite if there are too few values."""
     count: int
 
 
 def quantile(values: Sequence[float], share: float) -> Quantile:
-    """The least value that at least this share of the values does not exceed; infinite values are values, too. The
-    interval is by ranks (binomial), so it holds whatever the distribution."""
+    """The least value that at least this share of values does not exceed; infinite values count. The interval is by
+    ranks (binomial), valid for any distribution."""
     ordered = sorted(values)
     n = len(ordered)
     if not n:

@@ -1,12 +1,11 @@
-"""The least mean distance from a contact's barycenter that any method can have which sees the closed cells alone.
+"""The least mean barycenter error of any method that sees only the closed cells.
 
-Scenes of one contact are drawn at random, away from the sheet's edge. Those that close the same cells, moved, mirrored
-or turned, cannot be told apart: the best that can be said of them is their geometric median, seen from the cells. Its
-mean distance is the floor. From a finite number of scenes there are two estimates of it: a median of the scenes that it
-is then held against is too close to them, so the floor lies above; a median of other scenes is a method that one could
-use, so the floor lies below.
+Scenes of one contact are drawn at random, away from the edge. Scenes with the same cells, up to moves, mirrors and
+turns, cannot be distinguished: the best estimate is their geometric median. Its mean distance is the floor. Finite
+samples give two estimates: a median judged on its own scenes is optimistic, so the floor is above; a median judged on
+other scenes is a usable method, so the floor is below.
 
-No switch's own closing force is known to these methods, only how closing forces are spread.
+The methods know the spread of closing forces, not each switch's own.
 """
 
 from __future__ import annotations
@@ -27,22 +26,22 @@ from contactfpga_sim.model.scenes.families import placements
 from contactfpga_sim.model.scenes.scene import Scene
 
 ONE = ("finger", "bumper")
-"""Families of one contact that are the same turned and mirrored."""
+"""Families of one contact that are symmetric under turns and mirrors."""
 
 INNER = 12
-"""Pitches of the square in which contacts lie."""
+"""Side in pitches of the square that holds the contacts."""
 
 FOLDS = 10
-"""Each tenth of the scenes is held against medians of the other nine."""
+"""Folds of cross-validation: each tenth is judged by medians of the other nine."""
 
 DOUBT = 4.0
-"""Scenes' worth of weight that the barycenter keeps in a median which is to serve for other scenes."""
+"""Weight, in scenes, of the barycenter in a median for other scenes."""
 
 ROUNDS = 40
-"""Of Weiszfeld's iteration to a median."""
+"""Rounds of Weiszfeld's iteration for a median."""
 
 LEAST = 1e-6
-"""Distance in pitches below which a scene no longer pulls more at its median."""
+"""Distance in pitches below which a scene's pull on its median stops growing."""
 
 _MIRRORED = [np.diag(signs) for signs in ((1, 1), (-1, 1), (1, -1), (-1, -1))]
 _TURNED = _MIRRORED + [turn[::-1] for turn in _MIRRORED]
@@ -50,37 +49,37 @@ _TURNED = _MIRRORED + [turn[::-1] for turn in _MIRRORED]
 
 @dataclasses.dataclass(frozen=True)
 class Floor:
-    """What methods can reach on a family of scenes; distances in mm, of the scenes in which a switch closed."""
+    """Limits of methods on a family of scenes; distances in mm, over scenes in which a switch closed."""
 
     felt: Interval
-    """Share of the scenes in which one did."""
+    """Share of scenes in which a switch closed."""
     barycenter_mm: Interval
-    """Of the connected pieces of the cells."""
+    """Error of the barycenter of the connected cells."""
     lower_mm: Interval
-    """The floor lies above this, but for chance."""
+    """Statistical lower bound of the floor."""
     upper_mm: Interval
-    """The floor lies below this, but for chance."""
+    """Statistical upper bound of the floor."""
     table_mm: Interval
-    """What a :class:`PlaceTable` made of other scenes reaches, from area and sums alone."""
+    """Error of a :class:`PlaceTable` made of other scenes, from area and sums alone."""
     patterns: int
-    """That were told apart."""
+    """Number of distinct patterns."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """n scenes in which a switch closed, as they are and turned and mirrored in the other T - 1 ways."""
+    """n scenes in which a switch closed, in all T turns and mirrors."""
 
     offsets: np.ndarray
     """(n, T, 2) from the barycenter of the closed cells to the contact's, in pitches."""
     patterns: np.ndarray
-    """(n, T) int, the number of its pattern."""
+    """(n, T) int pattern numbers."""
     moments: np.ndarray
-    """(n, T, 3) int: area, and what is left of the sums of columns and rows after division by it."""
+    """(n, T, 3) int: area, and remainders of the column and row sums after division by it."""
 
 
 def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> Floor:
-    """The floor of ``count`` scenes of a family, one of :data:`ONE` with its options, under a cover, None for a bare
-    sheet. Of the Skin pitch and connectivity count, not the size. Raises ValueError."""
+    """The floor of ``count`` scenes of a family, one of :data:`ONE`, under a cover, None for a bare sheet. Only pitch
+    and connectivity of the Skin count. Raises ValueError."""
     sheet, scenes = inner(family, skin, count, seed, **options)
     pitch = np.array([skin.pitch_x_mm, skin.pitch_y_mm])
     cells = [scene.pressed(scene.settled_s, sheet, cover) for scene in scenes]
@@ -103,7 +102,7 @@ def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, *
 
 
 def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> PlaceTable:
-    """The table of ``count`` scenes, which are those of :func:`floor`: what a host places zones of one contact by."""
+    """The table of the ``count`` scenes of :func:`floor`, by which a host places zones of one contact."""
     sheet, scenes = inner(family, skin, count, seed, **options)
     cells = [(scene, scene.pressed(scene.settled_s, sheet, cover)) for scene in scenes]
     found = seen([(scene, one) for scene, one in cells if one.any()], sheet)
@@ -115,7 +114,7 @@ def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: 
 
 
 def inner(family: str, skin: Skin, count: int, seed: int, **options: Any) -> tuple[Skin, list[Scene]]:
-    """Scenes of one contact, and a sheet of the Skin's pitch on which they lie anywhere but near the edge."""
+    """Scenes of one contact away from the edge, and a sheet of the Skin's pitch for them."""
     if family not in ONE:
         raise ValueError(f"family {family!r} has no floor here; take one of {', '.join(ONE)}")
     contacts = [scene.contacts[0] for scene in placements(family, count, seed, skin, **options)]
@@ -136,7 +135,7 @@ def _moved(contact: Contact, x_mm: float, y_mm: float) -> Scene:
 
 
 def seen(felt: Sequence[tuple[Scene, np.ndarray]], skin: Skin) -> Seen:
-    """What is seen of scenes and their (R, C) bool cells, some of which are closed in each."""
+    """Observations of scenes and their (R, C) bool cells, some closed in each."""
     turns = np.array(_TURNED if skin.pitch_x_mm == skin.pitch_y_mm else _MIRRORED)
     pitch = np.array([skin.pitch_x_mm, skin.pitch_y_mm])
     offsets, patterns, moments = [], [], []
@@ -155,20 +154,19 @@ def seen(felt: Sequence[tuple[Scene, np.ndarray]], skin: Skin) -> Seen:
 
 
 def _pattern(at: np.ndarray) -> bytes:
-    """The same for (n, 2) int cells wherever they lie, in any order."""
+    """A key of (n, 2) int cells that ignores position and order."""
     moved = at - at.min(axis=0)
     return np.sort(moved[:, 0] * 1000 + moved[:, 1]).tobytes()
 
 
 def numbered(values: np.ndarray) -> np.ndarray:
-    """(n, T) int: the number of each of (n, T, k) values, the same for the same ones."""
+    """(n, T) int: the number of each distinct one of (n, T, k) values."""
     _, numbers = np.unique(values.reshape(-1, values.shape[-1]), axis=0, return_inverse=True)
     return np.reshape(numbers, values.shape[:-1])
 
 
 def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, folds: int) -> Interval:
-    """Of each scene from the median of those with its number; with several folds, from what was learned of these in
-    other folds than its own."""
+    """Distances of scenes from the median of their number; with several folds, from medians of the other folds."""
     places, found = offsets * pitch_mm, np.zeros(len(offsets))
     count = int(numbers.max()) + 1
     if folds == 1:
@@ -183,15 +181,14 @@ def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, f
 
 
 def _learned(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count, 2) medians of (n, T, 2) places by (n, T) numbers, drawn to the barycenter where few scenes say so."""
+    """(count, 2) medians of (n, T, 2) places by (n, T) numbers, drawn to the barycenter if scenes are few."""
     scenes = np.bincount(numbers.ravel(), minlength=count) / numbers.shape[1]
     medians = geometric_medians(places.reshape(-1, 2), numbers.ravel(), count)
     return medians * (scenes / (scenes + DOUBT))[:, None]
 
 
 def geometric_medians(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count, 2): for each number, the point from which the (n, 2) places of that number are nearest in the mean; 0 for
-    one that has none (Weiszfeld)."""
+    """(count, 2) geometric medians (Weiszfeld) of the (n, 2) places by number; 0 for a number without places."""
     weights = np.ones(len(places))
     medians = np.zeros((count, 2))
     for _ in range(ROUNDS):

@@ -1,6 +1,6 @@
-"""The README's picture: what to build, and what the other covers and pitches come to, for one family of scenes.
+"""The README's picture: the method to build, and the other covers and pitches, for one family.
 
-The family is `fingers`: two to five fingertips anywhere on 160 mm by 160 mm, where cover and pitch make a difference.
+The family is `fingers`: two to five fingertips anywhere on 160 mm by 160 mm, where cover and pitch matter.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ FAMILY = "fingers"
 
 
 def save(points: Sequence[Point], path: Path, rivals: Sequence[RivalMethod] = ()) -> Path:
-    """Draw the points of :data:`FAMILY`; what to build goes by all families. The same points give the same file."""
+    """Draw the points of :data:`FAMILY`; the recommendation is over all families. The same points give the same
+    file."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture(points, rivals), path)
 
 
 def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figure:
-    """Scenes miscounted, and the error of the barycenter, over the time from the first touch of the foam."""
+    """Miscounted scenes and barycenter error over the time from the first touch of the foam."""
     figure = style.new(4.3)
     method = to_build(points)
     (best,) = [point for point in points if (point.task.method, point.task.family) == (method, FAMILY)]
@@ -40,7 +41,7 @@ def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figu
 
 
 def title(best: Point) -> str:
-    """What to build, and how well it counts."""
+    """The recommended method, and how well it counts."""
     found = best.errors["total"]["miscounted"]
     share = f"{100 * found.mean:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f})"
     return f"Two to five fingers. Ringed, what to build: {best.task.method}. Miscounted: {share}"

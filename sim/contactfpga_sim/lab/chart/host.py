@@ -1,6 +1,6 @@
-"""Zones of a frame of cells, labelled on the host as people do it today: OpenCV's connected components.
+"""Zones of a frame of cells labelled on the host with OpenCV's connected components.
 
-How long that takes depends on the machine: a time here is of the one the chart is made on.
+Times depend on the machine that makes the chart.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, float, float]
 
 
 def label_us(frames: Sequence[np.ndarray], connectivity: int) -> float:
-    """Microseconds that :func:`zones` takes for a frame: the median over frames of the median of many calls."""
+    """Microseconds of :func:`zones` per frame: the median over frames of the median of many calls."""
     return statistics.median(statistics.median(_once(cells, connectivity) for _ in range(REPEATS)) for cells in frames)
 
 
@@ -39,7 +39,7 @@ def _once(cells: np.ndarray, connectivity: int) -> float:
 
 
 def timed(point: Point) -> Point:
-    """The same point with the host's time, where the host labels."""
+    """The point with the host's time, if the host labels."""
     task = point.task
     if task.skin.report != "cells":
         return point

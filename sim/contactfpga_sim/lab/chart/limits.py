@@ -19,7 +19,7 @@ from contactfpga_sim.model.scenes.families import touches
 
 PITCHES_MM = (5.0, 6.4, 8.0, 10.0)
 SCENES = 4000
-"""For each floor."""
+"""Scenes for each floor."""
 
 KNOWN_MM = 7.0
 """Radius of the finger whose size is known."""
@@ -33,11 +33,11 @@ CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     ),
     "bumper": ("bumper", {}, ("bare", "tiles")),
 }
-"""By name: family, its options, and the covers under which it is looked at."""
+"""By name: family, its options, and covers."""
 
 RIVAL_PITCHES_MM = (6.4, 10.0)
 TOUCHES = 300
-"""For each rival."""
+"""Touches for each rival."""
 
 
 def floor_table() -> str:
@@ -63,7 +63,7 @@ def floor_table() -> str:
 
 
 def measured(name: str, cover: str, pitch_mm: float, count: int = SCENES) -> Floor:
-    """One of the table."""
+    """One floor of the table."""
     family, options, _ = CONTACTS[name]
     skin = Skin(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     return floor(family, skin, COVERS[cover](pitch_mm), count, 0, **options)
@@ -82,7 +82,7 @@ def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
 
 
 def rivals_table() -> str:
-    """Each rival on two pitches of tiles, for the family of several fingers."""
+    """Each rival at two pitches of tiles, for several fingers."""
     head = (
         "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
     )  # fmt: skip
@@ -113,7 +113,7 @@ def rival_line(name: str, pitch_mm: float, count: int = TOUCHES) -> str:
 
 
 def rivals_notes() -> str:
-    """What each model assumes."""
+    """Assumptions of each model."""
     notes: dict[str, list[str]] = {}
     for name, rival in RIVALS.items():
         notes.setdefault(rival.note, []).append(name)

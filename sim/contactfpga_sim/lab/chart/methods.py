@@ -14,36 +14,35 @@ EXTENT_MM = 160.0
 """Width and height of every sheet."""
 
 PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
-"""The one under which methods are compared comes first."""
+"""Pitches, first the one that compares methods."""
 
 PITCH_MM = PITCHES_MM[0]
 
 THRESHOLDS_N = (0.2, 0.6, 1.0)
-"""Forces that close a switch, beside the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
+"""Closing forces of switches, besides the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
 
 MOST_ZONES = 32
-"""In a frame of every method, enough for any scene here: for all that 4-connected cells could make, `run` and the
-divider would need longer row times on the finest sheets."""
+"""Zones per frame of every method, enough for all scenes here. More would need longer row times for `run` and the
+divider on the finest sheets."""
 
 
 class Method(NamedTuple):
-    """A Skin and what lies over its switches."""
+    """A Skin and its cover."""
 
     skin: Skin
     cover: Cover | None
-    """None: a bare sheet, where a switch closes when its middle lies under a contact, whatever the force."""
+    """None: a bare sheet, where a switch closes at any force if its middle is under a contact."""
 
 
 def sheet(pitch_mm: float, **settings: Any) -> Skin:
-    """A square sheet of :data:`EXTENT_MM` with switches ``pitch_mm`` apart, 4-connected unless ``settings`` say
-    otherwise."""
+    """A square sheet of :data:`EXTENT_MM`, 4-connected by default."""
     lines = round(EXTENT_MM / pitch_mm)
     given: dict[str, Any] = {"connectivity": 4, "zone_capacity": MOST_ZONES} | settings
     return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **given)
 
 
 def under(cover: str, name: str, pitch_mm: float, more: str = "", **settings: Any) -> dict[str, Method]:
-    """One method by its name: ``name`` at a pitch under a cover, one of :data:`contactfpga_sim.lab.covers.COVERS`."""
+    """One method: ``name`` at a pitch under a cover, one of :data:`contactfpga_sim.lab.covers.COVERS`."""
     whole = f"{name}, {pitch_mm:g} mm, {cover}" + (f", {more}" if more else "")
     return {whole: Method(sheet(pitch_mm, **settings), COVERS[cover](pitch_mm))}
 
@@ -68,7 +67,7 @@ def _methods() -> dict[str, Method]:
 
 
 def _settings() -> dict[str, Method]:
-    """Other ways to find zones, to scan and to send, under tiles at :data:`PITCH_MM`."""
+    """Other ways to label, scan and send, under tiles at :data:`PITCH_MM`."""
     debounced: dict[str, Any] = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
     ways: list[tuple[str, str, dict[str, Any]]] = [
         ("run", "8-connected", {"connectivity": 8}),
@@ -99,4 +98,4 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
-"""By name, the plainest first; each one has gateware, and its time comes from the golden model of that gateware."""
+"""By name, the plainest first; each has gateware, and its time is from that gateware's golden model."""

@@ -1,4 +1,4 @@
-"""The chart's numbers: a line per point, written as CSV and read back."""
+"""The chart's numbers as CSV, a line per point."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contactfpga_sim.lab.chart.times import Times
 
 QUANTILES = ("touch_median_us", "touch_q95_us", "electric_median_us", "electric_q95_us")
 ENDS = ("", "_low", "_high", "_count")
-"""After a name, the fields of its interval."""
+"""Suffixes of the fields of an interval."""
 ERRORS = tuple(f"{kind}_{name}" for kind in KINDS for name in METRICS)
 SINGLE = ("bytes", "lower_bound_us", "host_us", "luts", "fmax_mhz")
 FIELDS = (
@@ -28,7 +28,7 @@ FIELDS = (
 
 
 def command(point: Point) -> str:
-    """What works out this point alone."""
+    """The command that computes this point alone."""
     task = point.task
     return (
         f'contactfpga study chart --method "{task.method}" --family {task.family} --placements {task.count} '
@@ -73,7 +73,7 @@ def _fields(name: str, found: Interval | Quantile, form: str) -> dict[str, objec
 
 
 def read(path: Path, methods: Mapping[str, Method] = METHODS) -> list[Point]:
-    """What :func:`write` wrote, rounded as it was written; ``methods``: what each one is, by its name."""
+    """The rounded points that :func:`write` wrote; ``methods``: by name."""
     with open(path, newline="", encoding="utf-8") as file:
         return [_point(line, methods) for line in csv.DictReader(file)]
 

@@ -1,4 +1,4 @@
-"""The chart as small multiples: a row of panels for each family of scenes, a column for each error."""
+"""The chart as small multiples: a row of panels per family, a column per error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.covers import COVERS
 
 MARKERS = "sv^oDp"
-"""By pitch, the finest first."""
+"""Markers by pitch, the finest first."""
 
 COLORS = {
     "tiles": style.BLUE,
@@ -31,13 +31,13 @@ COLORS = {
     "other covers": style.PURPLE,
     "model": style.GREEN,
 }
-"""By cover; and for what is no method of ours."""
+"""Colors by cover, and of the rivals."""
 
 MISSED = 0.05
-"""From this share of contacts on, a mark is hollow: its error of the barycenter is that of the contacts found."""
+"""Share of missed contacts from which a mark is hollow: its barycenter error is of the found ones only."""
 
 LINEAR = 0.01
-"""Shares below are drawn on a linear scale, so that 0 has its place; those above in powers of ten."""
+"""Limit between the linear scale, which shows 0, and the logarithmic one."""
 
 SMALL: dict[str, Any] = {"fontsize": style.SMALL}
 
@@ -50,7 +50,7 @@ class Metric(NamedTuple):
     scale: dict[str, Any]
     ticks: tuple[float, ...]
     ends: tuple[float, float]
-    """Of the axis, unless a point lies beyond."""
+    """Ends of the axis, extended if a point is beyond."""
     show: Callable[[float], str]
 
 
@@ -66,7 +66,7 @@ TIMES_US = {
 """Ticks."""
 
 NEVER_US = 500_000.0
-"""Where what is not felt at all in the median is drawn."""
+"""Where a median that is never felt is drawn."""
 
 ENDS_US = (40.0, 800_000.0)
 ALONG = "first touch of the foam to last byte, median"
@@ -125,7 +125,7 @@ def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rival
 
 
 def error(point: Point, name: str) -> float:
-    """Mean of the method's zones against the contacts."""
+    """Mean error of the method's zones against the contacts."""
     return point.errors["total"][name].mean
 
 
@@ -140,14 +140,14 @@ def hollow(point: Point) -> bool:
 
 
 def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
-    """An axis' usual ends, or such that all values lie between them."""
+    """Axis ends, extended to hold all values."""
     finite = [value for value in values if math.isfinite(value)]
     least, most = min(finite, default=usual[0]), max(finite, default=usual[1])
     return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)
 
 
 def markers(points: Sequence[Point]) -> dict[float, str]:
-    """By pitch in mm."""
+    """Markers by pitch in mm."""
     pitches = {skin.pitch_x_mm for skin, _ in METHODS.values()} | {point.task.skin.pitch_x_mm for point in points}
     return {pitch: MARKERS[index % len(MARKERS)] for index, pitch in enumerate(sorted(pitches))}
 
@@ -157,7 +157,7 @@ def _along(us: float) -> float:
 
 
 def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
-    """Alike for all families."""
+    """Set the axes alike for all families."""
     never = any(math.isinf(reached_us(point)) for point in points)
     ticks = TIMES_US | ({NEVER_US: "never"} if never else {})
     panel.set_xscale("log")
@@ -177,7 +177,7 @@ def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
 
 
 def _walls(panel: Any, metric: Metric, some: Sequence[Point], method: str) -> None:
-    """The time that the bits need; and the least error that any method can have from the best cells."""
+    """Draw the time that the bits need, and the least error of any method on the best cells."""
     wall: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.4, "linestyle": style.DASHES[1], "zorder": 2}
     if math.isfinite(least := bits_us(some)):
         panel.axvline(least, **wall)
@@ -204,7 +204,7 @@ def _mark(panel: Any, point: Point, place: tuple[float, float], shapes: dict[flo
 
 
 def legend(points: Sequence[Point], rivals: Sequence[RivalMethod]) -> tuple[list[Line2D], list[str]]:
-    """Lines and words for what is drawn."""
+    """Lines and words of the legend."""
     mark: dict[str, Any] = {"linestyle": "", "markersize": 6}
     used = {cover_of(point.task.method) for point in points} | ({"model"} if rivals else set())
     pitches = {point.task.skin.pitch_x_mm for point in points}

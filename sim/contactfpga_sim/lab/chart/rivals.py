@@ -1,7 +1,7 @@
-"""Other ways to read a sheet, as models under the same mechanics: no real device was measured.
+"""Other sensors as models under the same mechanics: no real device was measured.
 
-Each looks at the same scenes through the same cover. What an element of an analog array reads, how long a
-microcontroller takes and what parts cost are assumptions; each one has its name here.
+Each sees the same scenes through the same cover. Readings of analog elements, microcontroller times and part costs are
+assumptions, named here.
 """
 
 from __future__ import annotations
@@ -27,36 +27,36 @@ Readings = Callable[[Scene, float, Skin, Cover | None, Random], np.ndarray]
 """(R, C) readings of a scene at a time in s, above 0 where an element is touched."""
 
 STRIPS = 4
-"""Groups of rows, each of which is looked at in the middle of its time."""
+"""Groups of rows, each read at the middle of its time."""
 
 HALVINGS = 14
-"""Of the time in which forces rise, until it is known when the first element is touched."""
+"""Bisections of the rise time to find the first touched element."""
 
 # ---- an analog array
 
 BITS = 8
 FULL_N = 10.0
-"""Force on an element that gives the greatest reading."""
+"""Force on an element at full scale."""
 NOISE_COUNTS = 1.0
-"""Standard deviation of a reading, in steps of the converter."""
+"""Standard deviation of a reading, in converter steps."""
 CROSSTALK = 0.01
 """Share of an element's force that each of its four neighbors reads."""
 GAIN_SPREAD = 0.05
-"""Relative standard deviation of the elements' gains, once calibrated."""
+"""Relative standard deviation of calibrated gains."""
 THRESHOLD_N = 0.4
-"""From which on an element is touched: the closing force of the studies' domes."""
+"""Force from which an element is touched: the closing force of the studies' domes."""
 HEAD_BYTES = 4
-"""Of an array's frame, in front of a byte for each element."""
+"""Header of an array's frame, before a byte per element."""
 
 # ---- a microcontroller: 64 pins, about 50 of them for lines; USB is full speed
 
 MCU_HZ = 100e6
 ROW_CYCLES = 60
-"""To drive a row, wait for it apart, and read a port or two."""
+"""Cycles to drive a row, wait, and read a port or two."""
 CELL_CYCLES = 15
-"""To store and label a cell in software."""
+"""Cycles to store and label a cell in software."""
 SEND_CYCLES = 500
-"""To make a frame and hand it to the UART or the USB peripheral, which sends it while the next scan runs."""
+"""Cycles to make a frame and hand it to the UART or USB peripheral, which sends during the next scan."""
 USB_SLOT_US, USB_BIT_US = 1000.0, 1 / 12
 
 # ---- rough prices of parts in USD, boards and the elements themselves not counted: assumed, no offers
@@ -67,48 +67,48 @@ DIODE_USD, AMPLIFIER_USD = 0.02, 0.8
 
 @dataclasses.dataclass(frozen=True)
 class Pace:
-    """Times in us of a method on a sheet; scans follow one another, and of those that are ready the newest is sent."""
+    """Times in us of a method on a sheet; scans repeat, and the newest ready one is sent."""
 
     scan_us: float
-    """From the first row to the last, spread evenly."""
+    """From the first row to the last, evenly spread."""
     work_us: float
-    """From a scan's end until its frame can be sent."""
+    """Time from a scan's end until its frame is ready."""
     loop_us: float
-    """From a scan to the next."""
+    """Scan period."""
     wire_us: float
-    """That a frame is on the wire."""
+    """Time of a frame on the wire."""
     slot_us: float = 0.0
-    """Between two instants at which a frame may be sent; 0: at any."""
+    """Interval between instants for sending; 0: any."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """A model of another way to read a sheet."""
+    """A model of another kind of sensor."""
 
     note: str
-    """What is assumed."""
+    """Assumptions of the model."""
     readings: Readings
     pace: Callable[[Skin], Pace]
     cost_usd: Callable[[Skin], float]
-    """Rough, of parts."""
+    """Rough cost of parts."""
 
     def wires(self, skin: Skin) -> int:
-        """Lines of the sheet."""
+        """Number of the sheet's lines."""
         return skin.rows + skin.columns
 
     def zones(self, scene: Scene, skin: Skin, cover: Cover | None) -> list[Blob]:
-        """What it finds once all forces have risen; noise goes by the scene."""
+        """Zones found once all forces have risen; the scene seeds the noise."""
         rng = np.random.default_rng(zlib.crc32(repr(scene).encode()))
         return _blobs(self.readings(scene, scene.settled_s, skin, cover, rng), skin)
 
     def errors(self, scene: Scene, skin: Skin, cover: Cover | None) -> errors.Errors:
-        """Against what touches the sheet by then."""
+        """Errors against the contacts at that time."""
         there = errors.contacts(scene.truth(scene.settled_s, skin))
         return errors.errors(self.zones(scene, skin, cover), there)
 
     def time_us(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
-        """From the first touch of the foam, at 0 s of a scene whose forces rise, to the last byte on the host of the
-        first frame that reports a contact; infinite where none does. ``rng`` draws where in its round the scan is."""
+        """Time from the first touch of the foam, at 0 s of a scene with rising forces, to the last byte of the first
+        frame that reports a contact; infinite if none does. ``rng`` draws the scan's phase."""
         first_s = self._first_s(scene, skin, cover, rng)
         if not math.isfinite(first_s):
             return math.inf
@@ -129,7 +129,7 @@ class Rival:
         return math.inf
 
     def _first_s(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
-        """When the first element is touched, as good as noise allows; infinite where none ever is."""
+        """When the first element is touched, within noise; infinite if never."""
 
         def touched(seconds: float) -> bool:
             return bool(self.readings(scene, seconds, skin, cover, rng).any())
@@ -145,7 +145,7 @@ class Rival:
     def _scanned(
         self, scene: Scene, begin_us: float, scan_us: float, skin: Skin, cover: Cover | None, rng: Random
     ) -> np.ndarray:
-        """(R, C) readings of a scan that begins then."""
+        """(R, C) readings of a scan from ``begin_us``."""
         found = np.zeros((skin.rows, skin.columns))
         for number, rows in enumerate(np.array_split(np.arange(skin.rows), STRIPS)):
             seconds = (begin_us + (number + 0.5) / STRIPS * scan_us) * 1e-6
@@ -155,7 +155,7 @@ class Rival:
 
 
 def _blobs(readings: np.ndarray, skin: Skin) -> list[Blob]:
-    """Connected pieces of what is touched, in their middles, weighted by the readings."""
+    """Connected pieces of touched elements, with barycenters weighted by the readings."""
     numbers = labels.label(readings > 0, skin.connectivity).ravel()
     count = int(numbers.max(initial=0))
     rows, columns = (axis.ravel() for axis in np.indices(readings.shape))
@@ -167,16 +167,15 @@ def _blobs(readings: np.ndarray, skin: Skin) -> list[Blob]:
 
 
 def switches(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
-    """1 where a switch is closed. A bare sheet knows no force: there all that will be pressed is from the touch on."""
+    """1 for a closed switch. A bare sheet knows no force: all contacts close at the touch."""
     bare = cover is None or cover.model == "patch"
     return scene.pressed(scene.settled_s if bare else seconds, skin, cover).astype(float)
 
 
 def analog(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
-    """Steps of the converter of each element, 0 below the threshold.
+    """Converter steps of each element, 0 below the threshold.
 
-    An element takes the force that a switch's face or cap takes, and does not give way. On a bare sheet elements lie
-    side by side and take what presses on them.
+    An element takes the force of a switch's face or cap, and is rigid. On a bare sheet the elements are adjacent.
     """
     taken = cells_of(_elements(skin, cover), skin.rows, skin.columns, skin.pitch_x_mm * 1e-3, skin.pitch_y_mm * 1e-3)
     forces = taken.forces_n(scene.loads(seconds)) * _gains(skin.rows, skin.columns)
@@ -200,7 +199,7 @@ def _gains(rows: int, columns: int) -> np.ndarray:
 
 
 def _array_pace(rate_hz: float, skin: Skin) -> Pace:
-    """The frame rate falls where the wire is slower."""
+    """Pace of an array; a slow wire lowers the frame rate."""
     wire = 10e6 * (HEAD_BYTES + skin.rows * skin.columns) / skin.baud
     return Pace(1e6 / rate_hz, 0.0, max(1e6 / rate_hz, wire), wire)
 
@@ -223,7 +222,7 @@ def _mcu_usd(skin: Skin) -> float:
 
 
 def _cells_pace(skin: Skin) -> Pace:
-    """A board that sends rows as they are; the host's labelling comes after the last byte."""
+    """Pace of a board that sends plain rows; the host labels after the last byte."""
     sent = skin.replace(report="cells")
     derived = sent.derived
     scan = 1e6 * derived.frame_clocks / sent.clock_hz
@@ -235,7 +234,7 @@ def _cells_usd(skin: Skin) -> float:
 
 
 def frame_bytes(skin: Skin, items: int) -> int:
-    """Of a frame with so many items in our protocol, which a microcontroller may use as well."""
+    """Bytes of a frame with this many items in our protocol, which a microcontroller may use as well."""
     plain = items * skin.derived.item_bytes + skin.derived.trailer_bytes
     return plain + math.ceil(plain / 254) + CHECK_BYTES + 1
 

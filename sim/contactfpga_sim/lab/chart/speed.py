@@ -1,7 +1,6 @@
-"""Times by the golden model, a sample of them by the gateware, too.
+"""Times by the golden model, a sample also by the gateware.
 
-From touch to the last byte of the frame that holds all of it; of a scene that stays as it is, how long a frame takes,
-and how many come a second.
+From the touch to the last byte of its complete frame; for a constant scene, frame time and frame rate.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 
 FRAMES = 12
-"""Frames between which the rate is taken."""
+"""Frames that measure the rate."""
 
 WARM_US = 1500.0
-"""From power-up: by then the first hello is sent, and the link is at work."""
+"""Time after power-up by which the first hello is sent and the link works."""
 
 
 def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
-    """Clocks from the first row time of a frame to the end of its last byte, where nothing else is on the wire.
+    """Clocks from a frame's first row time to the end of its last byte, with nothing else on the wire.
 
-    ``cells``: (R, C) bool, pressed from the start; ``size``: bytes of their frame. The frame is one that the keep-alive
-    sends, with nothing changed.
+    ``cells``: (R, C) bool, pressed from the start; ``size``: bytes of their frame, which the keep-alive sends
+    unchanged.
     """
     if skin.derived.scan.waits:
         return _asked_clocks(skin, cells)
@@ -46,7 +45,7 @@ def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
 
 
 def _asked_clocks(skin: Skin, cells: np.ndarray) -> int:
-    """The same of a frame that the host asks for: a scan that waits would keep still for milliseconds."""
+    """:func:`frame_clocks` for a requested frame: a waiting scan would be still for milliseconds."""
     quiet = skin.replace(send="on_change")
     asked = round(WARM_US * skin.clock_hz / 1e6)
     received = requests([asked], skin.derived.bit_clocks)
@@ -60,20 +59,20 @@ def _asked_clocks(skin: Skin, cells: np.ndarray) -> int:
 
 
 def frames_per_second(skin: Skin, cells: np.ndarray, size: int) -> float:
-    """Frames of ``size`` bytes that leave in a second while (R, C) bool ``cells`` are pressed."""
+    """Frames of ``size`` bytes per second while (R, C) bool ``cells`` are pressed."""
     held = _held(skin.replace(send="always"), cells, (FRAMES + 4) * _longest(skin, size))
     ends = [got.last for got in held][-FRAMES - 1 :]
     return (len(ends) - 1) * skin.clock_hz / (ends[-1] - ends[0])
 
 
 def _longest(skin: Skin, size: int) -> int:
-    """Clocks that a frame takes at most, scan and wire."""
+    """Most clocks of a frame, scan and wire."""
     derived = skin.derived
     return derived.frame_clocks + 10 * derived.bit_clocks * size
 
 
 def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[ReceivedFrame]:
-    """Frames of a board on which ``cells`` are pressed from the start, once hello and debounce are over."""
+    """Frames of a board with ``cells`` pressed from the start, after hello and debounce."""
     debounce_us = skin.debounce_press_us if skin.debounce != "none" else 0.0
     settled = round(max(debounce_us, WARM_US) * skin.clock_hz / 1e6)
     trace = predict(skin, Timeline([(0, cells, None)]), settled + clocks)
@@ -81,13 +80,13 @@ def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[ReceivedFrame]:
 
 
 STEADY = 12
-"""This many scenes are also looked at while they stay as they are."""
+"""Scenes that are also measured while constant."""
 
 MOST_SCANS = 4000
-"""That a touch may take until it is reported."""
+"""Most scans until a touch is reported."""
 
 GOLDEN = 0.6180339887498949
-"""Its multiples lie evenly in a scan, whatever their number."""
+"""Golden ratio: its multiples sample a scan evenly, whatever their number."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,27 +96,27 @@ class Speed:
     median_us: float
     worst_us: float
     bound_us: float
-    """Median of what no scan that looks at each touched row alone can beat: (A + 1) row times, and the frame's bits."""
+    """Median lower bound of scans that visit touched rows alone: (A + 1) row times, and the frame's bits."""
     bytes: float
-    """Median of the frame's bytes on the wire."""
+    """Median number of bytes of the frame."""
     frame_us: float
-    """Once the scene stays as it is, from a frame's first row time to its last byte: median."""
+    """Median time from a frame's first row time to its last byte, for a constant scene."""
     frames_per_s: float
-    """Then, median."""
+    """Median frame rate of a constant scene."""
 
 
 def touch_cycle(skin: Skin, share: float) -> int:
-    """When a touch begins, after ``share`` of a scan."""
+    """Cycle of a touch after ``share`` of a scan."""
     scan = skin.derived.frame_clocks
     return int((math.ceil(WARM_US * skin.clock_hz / 1e6 / scan) + share) * scan)
 
 
 def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> tuple[int, int]:
-    """Clocks from the touch to the end of the last byte of the first frame with all of these (R, C) bool cells, which
-    close at once after ``share`` of a scan, and the frame's bytes.
+    """Clocks from the touch to the end of the first frame with all these (R, C) bool cells, which close at once after
+    ``share`` of a scan; and the frame's bytes.
 
-    With ``check`` the compiled gateware goes through the same; raises
-    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where it does anything else.
+    With ``check`` the compiled gateware must agree, else :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is
+    raised.
     """
     whole = int(cells.sum())
     return _until(skin, [(0, cells)], share, lambda frame: frame.cells == whole, check)
@@ -126,8 +125,8 @@ def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> t
 def first_report(
     skin: Skin, pieces: Sequence[tuple[int, np.ndarray]], share: float, check: bool = False
 ) -> tuple[int, int]:
-    """The same to the first frame with any cell. ``pieces``: from so many clocks after the touch on, these (R, C) bool
-    cells are closed; clocks rise from 0."""
+    """Clocks to the end of the first frame with any cell, and its bytes. ``pieces``: (clocks after the touch, rising
+    from 0, (R, C) bool closed cells); ``check`` as in :func:`touch`."""
     return _until(skin, pieces, share, lambda frame: frame.cells > 0, check)
 
 
@@ -150,10 +149,10 @@ def _until(
 
 
 def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
-    """The touches that (R, C) bool frames show, each at another instant of the scan.
+    """Speed over the touches of (R, C) bool frames, each at another phase of the scan.
 
-    The first ``checked`` of them go through the compiled gateware as well; raises
-    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where it differs from the golden model.
+    The first ``checked`` also go through the compiled gateware; raises
+    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` if it differs.
     """
     derived = skin.derived
     us = skin.clock_hz / 1e6

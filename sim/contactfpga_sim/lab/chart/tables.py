@@ -16,16 +16,16 @@ from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
 
 NUMBERS = Path("docs/chart/chart.csv")
-"""Of the chart that the page shows."""
+"""File of the numbers of the page's chart."""
 
 PLACEMENTS = 400
-"""Scenes of each point."""
+"""Scenes per point."""
 
 SHEETS = (16, 32, 64)
 
 
 def compute() -> list[Point]:
-    """Every point of the chart, as the file of its numbers has it."""
+    """Every point of the chart, from its CSV file."""
     tasks = [
         Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
     ]
@@ -53,12 +53,12 @@ HEAD = (
     "barycenter of found",
     "area of found",
 )
-"""Of a point's cells."""
+"""Headings of a point's cells."""
 
 
 def front_table(points: list[Point]) -> str:
-    """What to build by all families; then for each family the methods under a cover that no other beats in the time and
-    in the share of scenes miscounted."""
+    """The methods to build over all families; then per family the covered methods that are Pareto-optimal in time and
+    miscounted scenes."""
     lines = []
     method = to_build(points)
     for family in dict.fromkeys(point.task.family for point in points):
@@ -81,8 +81,7 @@ def methods_table(points: list[Point]) -> str:
 
 
 def families_table(points: list[Point]) -> str:
-    """Scenes miscounted and contacts missed by family; methods with the same cells that find the same share the line of
-    the first."""
+    """Miscounted scenes and missed contacts by family; methods with equal cells and results share a line."""
     families = list(dict.fromkeys(point.task.family for point in points))
     by = {(point.task.method, point.task.family): point for point in points}
     lines: dict[object, str] = {}
@@ -100,7 +99,7 @@ def _name(point: Point, build: str) -> str:
 
 
 def _cells(point: Point) -> tuple[str, ...]:
-    """For :data:`HEAD`."""
+    """Cells under :data:`HEAD`."""
     found, times = point.errors["total"], point.times
     electric = [f"{one.value + point.host_us:.0f}" for one in (times.electric_median_us, times.electric_q95_us)]
     touch = " / ".join(_ms(one.value + point.host_us) for one in (times.touch_median_us, times.touch_q95_us))
@@ -126,7 +125,7 @@ def _percent(share: Interval) -> str:
 
 
 def host_table() -> str:
-    """Zones from the board against cells labelled on the host: by sheet and number of touched places."""
+    """Board zones against host-labelled cells: by sheet and number of touches."""
     head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
     lines = []
     for size in SHEETS:
@@ -140,7 +139,7 @@ def host_table() -> str:
 
 
 def _later(skin: Skin, count: int) -> float:
-    """Microseconds by which the zones of this many contacts come later from the board than from the host."""
+    """Microseconds by which the board's zones of this many contacts are later than the host's."""
     cells = _contacts(skin, count)
     return _frame(skin, cells)[0] - _frame(skin.replace(report="cells"), cells)[0] - host.label_us([cells], 8)
 
@@ -156,7 +155,7 @@ def _rival_line(skin: Skin, count: int) -> str:
 
 
 def _contacts(skin: Skin, count: int) -> np.ndarray:
-    """(R, C) bool: switches that do not touch each other, spread over the sheet."""
+    """(R, C) bool: isolated switches, spread over the sheet."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     rows, columns = (skin.rows + 1) // 2, (skin.columns + 1) // 2
     chosen = np.linspace(0, rows * columns - 1, count).round().astype(int)
@@ -165,6 +164,6 @@ def _contacts(skin: Skin, count: int) -> np.ndarray:
 
 
 def _frame(skin: Skin, cells: np.ndarray) -> tuple[float, int]:
-    """From a frame's first row time to its last byte in us, and its bytes."""
+    """Time in us from a frame's first row time to its last byte, and its bytes."""
     _, size = speed.touch(skin, cells, 0.5)
     return speed.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size

@@ -1,7 +1,7 @@
 """From the first touch of the foam to the last byte of the first frame that reports a contact.
 
-Mechanics: with the force that rises, when which switch closes. Electronics: from the first closed switch on, by the
-golden model, on a board whose scan is anywhere in its round by then.
+Mechanics: switches close as the force rises. Electronics: the golden model from the first closed switch on, at a random
+phase of the scan.
 """
 
 from __future__ import annotations
@@ -20,45 +20,43 @@ from contactfpga_sim.lab.chart.errors import Interval, Quantile
 from contactfpga_sim.model.scenes.scene import Scene
 
 HALVINGS = 14
-"""Of the time in which the force rises, until it is known when the first switch closes: to 12 us where it rises for
-200 ms."""
+"""Bisections of the rise time to find the first closed switch: to 12 us for 200 ms."""
 
 LOOKS_S = (0.0, 1e-4, 2e-4, 4e-4, 8e-4)
-"""From the first closed switch on, when it is looked which ones are closed by then."""
+"""Times after the first closed switch at which closed cells are sampled."""
 
 Closing = tuple[float, list[tuple[float, np.ndarray]]]
-"""When the first switch closes in s after the touch, and from how many s later on which (R, C) bool cells are closed.
-"""
+"""Time in s of the first closed switch after the touch, and (R, C) bool cells by seconds after it."""
 
 Raw = dict[str, list[float]]
-"""By name of a time, a value for each touch."""
+"""A value per touch, by name of a time."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Times:
-    """Of a method's touches; all times in us."""
+    """Times of a method's touches, in us."""
 
     touch_median_us: Quantile
-    """From the first touch of the foam; a touch that no frame ever reports counts as infinite."""
+    """From the first touch of the foam; an unreported touch counts as infinite."""
     touch_q95_us: Quantile
     electric_median_us: Quantile
-    """Of the touches that close a switch: from the first closed one on."""
+    """From the first closed switch, over touches that close one."""
     electric_q95_us: Quantile
     not_felt: Interval
-    """Share of the touches that close no switch."""
+    """Share of touches that close no switch."""
     bytes: float
-    """Of the first frame: median."""
+    """Median bytes of the first frame."""
     lower_bound_us: float
-    """What the bits of these bytes take."""
+    """Time of these bytes' bits."""
 
 
 def at_once(cover: Cover | None) -> bool:
-    """Whether this is a bare sheet: it knows no force, so all that a contact presses closes at the touch."""
+    """Whether this is a bare sheet: without force, all of a contact closes at the touch."""
     return cover is None or cover.model == "patch"
 
 
 def closing(scene: Scene, skin: Skin, cover: Cover | None) -> Closing | None:
-    """How a touch closes switches; None where it closes none at its whole force."""
+    """How a touch closes switches; None if its full force closes none."""
     settled = scene.pressed(scene.settled_s, skin, cover)
     if not settled.any():
         return None
@@ -77,8 +75,8 @@ def closing(scene: Scene, skin: Skin, cover: Cover | None) -> Closing | None:
 
 
 def measured(scenes: Sequence[Scene], skin: Skin, cover: Cover | None, first: int, checked: int) -> Raw:
-    """Times of touches with the numbers from ``first`` on; those below ``checked`` also go through the compiled
-    gateware, which must agree in every clock, else :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is raised."""
+    """Times of touches numbered from ``first`` on; those below ``checked`` also go through the compiled gateware, which
+    must agree in every clock, else :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is raised."""
     found: Raw = {"touch": [], "electric": [], "bytes": []}
     for number, scene in enumerate(scenes, first):
         values = (math.inf, math.nan, math.nan)
@@ -93,7 +91,7 @@ def measured(scenes: Sequence[Scene], skin: Skin, cover: Cover | None, first: in
 
 
 def summed(pieces: Sequence[Raw], skin: Skin) -> Times:
-    """What a method's touches say together."""
+    """Times over all touches of a method."""
     touch, electric, sizes = ([value for piece in pieces for value in piece[name]] for name in pieces[0])
     closed = [value for value in electric if not math.isnan(value)]
     usual = errors.quantile([size for size in sizes if not math.isnan(size)], 0.5).value

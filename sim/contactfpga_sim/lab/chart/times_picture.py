@@ -1,4 +1,4 @@
-"""What mechanics costs and what electronics costs: a line for each method, for one family of scenes."""
+"""Cost of mechanics and of electronics: a line per method, for one family."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ TITLE = f"{FAMILY}, to the last byte of the first frame with a contact: median, 
 
 
 def save(points: Sequence[Point], path: Path) -> Path:
-    """Draw the points of one family; the same ones give the same file."""
+    """Draw the points of one family; the same points give the same file."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture([point for point in points if point.task.family == FAMILY]), path)
 
 
 def picture(points: Sequence[Point]) -> Figure:
-    """Methods from above in their order, times along."""
+    """Methods downward, time along."""
     figure = style.new(0.2 * len(points) + 1.3)
     panel = figure.subplots()
     bits, electric, touch = PARTS.values()

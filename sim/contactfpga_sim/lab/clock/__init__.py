@@ -1,1 +1,1 @@
-"""Board time on the host's clock, over simulated ways to the host."""
+"""Board time on the host's clock, over simulated transports."""

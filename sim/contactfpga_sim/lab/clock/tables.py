@@ -1,4 +1,4 @@
-"""Board time on the host's clock, over simulated ways to the host: the fit's errors, and the table of docs/clock.md."""
+"""Board time on the host's clock, over simulated transports: the fit's errors, and the table of docs/clock.md."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from contactfpga.driver.clock import ClockFit
 from contactfpga_sim.lab import writer
 
 SECONDS, SEEDS = 60.0, 8
-"""Of device time in each of so many runs."""
+"""Device time of each run, and number of runs."""
 WANDER_PPM, WANDER_S = 1.0, 60.0
-"""A crystal's rate goes up and down by this much in this time, with the temperature."""
+"""Swing of a crystal's rate with temperature, and its period."""
 SENT_S = 150e-6
-"""From the sample of a frame's first row to its last byte on the wire, of which WIRE_S are its bytes."""
+"""From the sample of a frame's first row to its last byte on the wire, WIRE_S of it for its bytes."""
 WIRE_S = 57e-6
 REQUEST_S, SCAN_S = 30e-6, 100e-6
-"""What a request takes on the wire, and the longest that it waits for the next scan."""
+"""Time of a request on the wire, and its longest wait for the next scan."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Path:
-    """How bytes come from the wire to the program."""
+    """Path of bytes from the wire to the program."""
 
     title: str
     tick_s: float
-    """They are handed over at multiples of this."""
+    """Delivery period to the program."""
     out_tick_s: float
-    """The same of requests, the other way."""
+    """Delivery period of requests to the board."""
     jitter_s: float
-    """Mean of what the host adds, exponentially distributed."""
+    """Mean delay of the host, exponentially distributed."""
     rate_hz: float = 1000.0
     """Frames per second."""
     asked_s: float = 1.0
-    """From request to request."""
+    """Interval of requests."""
     stall: float = 0.0
-    """Share of frames that wait for another 20 ms, as the host is busy."""
+    """Share of frames delayed by another 20 ms because the host is busy."""
 
 
 PATHS = {
@@ -59,13 +59,13 @@ class Moment(NamedTuple):
     time_us: int
     arrived_s: float
     sampled_s: float
-    """On the host's clock: the truth."""
+    """True sample time on the host's clock."""
     asked_s: float | None
-    """When the request was sent that it answers first."""
+    """Sending time of the request that it answers first."""
 
 
 class FrameTimes(NamedTuple):
-    """What the fit says of frames, and the truth."""
+    """Fitted times of frames, and the truth."""
 
     found_s: np.ndarray
     sigma_s: np.ndarray
@@ -74,7 +74,7 @@ class FrameTimes(NamedTuple):
 
     @property
     def errors_s(self) -> np.ndarray:
-        """Of each frame."""
+        """Error of each frame."""
         return self.found_s - self.sampled_s
 
 
@@ -97,7 +97,7 @@ def moments(path: Path, ppm: float, seed: int, seconds: float = SECONDS) -> Iter
 
 
 def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTimes:
-    """Have a fit follow frames."""
+    """Feed frames to a fit."""
     fit = fit or ClockFit()
     rows = []
     for moment in frames:
@@ -111,22 +111,22 @@ def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTime
 
 
 class Accuracy(NamedTuple):
-    """Over all runs of a path, the first second of each left out; times in s."""
+    """Errors over all runs of a path, without each first second; times in s."""
 
     late_s: float
-    """Mean of arrival less sample."""
+    """Mean delay from sample to arrival."""
     error_s: float
-    """Median size of the error."""
+    """Median magnitude of the error."""
     worst_s: float
     """99 % of errors are at most this."""
     sigma_s: float
-    """Median of the stated uncertainty."""
+    """Median stated uncertainty."""
     within: float
-    """Share of errors of at most two of them."""
+    """Share of errors within two stated uncertainties."""
 
 
 def accuracy(path: Path, seeds: int = SEEDS, seconds: float = SECONDS) -> Accuracy:
-    """Over clocks that are off by -80 to 80 ppm."""
+    """Accuracy over clocks that are off by -80 to 80 ppm."""
     runs = []
     for seed in range(seeds):
         ppm = -80 + 160 * seed / max(1, seeds - 1)
@@ -150,7 +150,7 @@ HEAD = (
 
 
 def accuracy_table(names: Iterable[str] = PATHS) -> str:
-    """Over simulated ways."""
+    """Accuracy over simulated transports."""
     rows: list[tuple[str, ...]] = [HEAD]
     for path in (PATHS[name] for name in names):
         found = accuracy(path)

@@ -1,4 +1,4 @@
-"""Measures what it takes to join zones over the seam of a closed sheet, and writes it into the page on labelling."""
+"""Measures the cost of joining zones over the seam of a closed sheet, and writes it into docs/labelling.md."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contactfpga_sim.model.golden import volume
 
 CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]
 COLUMNS = 8
-"""Of the sheet whose every last two rows are looked at."""
+"""Columns of the sheet whose every last two rows are tried."""
 AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": True}
 
 
@@ -26,7 +26,7 @@ def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> 
 
 
 def clocks_table() -> str:
-    """The last record of every pair of last rows, and bounds."""
+    """The time of the last record over every pair of last rows, and bounds."""
     head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
     bounds = [f"bound of {lines} columns" for lines in size.SIZES]
     rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))
@@ -48,7 +48,7 @@ def names(labeller: Labeller, connectivity: int) -> tuple[str, str]:
 
 
 def worst(labeller: Labeller, connectivity: int) -> list[str]:
-    """Clocks from the last row to the last record, at most over all last two rows, of an open and a closed sheet."""
+    """Most clocks from the last row to the last record over all last two rows, of an open and a closed sheet."""
     cells = 2 * COLUMNS
     numbers = np.arange(1 << cells)[:, None] >> np.arange(cells) & 1
     frames = numbers.astype(bool).reshape(-1, 2, COLUMNS)
@@ -57,7 +57,7 @@ def worst(labeller: Labeller, connectivity: int) -> list[str]:
 
 
 def most(labeller: Labeller, connectivity: int) -> list[str]:
-    """What no closed sheet exceeds: the end mark comes a clock later."""
+    """Bound for every closed sheet: the end mark is a clock later."""
     skins = (skin_of(lines, connectivity, labeller, True) for lines in size.SIZES)
     return [str(skin.derived.label_clocks - 1) for skin in skins]
 

@@ -1,1 +1,1 @@
-"""Formulas for covers of foam against integrals and the paper."""
+"""Formulas for foam covers against integrals and the paper."""

@@ -1,6 +1,6 @@
-"""What each way to lay foam on switches makes of a light finger: the tables and the picture of the cover's first part.
+"""Light fingers on each arrangement of foam on switches: tables and picture of the cover's first part.
 
-One switch force, one finger and one sheet; foam, faces and caps differ.
+Switch force, finger and sheet are fixed; foam, faces and caps differ.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ LINES = 16
 """Rows and columns of the sheet."""
 
 PLACES = 1000
-"""Of the finger."""
+"""Places of the finger."""
 
 PROUD_MM = 0.5
-"""How far caps stand above what lies between them, where foam may sag that far."""
+"""Height of caps above their surroundings, into which foam may sag."""
 
 FLUSH = 0.8
-"""Side of a flush cap, of the pitch."""
+"""Side of a flush cap over the pitch."""
 
 
 def _flush_face(pitch_mm: float, force_n: float) -> Cover:
@@ -71,14 +71,14 @@ KINDS = {
 
 
 def felt_table() -> str:
-    """Forces from which a finger is felt, by pitch, kind of cover and the switch's force."""
+    """Smallest felt finger forces, by pitch, kind of cover and switch force."""
     head = ["pitch", "what the foam presses", "one switch takes, least"]
     head += [f"{force:g} N switch: {what}" for force in FORCES_N for what in ("50 %", "99 %", "worst")]
     return writer.table_of([head, *(_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS))])
 
 
 def felt_sample() -> str:
-    """The line of that table that is made fastest."""
+    """The fastest line of :func:`felt_table`."""
     return writer.line(_row(PITCHES_MM[-1], list(KINDS)[-1]))
 
 
@@ -98,11 +98,11 @@ def _newtons(force: Force | NoSolution) -> str:
 THICKNESSES_MM, SIDES_MM = (2.0, 5.0), (4.0, 6.0, 8.0, 9.0)
 SOFT_N_MM = covers.DOME.force_n / (1e3 * covers.DOME.travel_m)
 PLACES_MM = ((45.0, 45.0), (40.0, 45.0), (40.0, 40.0), (42.0, 43.0))
-"""On a cap, between two, between four and aside: from the corner of 8x8 caps, 10 mm apart."""
+"""On a cap, between two, between four and aside, from the corner of 8x8 caps at 10 mm pitch."""
 
 
 def elements_table() -> str:
-    """By how much the largest force on a switch is off from the boundary elements' at the worst of four places."""
+    """Deviation of the largest switch force from the boundary elements', at the worst of four places."""
     head = ["foam", "cap, pitch 10 mm", "flush, rigid", "proud, rigid", f"proud, on {SOFT_N_MM:g} N/mm"]
     rows = [head]
     for thickness, side in itertools.product(THICKNESSES_MM, SIDES_MM):
@@ -115,7 +115,7 @@ def elements_table() -> str:
 
 
 def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> float:
-    """The error with the largest size."""
+    """The error with the largest magnitude."""
     foam = FoamOnCaps(thickness_mm, side_mm, stiffness=stiffness, proud=proud)
     switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
     cells = Cells(
@@ -133,10 +133,10 @@ def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> 
 
 
 def sagging_n(cover: Cover, pitch_m: float, proud_m: float = PROUD_MM * 1e-3) -> float:
-    """The finger's force in N at which foam sags by ``proud_m`` in the middle of the gap between two caps.
+    """The finger's force in N at which foam sags by ``proud_m`` midway between two caps.
 
-    A strip clamped at both caps (Timoshenko) under the finger's mean pressure: w/p = 6/5 g^2/(8 G h) +
-    (1 - nu^2) g^4/(32 E h^3).
+    A strip clamped at both caps (Timoshenko) under the finger's mean pressure: w/p = 6/5 g^2/(8 G h) + (1 - nu^2)
+    g^4/(32 E h^3).
     """
     gap, thick = pitch_m - cover.side_m, cover.thickness_m
     shear = cover.modulus_pa / (2 * (1 + cover.poisson))
@@ -146,7 +146,7 @@ def sagging_n(cover: Cover, pitch_m: float, proud_m: float = PROUD_MM * 1e-3) ->
 
 
 def sagging_table() -> str:
-    """That force for proud caps under whole foam."""
+    """Sagging forces for proud caps under whole foam."""
     rows = [["pitch", "caps", "foam", f"sags by {PROUD_MM:g} mm from"]]
     for pitch, kind in itertools.product(PITCHES_MM, (_button, _caps)):
         cover = kind(pitch, 1.0)
@@ -165,7 +165,7 @@ _SHORT = ("flush face", "flush cap", "proud button", "proud caps, whole foam", "
 
 
 def draw(path: Path) -> Path:
-    """Cross sections of three covers, and the force that is felt along the diagonal from one switch to the next."""
+    """Cross sections of three covers, and the felt force along the diagonal between switches."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(4.4)
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
@@ -175,7 +175,7 @@ def draw(path: Path) -> Path:
 
 
 def _sections(place: Any) -> None:
-    """Three sketches, one above the other; lengths in mm, widened upward."""
+    """Three stacked sketches; lengths in mm, widened upward."""
     for number, (name, proud, cut) in enumerate(
         (
             ("flush: the base carries most", False, False),
@@ -228,7 +228,7 @@ def _diagonal(place: Any) -> None:
 
 
 def _felt_along(cover: Cover, pitch_mm: float, along_mm: np.ndarray) -> Iterator[float]:
-    """In N, with the middle of the finger so far from a switch along the diagonal."""
+    """Felt forces in N with the finger this far from a switch along the diagonal."""
     cells = Cells(cover, 10, 10, pitch_mm * 1e-3, pitch_mm * 1e-3)
     for away in along_mm:
         place = 4 * pitch_mm * 1e-3 + away * 1e-3 / math.sqrt(2)

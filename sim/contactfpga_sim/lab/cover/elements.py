@@ -1,8 +1,8 @@
-"""An elastic layer on rigid caps, by boundary elements: what :class:`contactfpga.design.cover.Cells` is held against.
+"""An elastic layer on rigid caps by boundary elements, the reference for :class:`contactfpga.design.cover.Cells`.
 
-The layer is free of friction above and below. By wave number k, with t = k h/2 and E' = E/(1 - nu^2), equal pressures p
-on both faces move each inward by 2 p/(E' k) sinh^2 t/(sinh t cosh t + t), opposite ones both along by
-2 p/(E' k) cosh^2 t/(sinh t cosh t - t). Lengths in mm, forces in N; the sheet repeats itself beyond its edges.
+The layer is frictionless above and below. By wave number k, with t = k h/2 and E' = E/(1 - nu^2), equal pressures p on
+both faces move each inward by 2 p/(E' k) sinh^2 t/(sinh t cosh t + t), opposite ones both along by 2 p/(E' k) cosh^2
+t/(sinh t cosh t - t). Lengths in mm, forces in N; the sheet repeats itself beyond its edges.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ STEP = 0.5
 class FoamOnCaps:
     """A layer of ``thickness`` over ``count`` by ``count`` square caps of ``side``, ``pitch`` apart.
 
-    ``stiffness``: N/mm of the switch under each cap; inf: rigid. ``proud``: nothing carries the foam between the caps;
-    else it lies on a rigid base there.
+    ``stiffness``: N/mm of the switch under each cap; inf: rigid. ``proud``: the foam hangs free between the caps; else
+    it is on a rigid base there.
     """
 
     def __init__(
@@ -63,7 +63,8 @@ class FoamOnCaps:
         return np.asarray(total, float).reshape(self.count, self.count)
 
     def _solved(self, pressure: Floats) -> Floats:
-        """The pressure below, by conjugate gradients: all that is held moves along, but for what the switches give."""
+        """The pressure below, by conjugate gradients: supported elements move together, except for the switches'
+        yield."""
         below = np.where(self.held, pressure.sum() / self.held.sum(), 0.0)
         rest = self._free(self._moves(pressure, below) - self._given(below))
         step, size = rest.copy(), (rest**2).sum()
@@ -79,11 +80,11 @@ class FoamOnCaps:
         raise AssertionError("the conjugate gradients did not converge")
 
     def _free(self, moved: Floats) -> Floats:
-        """Without the part in common, which is how deep the layer as a whole lies."""
+        """Remove the mean, the depth of the layer as a whole."""
         return np.where(self.held, moved - moved[self.held].mean(), 0.0)
 
     def _moves(self, above: Floats, below: Floats) -> Floats:
-        """How far the lower face moves down."""
+        """Displacement of the lower face, downward."""
         top, bottom = np.fft.fft2(above), np.fft.fft2(below)
         return np.fft.ifft2(self.opposite * (top - bottom) / 2 - self.equal * (top + bottom) / 2).real
 

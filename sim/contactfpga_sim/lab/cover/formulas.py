@@ -1,7 +1,6 @@
 """Speed against accuracy of the cover's formulas.
 
-Errors are the same everywhere; times are those of the machine on which it runs. The rules that fail are here and
-nowhere else.
+Times are of this machine. Failing rules are only here.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import LADDER, Model, PaddedSheet
 
 FLOOR = 1e-13
-"""Errors below this are those of the reference, and written as less than it."""
+"""Errors below this are the reference's own, and are written as "less than"."""
 
 STALLED = 200_000
-"""Steps after which Euler's method is given up."""
+"""Steps after which Euler's method is abandoned."""
 
 
 class Blow(NamedTuple):
-    """An impact whose time is asked for."""
+    """An impact whose duration is computed."""
 
     name: str
     arm: Arm
@@ -89,7 +88,7 @@ def _raw_gauss(nodes: int) -> Rule:
 
 
 def _off(share: float, nodes: int) -> Rule:
-    """delta = delta_c sin^2(phi) without the factor taken out, at a delta_c that is a little short."""
+    """delta = delta_c sin^2(phi) without factoring it out, at a slightly short delta_c."""
 
     def rule(blow: Blow) -> float:
         depth = blow.depth_m * (1 - share)
@@ -109,7 +108,7 @@ def _off_factored(share: float) -> Rule:
 
 
 def _euler(step_share: float) -> Rule:
-    """Explicit steps in time on v = sqrt(v^2(delta)); from rest it never leaves, and its end is a matter of luck."""
+    """Explicit time steps on v = sqrt(v^2(delta)); from rest it never starts, and its end is arbitrary."""
 
     def rule(blow: Blow) -> float:
         depth, step, count, end = 0.0, step_share * blow.depth_m / max(blow.speed_m_s, 0.1), 0, blow.depth_m
@@ -167,19 +166,19 @@ FAILING: dict[str, Rule] = {
     "Gauss-Legendre, 64": _raw_gauss(64),
     "16 nodes, sin², δ_c short by 1e-8": _off(1e-8, 16),
     "256 nodes, sin², δ_c short by 1e-8": _off(1e-8, 256),
-    "16 nodes, sin², that short, factored": _off_factored(1e-8),
+    "16 nodes factored, δ_c short by 1e-8": _off_factored(1e-8),
     "Euler on v = √v²(δ), 100 steps": _euler(0.01),
 }
 
 
 def relative_errors(rule: Rule) -> list[float]:
-    """By how much a rule is off for each of :data:`BLOWS`; NaN where it gives nothing."""
+    """Relative error of a rule for each of :data:`BLOWS`; NaN without a result."""
     with np.errstate(all="ignore"):
         return [rule(blow) / _adaptive(blow) - 1 for blow in BLOWS]
 
 
 def seconds(call: Callable[[], object], repeats: int = 5) -> float:
-    """The shortest of some runs, each long enough to be timed."""
+    """The shortest of several runs, each long enough to time."""
     call()
     count, took = 1, 0.0
     while took < 2e-3:
@@ -208,7 +207,7 @@ BALLS = {"R* = 2 mm, E* = 1 MPa": Ball(2e-3, 1e6), "R* = 0.1 mm, E* = 10 MPa": B
 
 
 def sense_errors(model: Model, ball: Ball) -> list[float]:
-    """Closing force by a model over that by the reference, minus 1, at each of :data:`PLACES`."""
+    """Relative error of a model's closing force at each of :data:`PLACES`."""
     sheet = PaddedSheet(SWITCH, THICKNESS_M, ball)
     found = []
     for ratio in PLACES:

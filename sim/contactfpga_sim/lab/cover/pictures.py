@@ -1,4 +1,4 @@
-"""Pictures of the cover's formulas: their error over the time that they take on this machine."""
+"""Pictures of the cover's formulas: error over computing time on this machine."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from contactfpga import picture_style as style
 from contactfpga_sim.lab.cover import formulas as measured
 
 LEAST_SHARE = 1e-3
-"""Errors below are drawn on a linear scale, so that 0 has its place."""
+"""Errors below are on a linear scale, which shows 0."""
 
 SHORTER = 1e-9
-"""What counts as a shorter line, of the axes' length; rounding does not."""
+"""Smallest gain, of the axes' length, that counts as a shorter line, above rounding."""
 
 Point = tuple[float, float]
 
 
 def study(path: Path) -> Path:
-    """Error over time of the rules for the compression time, and of the models of sensitivity."""
+    """Error over time of the compression-time rules and the sensitivity models."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(7.6)
         above, below = figure.subplots(2, 1, height_ratios=(1.25, 1))
@@ -35,7 +35,7 @@ def study(path: Path) -> Path:
 
 
 def _rules(place: Any) -> None:
-    """Each rule by name in a column on the right, joined by lines that do not cross."""
+    """Rule names in a column on the right, joined by lines without crossings."""
     found = []
     for rules, color in ((measured.RULES, style.BLUE), (measured.FAILING, style.VERMILLION)):
         for name, rule in rules.items():
@@ -69,9 +69,9 @@ def _rules(place: Any) -> None:
 
 
 def uncrossed(starts: Sequence[Point], ends: Sequence[Point]) -> list[Point]:
-    """The ends in such an order that no two lines, each from a start to its end, cross.
+    """The ends reordered so that no two lines from start to end cross.
 
-    Two ends are swapped where that makes the lines shorter, as it does where they cross; so there is an end to it.
+    Swapping two ends of crossing lines shortens them, so the loop ends.
     """
     found = list(ends)
     while longer := [
@@ -86,7 +86,7 @@ def uncrossed(starts: Sequence[Point], ends: Sequence[Point]) -> list[Point]:
 
 
 def _models(place: Any) -> None:
-    """Every model with both balls; the errors at several offsets stand above one another."""
+    """Every model with both balls; errors at several offsets share a column."""
     place.set_xscale("log")
     place.set_yscale("symlog", linthresh=LEAST_SHARE)
     marks = dict(zip(measured.BALLS, ("o", "x")))

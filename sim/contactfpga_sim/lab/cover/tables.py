@@ -26,7 +26,7 @@ RESILIENCE = 4791.0
 
 
 class PaperClaim(NamedTuple):
-    """What the paper says, what follows, and what to make of it."""
+    """A claim of the paper, our result, and the verdict."""
 
     printed: str
     ours: str
@@ -34,7 +34,7 @@ class PaperClaim(NamedTuple):
 
 
 def rows() -> list[PaperClaim]:
-    """All of them, in the paper's order."""
+    """All claims, in the paper's order."""
     return [*_equations(), *_first_design(), *_thickness(), *_sensitivity(), *_experiment()]
 
 
@@ -232,7 +232,7 @@ def _rule_table(rules: dict[str, formulas.Rule]) -> str:
 
 
 def sense_table() -> str:
-    """Models of sensitivity: error against the reference, and time."""
+    """Sensitivity models: error against the reference, and time."""
     study = formulas
     rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES), "time"]]
     for model in study.LADDER:
@@ -245,20 +245,20 @@ def sense_table() -> str:
 
 
 def paper_table() -> str:
-    """What is printed, what we get, and the verdict."""
+    """Printed value, our value, and verdict."""
     lines = [(row.printed, row.ours, row.verdict) for row in rows()]
     return writer.table_of([("paper says", "we get", "verdict"), *lines])
 
 
 def thinning_table() -> str:
-    """The first design as the reaction gets faster."""
+    """The first design with ever faster reactions."""
     head = (
-        "reaction after",
-        "foam that lasts 4/3 of it",
-        "pressed in",
+        "reaction time",
+        "modulus for a compression of 4/3 of this time",
+        "indentation",
         "peak force",
-        "the paper's foam: by then",
-        "in all",
+        "the paper's foam: indentation at the reaction",
+        "in the end",
     )
     lines = []
     for one in thinning(FIRST_DESIGN, FIRST_DESIGN.foams[0]):
@@ -284,16 +284,16 @@ def foam_table() -> str:
 
 
 def rules_table() -> str:
-    """Rules for the peak force: error against the exact one, and time."""
+    """Peak-force rules: error against the exact one, and time."""
     return _rule_table(formulas.RULES)
 
 
 def failing_table() -> str:
-    """The same of rules that fail."""
+    """Failing rules: error and time."""
     return _rule_table(formulas.FAILING)
 
 
 def draw(folder: Path) -> list[Path]:
-    """The pictures of the command's answer, and those of the study."""
+    """The pictures of the command's answer and of the study."""
     own = (caps.draw(folder / "cover-caps.svg"), pictures.study(folder / "cover-study.svg"))
     return [*own, *drawing.draw(folder, "svg")]

@@ -1,1 +1,1 @@
-"""Diagrams that explain: how the parts fit together, the skin, a touch, the wiring, and a packet."""
+"""Explanatory diagrams: the parts, the skin, a touch, the wiring, and a packet."""

@@ -1,4 +1,4 @@
-"""A card on which a diagram is drawn in pixels of the page, y down."""
+"""A canvas for a diagram in page pixels, y down."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TINTS = {
     style.GRAY: style.SHEET,
     style.PURPLE: "#f4e1ec",
 }
-"""What a box in each color is filled with, so that words on it can be read."""
+"""Fill of a box in each color, light enough for text."""
 
 
 class Canvas:
@@ -30,30 +30,30 @@ class Canvas:
         self.axes.axis("off")
 
     def text(self, x: float, y: float, words: str, **how: Any) -> None:
-        """Words whose left end is at x, and whose middle is at y."""
+        """Draw words from x, vertically centered at y."""
         self.axes.text(x, y, words, **{"va": "center", "fontsize": style.NORMAL, "color": style.INK} | how)
 
     def small(self, x: float, y: float, words: str, **how: Any) -> None:
-        """Words that come second."""
+        """Draw secondary words."""
         self.text(x, y, words, **{"fontsize": style.SMALL, "color": style.SOFT} | how)
 
     def box(self, x: float, y: float, w: float, h: float, color: str, **how: Any) -> None:
-        """A rectangle with its upper left corner at (x, y), tinted in a color of the palette."""
+        """Draw a rectangle with its upper left corner at (x, y), tinted in a palette color."""
         from matplotlib.patches import Rectangle
 
         look: dict[str, Any] = {"fc": TINTS.get(color, color), "ec": color, "lw": 1} | how
         self.axes.add_patch(Rectangle((x, y), w, h, **look))
 
     def area(self, points: Sequence[tuple[float, float]], color: str, **how: Any) -> None:
-        """A polygon in a color."""
+        """Draw a filled polygon."""
         self.axes.fill(*zip(*points, strict=True), **{"fc": color, "ec": "none", "lw": 0.8} | how)
 
     def line(self, *points: tuple[float, float], color: str = style.SOFT, **how: Any) -> None:
-        """A line through points."""
+        """Draw a line through points."""
         self.axes.plot(*zip(*points, strict=True), **{"color": color, "lw": 1, "solid_capstyle": "round"} | how)
 
     def arrow(self, *points: tuple[float, float], color: str = style.SOFT, both: bool = False) -> None:
-        """A line through points with a head at its end, or at either end."""
+        """Draw a line through points with an arrowhead at its end, or at both."""
         self.line(*points, color=color, lw=1.6, solid_capstyle="butt")
         ends = [(points[-2], points[-1])] + ([(points[1], points[0])] if both else [])
         for start, end in ends:

@@ -17,11 +17,11 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 LEFT, RIGHT = 16.0, 704.0
 HEIGHT = 34.0
 BITS = 32
-"""In a line of bit fields."""
+"""Bits in a line of bit fields."""
 
 
 class Field(NamedTuple):
-    """A box of a line, ``size`` bits or bytes wide."""
+    """A field, ``size`` bits or bytes wide."""
 
     name: str
     size: int
@@ -116,7 +116,7 @@ def _hello(skin: Skin) -> Iterator[Field]:
 
 
 def _line(canvas: Canvas, y: float, fields: Sequence[Field], unit: str, even: bool = False) -> None:
-    """Draw boxes side by side. ``even``: they are equally wide."""
+    """Draw boxes side by side, with ``even`` equally wide."""
     total = len(fields) if even else max(sum(one.size for one in fields), BITS if unit == "bit" else 0)
     step = (RIGHT - LEFT) / total
     sizes = [1 if even else one.size for one in fields]

@@ -12,7 +12,7 @@ from contactfpga_sim.lab.diagrams import cutaway, packet, together, touch, wires
 
 
 def draw(folder: Path) -> list[Path]:
-    """All of them; those of a kit show the starter kit."""
+    """Draw all diagrams; those of a kit show the starter kit."""
     kit = kits.kit("starter")
     with matplotlib.rc_context(style.SETTINGS):
         return [

@@ -1,4 +1,4 @@
-"""How the parts of the starter kit fit together, with the time of each arrow since the switch closed."""
+"""The parts of the starter kit, with the time of each arrow since the switch closed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga_sim.lab.finger.stages import ASSUMED_HOST_US
 SKIN, BOARD, HOST = (16, 184), (272, 146), (560, 144)
 """Left end and width of each column, px."""
 CELLS = 9
-"""Of the row of switches that is drawn."""
+"""Switches in the drawn row."""
 
 
 def draw(kit: Kit, path: Path) -> Path:
@@ -28,7 +28,7 @@ def draw(kit: Kit, path: Path) -> Path:
 
 
 def _skin(canvas: Canvas, kit: Kit) -> None:
-    """Finger, foam, switches and link, one above the other."""
+    """Finger, foam, switches and link, stacked."""
     left, width = SKIN
     step = width / CELLS
     canvas.text(left, 22, "robot with a skin", fontweight="bold")
@@ -67,7 +67,7 @@ def _boxes(canvas: Canvas, kit: Kit) -> None:
 
 
 def _times(canvas: Canvas, kit: Kit) -> None:
-    """Arrows between the columns, and what the kit's predictions say of each."""
+    """Arrows between the columns, with the kit's predicted times."""
     skin, said = kit.skin, predictions.load(kit)
     times = skin.derived
 

@@ -17,15 +17,15 @@ LANES = ("row is driven", "zone is found", "byte on the line", "contact")
 ROW, ZONE, BYTE, CONTACT = range(len(LANES))
 TOUCHED, OTHER = style.VERMILLION, style.SKY
 HALF = 0.3
-"""Of a bar's height; lanes are 1 apart."""
+"""Half a bar's height; lanes are 1 apart."""
 BYTE_BITS = 10
-"""On the line, with start and stop."""
+"""Bits of a byte on the line, with start and stop."""
 BEFORE_OFFER = 2
-"""Clocks from the last one in which a row is driven to the one in which it is handed on (docs/timing.md)."""
+"""Clocks from the last one that drives a row to its handover (docs/timing.md)."""
 
 
 def draw(path: Path) -> Path:
-    """Write the picture: a panel for each kit, and between them one row of the raster scan."""
+    """Write the picture: a panel per kit, and between them one row of the raster scan."""
     figure = style.new(6.6)
     raster, slot, reversal = figure.subplots(3, 1, height_ratios=(4, 2.4, 4))
     starter, fast = (kits.kit(name).skin for name in ("starter", "fast"))
@@ -37,7 +37,7 @@ def draw(path: Path) -> Path:
 
 
 def _touch(axes: Any, skin: Skin, title: str) -> None:
-    """One touch, from shortly before the switch closes until the last byte of its frame is sent."""
+    """One touch, from just before the switch closes to the last byte of its frame."""
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as work:
         touch = wave.simulate(skin, wave.finger(skin), Path(work) / "touch.vcd")
 
@@ -80,7 +80,7 @@ def _bars(skin: Skin, touch: wave.SimulatedTouch) -> Iterator[tuple[int, float, 
 
 
 def _slot(axes: Any, skin: Skin) -> None:
-    """One row of a raster scan with precharge, and the beginning of the next one."""
+    """One row of a raster scan with precharge, and the beginning of the next."""
     times = skin.derived
     row = times.settle_clocks + times.release_clocks
     driven, released, next_row, one = (

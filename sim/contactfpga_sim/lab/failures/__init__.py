@@ -1,1 +1,1 @@
-"""Where methods fail: one knob a study, moved until something breaks, on the compiled gateware."""
+"""Where methods fail: one parameter per study, moved until something breaks, on the compiled gateware."""

@@ -1,4 +1,4 @@
-"""Knobs of the sheet's wiring: slow columns, weak switches, missing diodes, broken lines, what sticks."""
+"""Knobs of the sheet's wiring: slow columns, weak switches, missing diodes, broken and stuck lines."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
 
 
 def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:
-    """(rows, columns) bool: 2x2 cells at each of these (row, column)."""
+    """(rows, columns) bool: 2x2 cells at each (row, column)."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     for row, column in spots:
         cells[row : row + 2, column : column + 2] = True
@@ -41,7 +41,7 @@ def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:
 
 
 def judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: str = "contact") -> Outcome:
-    """A frame against the contacts that are there, to the cell."""
+    """A frame judged against the contacts, to the cell."""
     right = reported(zones) == sorted(map(moments, contacts))
     what = f"{plural(len(zones), 'zone')} of {plural(len(contacts), unit)}"
     if not right and len(zones) == len(contacts):
@@ -58,7 +58,7 @@ LAZY_CIRCUIT = WEAKLY.replace(line_ohm=2000.0)
 
 
 def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> list[tuple[int, int]]:
-    """Places of as many fingers of 2x2 cells, with this many free cells and more between any two of them."""
+    """Random places of fingers of 2x2 cells, at least ``free`` cells apart."""
     spots: list[tuple[int, int]] = []
     while len(spots) < count:
         row, column = map(int, rng.integers(0, (skin.rows - 1, skin.columns - 1)))
@@ -68,7 +68,7 @@ def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> l
 
 
 def _slow(skin: Skin, circuit: Circuit, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Two fingers that share no row or column, on lines that take their time."""
+    """Two fingers without common rows or columns, on slow lines."""
     found = []
     with Rig(skin) as rig:
         rig.board.settle(*lines_of(circuit, skin, most=2))
@@ -118,18 +118,18 @@ SETTLE = Knob(
 
 
 def bare(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Three fingers at corners of rectangles; of one of them the switches lose their diodes one by one."""
+    """Three fingers at corners of rectangles; one loses its switches' diodes one by one."""
     return [_bare(skin, int(count), _rectangle(rng, skin)[:3], rng) for _ in range(draws)]
 
 
 def _rectangle(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
-    """Corners of a rectangle with a free row and column between fingers of 2x2 cells that stand at them."""
+    """Rectangle corners that leave a row and column between the 2x2 fingers on them."""
     (y, x), (v, u) = _crossed(rng, skin)
     return [(y, x), (y, u), (v, x), (v, u)]
 
 
 def _bare(skin: Skin, count: int, spots: list[tuple[int, int]], rng: np.random.Generator) -> Outcome:
-    """Undefined levels are tried both ways."""
+    """The worse outcome of both values of undefined levels."""
     cells = finger(skin, *spots)
     bare = np.zeros_like(cells)
     bare.flat[rng.permutation(np.flatnonzero(finger(skin, spots[0])))[:count]] = True
@@ -150,7 +150,7 @@ def _bare(skin: Skin, count: int, spots: list[tuple[int, int]], rng: np.random.G
 
 
 def _still(skin: Skin, read: np.ndarray) -> Zones:
-    """The frame of a sheet that reads so, with its guard lines if it has some."""
+    """The frame of a sheet with these constant readings, with its guard lines if any."""
     if not skin.guard:
         return still(skin, read)
     return still(skin, read[:-1, :-1], wiring.missed(read))
@@ -188,7 +188,7 @@ def _corners(count: float, rng: np.random.Generator, draws: int) -> list[Outcome
 
 
 def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
-    """The second frame of each: the first one differs from what was before."""
+    """The second frame of each; the first depends on earlier ones."""
     found = []
     with Rig(skin) as rig:
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), hello_clocks(skin))
@@ -200,7 +200,7 @@ def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
 
 
 def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Zones that are not what touches."""
+    """Outcomes of zones that do not match the contacts."""
     placed = [_apart(rng, BARE, int(count)) for _ in range(draws)]
     cells = [finger(BARE, *spots) for spots in placed]
     truths = [[finger(BARE, spot) for spot in spots] for spots in placed]
@@ -208,7 +208,7 @@ def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outco
 
 
 def _scattered_cells(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Cells that are read wrong; it is reported if each of them is marked."""
+    """Outcomes of misread cells; reported if each is marked."""
     cells = [finger(BARE, *_apart(rng, BARE, int(count))) for _ in range(draws)]
     return [_marked(zones, each) for zones, each in zip(_frames(BARE_CELLS, cells), cells)]
 
@@ -244,7 +244,7 @@ GHOST = Knob(
 
 
 PATIENT, PATIENT_GUARDED = (skin.replace(settle_us=5.0) for skin in (REVERSAL, REVERSAL_GUARDED))
-"""Columns have the time that weak switches need."""
+"""Skins whose columns allow the time that weak switches need."""
 
 
 def _switch(skin: Skin, kiloohm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
@@ -290,7 +290,7 @@ DIODES_REVERSAL = dataclasses.replace(
 
 
 def _broken(skin: Skin, line: str, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """``line``: row or column. The contact lies anywhere, and the broken lines anywhere beneath it."""
+    """Outcomes with broken lines, rows or columns, anywhere under a contact anywhere."""
     found = []
     for _ in range(draws):
         top, left = map(int, rng.integers(0, (skin.rows - 6, skin.columns - 6)))
@@ -336,7 +336,7 @@ MASKED = REFERENCE.replace(mask=((2, 3), (12, 2), (5, 12)))
 
 
 def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Switches anywhere but beneath and beside the finger, those of the mask first."""
+    """Outcomes with switches stuck away from the finger, masked ones first."""
     found = []
     for _ in range(draws):
         touch, beside = _finger_anywhere(rng, skin)
@@ -350,7 +350,7 @@ def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> li
 
 
 def _finger_anywhere(rng: np.random.Generator, skin: Skin) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, columns) bool each: a finger clear of the mask, and its cells with those around them."""
+    """(rows, columns) bool each: a finger clear of the mask, and its cells with their neighbors."""
     while True:
         ((row, column),) = _apart(rng, skin, 1)
         touch, beside = finger(skin, (row, column)), np.zeros((skin.rows, skin.columns), bool)

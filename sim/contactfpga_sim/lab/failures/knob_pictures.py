@@ -1,6 +1,6 @@
-"""A knob as a picture: what came out at each value, and the sheet before and at the first break.
+"""A knob as a picture: results at each value, and the sheet before and at the first break.
 
-Written by hand rather than by a plotting library, so that the same numbers always make the same file.
+Hand-written, so that the same numbers always make the same file.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LETTER = 7.5
 
 
 class Span(NamedTuple):
-    """What a value takes of the axis, in pixels: halfway to the values before and after it."""
+    """The pixels of a value on the axis: halfway to its neighbors."""
 
     start: float
     middle: float
@@ -30,10 +30,9 @@ class Span(NamedTuple):
 
 
 def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span], str]:
-    """The values' places, in the order in which the knob is moved, and what is to be said of the scale.
+    """The values' places in sweep order, and a note on the scale.
 
-    Values that are evenly spaced or reach below 0 lie so; others in powers of ten, where a first value of 0 stands
-    apart.
+    Evenly spaced or negative values are linear; others logarithmic, with a first 0 set apart.
     """
     steps = np.diff(values)
     if np.allclose(steps, steps[0]) or min(values[1:]) <= 0:
@@ -51,7 +50,7 @@ def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span
 
 
 def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
-    """Numbers of the values that are written below the axis: at even steps where they lie so, else all with room."""
+    """Indexes of the labeled values: at even steps if evenly spaced, else all with room."""
     wide = [span.end - span.start for span in spans]
     if np.allclose(wide, wide[0]):
         choices = [list(range(0, len(words), step)) for step in (1, 2, 4, 5, 10, 20, len(words))]
@@ -60,7 +59,7 @@ def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
 
 
 def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int]) -> list[int]:
-    """Those of the chosen that do not come too close to the one before."""
+    """The chosen indexes that are not too close to the one before."""
     found, end = [], -math.inf
     for index in chosen:
         half = LETTER * len(words[index]) / 2
@@ -71,7 +70,7 @@ def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int
 
 
 def rounded_up(amounts: Sequence[float]) -> list[float]:
-    """From 0 in at most four round steps to the least of them that none exceeds; whole ones for whole numbers."""
+    """Round steps from 0, at most four, to the least one above all amounts; integers for integers."""
     most, whole = max(amounts), all(amount == int(amount) for amount in amounts)
     if most <= 0:
         return [0.0, 1.0]
@@ -83,7 +82,7 @@ def rounded_up(amounts: Sequence[float]) -> list[float]:
 
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
 TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}
-"""Height of a bar, which says the same as its color."""
+"""Height of a bar, which repeats its color's meaning."""
 
 LEGEND = {
     "right": (52, "right"),
@@ -91,13 +90,13 @@ LEGEND = {
     "told": (284, "wrong, and the system says so"),
     "silent": (502, "wrong, not noticed"),
 }
-"""Where each word stands."""
+"""Position of each word."""
 
 LINES = ((style.SKY, 7.0), (style.PURPLE, 5.0), (style.BLUE, 3.0), (style.BLACK, 1.2))
-"""Color and width, the last ones for few methods: where lines lie on one another, each is seen beneath the next."""
+"""Color and width; later methods are wider, so that coinciding lines stay visible."""
 
 LEFT, TOP, HIGH = 52, 62, 110
-"""Where the chart begins, and its height, in pixels."""
+"""Origin of the chart, and its height, in pixels."""
 
 BESIDE, ALONE = 380, 640
 """Width of the chart beside two sheets, and without."""
@@ -106,7 +105,7 @@ STRIP = 36
 """Height of a method's name and bars."""
 
 SIDE, SHEETS = 104, 470
-"""Size of a sheet, and where the first one begins."""
+"""Size of a sheet, and position of the first."""
 
 
 def svg(knob: Knob, methods: Mapping[str, Sweep]) -> str:
@@ -138,7 +137,7 @@ def _text(x: float, y: float, words: str, style: str = "") -> str:
 
 
 def _chart(knob: Knob, methods: Mapping[str, Sweep], spans: Sequence[Span]) -> list[str]:
-    """The outcomes' amounts; 0 is the frame's bottom."""
+    """Draw the outcomes' amounts; 0 is the frame's bottom."""
     ticks = rounded_up([outcome.amount for sweep in methods.values() for outcome in sweep.outcomes])
     left, right = spans[0].start, spans[-1].end
     parts = [_text(LEFT, TOP - 10, knob.amount)]
@@ -194,7 +193,7 @@ def _kind(outcome: Outcome) -> str:
 
 
 def _sheets(knob: Knob, methods: Mapping[str, Sweep]) -> tuple[str, list[tuple[str, Outcome]]]:
-    """The first method that gets from right to wrong, and what came out at the two values between which it does."""
+    """The first method that fails, and its outcomes at the two values around the break."""
     for method, sweep in methods.items():
         if sweep.broken is None or not sweep.broken or sweep.outcomes[sweep.broken].cells is None:
             continue

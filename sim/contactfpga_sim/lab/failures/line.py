@@ -1,4 +1,4 @@
-"""Knobs of the line and of both its ends: baud rates that differ, noise, another clock, a host that is slow."""
+"""Knobs of the line and its ends: differing baud rates, noise, another clock, a slow host."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 OVERSAMPLING = 16
-"""Samples per bit, as most UARTs take; the middle one of a bit counts."""
+"""Samples per bit, as in most UARTs; the middle one counts."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Line:
-    """What a board put on its line."""
+    """The signal that a board put on its line."""
 
     skin: Skin
     edges: np.ndarray
     """(n,) float: clocks at which the level changes; it begins high."""
     end: float
-    """Clocks that were recorded."""
+    """Recorded clocks."""
     frames: tuple[bytes, ...]
-    """Every packet that was sent, without its delimiter, in order."""
+    """Every sent packet without its delimiter, in order."""
 
     @classmethod
     def record(cls, skin: Skin, scans: int, seed: int) -> Line:
-        """A board whose sheet shows random fingers, others in each scan."""
+        """Record a board whose sheet shows other random fingers in each scan."""
         rng = np.random.default_rng(seed)
         with Rig(skin, capture=("line",)) as rig:
             rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), hello_clocks(skin))
@@ -59,7 +59,7 @@ class Line:
             return cls(skin, edges, float(rig.board.cycle), tuple(packets))
 
     def noisy(self, rate_hz: float, seed: int) -> Line:
-        """With this many pulses per second that invert the level for half a bit to two bits."""
+        """The line with this many pulses per second that invert the level for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
         bit = self.skin.derived.bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)
@@ -67,8 +67,8 @@ class Line:
         return dataclasses.replace(self, edges=np.sort(np.concatenate([self.edges, starts, starts + lengths])))
 
     def read(self, bit_clocks: float, phase: float = 0.0) -> bytes:
-        """What a UART takes for bytes whose bits last this many of the board's clocks; without the bytes that have no
-        stop bit. Its first look comes ``phase`` (0 to 1) of a look later."""
+        """The bytes that a UART reads if its bits last this many board clocks, without those that lack a stop bit.
+        ``phase`` (0 to 1) delays its sampling by part of a sample."""
         tick = bit_clocks / OVERSAMPLING
         data, now, last = bytearray(), 0.0, self.end + 12 * self.skin.derived.bit_clocks
         offsets = tick * (OVERSAMPLING * np.arange(10) + OVERSAMPLING // 2)
@@ -98,20 +98,20 @@ class Line:
 
 @dataclasses.dataclass(frozen=True)
 class HostDecoding:
-    """What the host makes of a line."""
+    """The host's reading of a line."""
 
     sent: int
-    """Frames that were sent."""
+    """Frames sent."""
     arrived: int
-    """Frames that arrived as they were sent."""
+    """Frames that arrived unchanged."""
     wrong: int
-    """Frames that arrived and were never sent."""
+    """Frames that arrived but were never sent."""
     told: tuple[str, ...]
-    """Counters that are not 0, and errors."""
+    """Nonzero counters, and errors."""
 
 
 def heard(line: Line, data: bytes, greeted: bytes = b"") -> HostDecoding:
-    """The host's frames and counters; ``greeted`` came before, as it was sent."""
+    """The host's frames and counters; ``greeted`` arrived earlier, undisturbed."""
     sent = _decoded(b"".join(packet + bytes([protocol.DELIMITER]) for packet in line.frames))[0]
     frames, conversation = _decoded(greeted + data)
     stats = conversation.stats
@@ -131,7 +131,7 @@ def _decoded(data: bytes) -> tuple[list[str], Conversation]:
 
 
 def _sent(zones: Zones) -> dict[str, object]:
-    """What the board said, without what the host adds from the frames before: flags, and the time on its own clock."""
+    """A frame as sent, without the flags and board time that the host adds from earlier frames."""
     own = {name: value for name, value in zones.to_dict().items() if not name.startswith("host_")}
     return own | {"flags": sorted(zones.frame.flags)}
 
@@ -139,20 +139,20 @@ def _sent(zones: Zones) -> dict[str, object]:
 SKIN = REFERENCE
 SCAN_MS = 1000 * SKIN.derived.frame_clocks / SKIN.clock_hz
 ZONE_BYTES = 13 + 4
-"""Of a frame with one zone on the wire; each further zone takes 4."""
+"""Bytes of a frame with one zone; each further zone needs 4."""
 FEW_FRAMES = 20
 RECORDED = 200
-"""Lines of :data:`FEW_FRAMES` from which draws choose."""
+"""Recorded lines of :data:`FEW_FRAMES` to draw from."""
 
 
 @functools.cache
 def recorded(scans: int, seed: int) -> Line:
-    """A line to be heard in several ways."""
+    """A recorded line, to be decoded in several ways."""
     return Line.record(SKIN, scans, seed)
 
 
 def _of_line(found: HostDecoding) -> Outcome:
-    """Right if every frame arrives; a frame that was never sent is worse than one that is lost, and silent."""
+    """Right if every frame arrives; a frame never sent is worse than a lost one, and silent."""
     missing = found.sent - found.arrived
     what = f"{missing} of {found.sent} frames do not arrive"
     if found.wrong:
@@ -161,7 +161,8 @@ def _of_line(found: HostDecoding) -> Outcome:
 
 
 def _lines(bit_clocks: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Lines of a hello and some frames, each with its own contacts and phase, at a host whose bits last so long."""
+    """Outcomes of lines of a hello and some frames, each with its own contacts and phase, at a host with this bit
+    length."""
     lines = [recorded(FEW_FRAMES, int(seed)) for seed in rng.integers(0, RECORDED, count)]
     found = [(line, line.read(bit_clocks, float(phase))) for line, phase in zip(lines, rng.random(count))]
     return [_of_line(heard(line, data)) for line, data in found]
@@ -172,7 +173,7 @@ def _baud(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> l
 
 
 def _send(rig: Rig, byte: int, bit: float) -> None:
-    """A byte whose bits last this many of the board's clocks, at its receive pin."""
+    """Send a byte to the board's receive pin, with this many board clocks per bit."""
     bits = [0, *(byte >> index & 1 for index in range(8)), 1]
     ends = [round(bit * (index + 1)) for index in range(10)]
     for start, end, level in zip([0, *ends], ends, bits):
@@ -182,14 +183,14 @@ def _send(rig: Rig, byte: int, bit: float) -> None:
 
 
 def _number(rng: np.random.Generator) -> int:
-    """Of a request, any that may be sent."""
+    """A random number for a request."""
     while not protocol.may_number(number := int(rng.integers(1 << protocol.DIGIT_BITS * protocol.HEARD_DIGITS))):
         pass
     return number
 
 
 def _asked(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Any requests of the host, at the host's rate, at the board's receive pin at any time: does a frame answer?"""
+    """Outcomes of requests at the host's rate and any time: does a frame answer?"""
     bit = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
     found = []
     with Rig(SKIN) as rig:
@@ -224,7 +225,7 @@ BAUD = Knob(
 
 
 def _noise(rate_hz: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Each frame is a draw. The port was opened before the noise began."""
+    """One outcome per frame. The port was opened before the noise began."""
     line = recorded(count + 10, int(rng.integers(RECORDED)))
     data = line.noisy(rate_hz, int(rng.integers(1 << 32))).read(SKIN.derived.bit_clocks)
     found = heard(line, data, greeted=protocol.encode_hello(SKIN))
@@ -249,7 +250,7 @@ NOISE = Knob(
 
 
 def _clock(per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """The board's crystal is fast: bits are short, and so are its microseconds."""
+    """Outcomes with a fast board crystal: short bits and short microseconds."""
     faster = 1 + per_cent / 100
     told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
     times = Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off")
@@ -257,10 +258,10 @@ def _clock(per_cent: float, rng: np.random.Generator, count: int) -> list[Outcom
 
 
 DOCTOR_S = 10.0
-"""How long `contactfpga doctor --seconds 10` looks."""
+"""Duration of `contactfpga doctor --seconds 10`."""
 
 CLOCK_PER_CENT = 0.1
-"""Times count as right that are off by no more."""
+"""Largest error of times that count as right."""
 
 CLOCK = Knob(
     name="clock",
@@ -278,11 +279,11 @@ CLOCK = Knob(
 
 
 TTY_BYTES = 4095
-"""What Linux keeps of a serial port that nobody reads; what comes then is dropped."""
+"""Linux's buffer of an unread serial port; bytes beyond it are dropped."""
 
 
 class SlowHost:
-    """A virtual board behind a buffer as the system has it; time passes while the host is busy elsewhere."""
+    """A virtual board behind an operating system's buffer; time passes while the host is busy."""
 
     live, threaded = True, False
     name = "the slow host"
@@ -292,7 +293,7 @@ class SlowHost:
         self._waiting: deque[int] = deque()
 
     def work(self, seconds: float) -> None:
-        """The host does something else."""
+        """Keep the host busy for this time."""
         end = self._board.clock() + seconds
         while (left := end - self._board.clock()) > 1e-6:
             self._keep(self._board.read(min(left, 1e-4)))
@@ -318,7 +319,7 @@ class SlowHost:
 
 
 def _slow_host(milliseconds: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """The driver reads all there is, then the host works for a while, and so on: each time is a draw."""
+    """The driver reads all there is, then the host works for a while; one outcome per cycle."""
     transport = SlowHost()
     scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
     found = []
@@ -352,13 +353,13 @@ class DyingBoard(SlowHost):
 
 
 MAX_AGE_S = 0.005
-"""What a robot may act on."""
+"""Largest age of data on which a robot may act."""
 
 
 @functools.cache
 def _silence(max_age_s: float | None, phase: float) -> tuple[str, float]:
-    """A program reads the newest frame again and again, and the board stops at this phase of a scan: the error that it
-    gets, and seconds until then."""
+    """A program reads the newest frame repeatedly, and the board stops at this phase of a scan: the error, and seconds
+    until it."""
     transport = DyingBoard()
     with Driver(transport) as board:
         board.greet(1.0)
@@ -384,7 +385,7 @@ def _told_late(max_age_s: float | None, milliseconds: float, rng: np.random.Gene
 
 
 PHASES = 32
-"""Of a scan, at which a board stops."""
+"""Phases of a scan at which a board stops."""
 
 SILENCE = Knob(
     name="silence",

@@ -1,4 +1,4 @@
-"""How often a method is right at a value of a knob, by a test that ends as soon as its answer is known."""
+"""How often a method is right at a value of a knob, by a sequential test."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from contactfpga_sim.lab.failures.knob import Outcome
 from contactfpga_sim.lab.flips.campaign import wilson
 
 LEVEL = 0.95
-"""The share that has to be right for a value to hold."""
+"""The share that must be right for a value to hold."""
 LOOKS = (30, 120, 480, 1920)
-"""Draws after which the interval is looked at. 120 right ones are the fewest that show :data:`LEVEL`."""
+"""Draws after which the interval is tested. At least 120, all right, are needed to show :data:`LEVEL`."""
 Z = 2.5
-"""Of Wilson's interval at one look, so that it holds at all four looks with 95 %."""
+"""z of Wilson's interval at one test, so that it holds at all four with 95 %."""
 
 SHARE = "share of draws that are right"
-"""What :attr:`contactfpga_sim.lab.failures.knob.Outcome.amount` is here."""
+"""Meaning of :attr:`contactfpga_sim.lab.failures.knob.Outcome.amount` here."""
 
 Draws = Callable[[float, np.random.Generator, int], Sequence[Outcome]]
-"""A function of the knob's value, random numbers and a count: it gives the outcomes of that many draws."""
+"""The outcomes of a number of draws, as a function of the knob's value, random numbers and that number."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rate:
-    """A share of draws that are right, with its interval."""
+    """A share of right draws, with its interval."""
 
     right: int
     of: int
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The least and the largest share that are likely."""
+        """The interval's ends."""
         return wilson(self.right, self.of, Z)
 
     def reaches(self, level: float) -> bool | None:
-        """Whether the share is this level or more; None while the level lies within the interval."""
+        """Whether the share reaches this level; None while the interval contains the level."""
         low, high = self.interval
         return True if low >= level else False if high < level else None
 
@@ -49,10 +49,10 @@ class Rate:
 
 @dataclasses.dataclass(frozen=True)
 class Rated:
-    """A knob's method that is tried in as many draws as it takes to say whether enough of them are right.
+    """A knob's method, tried in as many draws as the decision needs.
 
-    A value holds if the interval lies above the level. It does not if the interval lies below, or if it does not leave
-    the level within ``most`` draws. The draws of all values begin with the same seed.
+    A value holds if the interval is above the level; it fails if the interval is below, or still contains the level
+    after ``most`` draws. All values share a seed.
     """
 
     draws: Draws
@@ -60,11 +60,11 @@ class Rated:
     most: int = LOOKS[-1]
     level: float = LEVEL
     telling: float = 1.0
-    """The share of wrong draws that have to tell something, else it counts as not noticed."""
+    """The share of wrong draws that must be reported, else the fault counts as unnoticed."""
 
     def __call__(self, value: float) -> Outcome:
-        """The rate at a value. Its words and its sheet are those of a right draw where the value holds, else of a wrong
-        one, that is not told if there is such a one."""
+        """The rate at a value. Words and sheet are of a right draw if the value holds, else of a wrong one, unreported
+        if possible."""
         rng = np.random.default_rng(self.seed)
         found: list[Outcome] = []
         for look in LOOKS:
@@ -77,8 +77,8 @@ class Rated:
 
 
 def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:
-    """One outcome of all. Where the value holds, it tells what half of the draws do. Where it does not, it tells what
-    its wrong draws do, and nothing if fewer than ``telling`` of them tell anything."""
+    """One outcome of all draws. If the value holds, it reports what half of the draws report; else what the wrong draws
+    report, or nothing if fewer than ``telling`` of them report anything."""
     wrong = [one for one in found if not one.right]
     each = [{re.sub(r"\d+", "N", word) for word in one.told} for one in (found if holds else wrong)]
     told = set().union(*each) if holds or sum(map(bool, each)) >= telling * len(each) else set()

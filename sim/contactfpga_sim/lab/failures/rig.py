@@ -1,4 +1,4 @@
-"""A compiled board with the host's receiver at the other end of its line, in simulated time."""
+"""A compiled board with the host's receiver on its line, in simulated time."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from contactfpga_sim.model.sheet.wiring import LineCuts
 
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)
-"""The same sheet with guard lines, and the pins that go with them."""
+"""The sheet with guard lines, and their pins."""
 REVERSAL = REFERENCE.replace(scan="reversal", precharge_us=0.25, settle_us=0.5, release_us=0.05)
 REVERSAL_GUARDED = REVERSAL.replace(guard=True)
 
 HELLO_BYTES = len(protocol.encode_hello(REFERENCE.replace(surface="cylinder", radius_mm=100.0, name=32 * "n")))
-"""The most that a hello takes on the wire."""
+"""Largest hello on the wire."""
 
 FRAME_BYTES = 28
-"""Of a frame of few zones on the wire; a scan that waits for the wire may be shorter than that."""
+"""Bytes of a frame of few zones; a scan that waits for the wire may be shorter."""
 
 HELD_SCANS = 5
-"""Scans for which a frame is held, so that one of it reaches the host even if a hello comes between."""
+"""Scans that a frame is held, so that it reaches the host even if a hello intervenes."""
 
 
 class Rig:
-    """``board`` is to be pressed and run; :meth:`frames` are those that came out meanwhile."""
+    """A board to press and run; :meth:`frames` returns its output."""
 
     def __init__(self, skin: Skin, capture: tuple[str, ...] = ()):
         self.skin = skin
@@ -40,7 +40,7 @@ class Rig:
         self.scan = skin.derived.frame_clocks
 
     def frames(self) -> list[Zones]:
-        """All frames that have come since they were taken last."""
+        """All frames since the last call."""
         events = self.conversation.receive(self.board.receive(), self.board.cycle / self.skin.clock_hz)
         return [event.zones for event in events if isinstance(event, Arrival)]
 
@@ -52,25 +52,25 @@ class Rig:
 
 
 def hello_clocks(skin: Skin) -> int:
-    """Scans that the hello at power-up may take from frames, in clocks."""
+    """Scans whose frames the hello at power-up may displace, in clocks."""
     scan = skin.derived.frame_clocks
     return scan * (math.ceil(HELLO_BYTES * 10 * skin.derived.bit_clocks / scan) + 2)
 
 
 def held_clocks(skin: Skin) -> int:
-    """For which a frame is held: whole scans, or the last frame would be torn, and some frames' time on the line."""
+    """Clocks that a frame is held: whole scans, lest the last frame be torn, plus some frames' time on the line."""
     scan = skin.derived.frame_clocks
     return HELD_SCANS * scan * math.ceil(10 * FRAME_BYTES * skin.derived.bit_clocks / scan)
 
 
 def still(skin: Skin, cells: np.ndarray, cuts: LineCuts | None = None) -> Zones:
-    """The frame of a sheet that is pressed so, with its lines cut."""
+    """The frame of a constantly pressed sheet with cut lines."""
     return seen(skin, cells[None], cuts)[0]
 
 
 def seen(skin: Skin, frames: np.ndarray, cuts: LineCuts | None = None) -> list[Zones]:
-    """What the host gets of each of (n, rows, columns) bool frames of few zones that are pressed one after the other,
-    for some whole scans each: the last frame of each."""
+    """The host's frame for each of (n, rows, columns) bool frames of few zones, each pressed for some whole scans: the
+    last frame of each."""
     with Rig(skin) as rig:
         if cuts is not None:
             rig.board.cut(cuts.rows, cuts.columns)
@@ -108,7 +108,7 @@ def _place(sums: list[int]) -> tuple[float, float, int]:
 
 
 def faults(zones: Zones) -> tuple[str, ...]:
-    """What a frame says against itself."""
+    """Faults that a frame reports."""
     return (*sorted(zones.flags - {"fault"}), *sorted(zones.faults))
 
 

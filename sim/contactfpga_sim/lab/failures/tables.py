@@ -14,7 +14,7 @@ from contactfpga_sim.lab.pool import progress
 
 HEAD = (
     *("knob", "method", "holds until", "breaks at", "closed form"),
-    *("what breaks", "what the system says", "what helps"),
+    *("what breaks", "reported", "what helps"),
 )
 
 
@@ -38,9 +38,11 @@ def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> lis
 
 def _cells(knob: Knob, sweep: Sweep) -> list[str]:
     last = len(sweep.values) - 1 if sweep.broken is None else sweep.broken - 1
-    holds = "nowhere" if last < 0 else knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
+    holds = "fails at the first value"
+    if last >= 0:
+        holds = knob.format.format(sweep.values[last]) + _rate(sweep.outcomes[last])
     if sweep.broken is None:
-        return [f"{holds}, all there are", "", "nothing", ""]
+        return [f"{holds}, end of range", "", "no failure", ""]
     first = sweep.outcomes[sweep.broken]
     at = knob.format.format(sweep.breaks_at)
     return [holds, f"**{at}**{_rate(first)}", first.what, says(knob, sweep)]

@@ -1,5 +1,4 @@
-"""Knobs of touch: two contacts that come close, one that moves during a scan, switches that bounce; an arm that winds,
-shadows that cross, more zones than a frame carries."""
+"""Knobs of touch: close contacts, a moving one, bouncing switches, a winding arm, crossing shadows, too many zones."""
 
 from __future__ import annotations
 
@@ -32,14 +31,14 @@ from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
 
 
 def _pair(gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator) -> Scene:
-    """Two fingers around any place of a pitch near the middle of the sheet, at any angle."""
+    """Two fingers at a random place near the middle of the sheet, at any angle."""
     x, y = pitch_mm * rng.uniform(7, 8, 2)
     return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180)))
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Fingers of 8 mm radius cover a switch wherever they are. The pitch is in no wire of the gateware: the same one
-    serves sheets of any pitch."""
+    """Outcomes of two fingers of 8 mm radius, which cover a switch anywhere. The gateware does not depend on the
+    pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_pair_told(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
@@ -75,15 +74,15 @@ CLOSING = Knob(
 )
 
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
-"""Directions of motion: along the columns and along the rows, both ways."""
+"""Directions of motion: along columns and rows, both ways."""
 
 FIRST, LAST = 2.0, 13.0
-"""Where a moving finger starts and ends, in pitches."""
+"""Start and end of a moving finger, in pitches."""
 
 
 def _slide(skin: Skin, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame whose zones are farthest from the finger at the frame's time, of a finger that starts at any time of a
-    scan. A frame without exactly one zone is infinitely far."""
+    """The worst frame of a finger that starts at any time of a scan, by the distance of its zone from the finger at the
+    frame's time; infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -132,7 +131,7 @@ MOVING = Knob(
 
 DEBOUNCE_SCANS = 4
 BOUNCING = Skin(rows=4, columns=4, baud=6_000_000)
-"""Its scan takes 24 us."""
+"""A Skin with a scan of 24 us."""
 
 
 def debounced(method: str) -> Skin:
@@ -143,7 +142,7 @@ def debounced(method: str) -> Skin:
 
 
 def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
-    """How often the host sees the sheet touched when a switch closes for a time, opens for a time and closes again."""
+    """Touches that the host sees when a switch closes, opens and closes again."""
     rest, touch = np.zeros((2, 1, skin.rows, skin.columns), bool)
     touch[0, 2, 1] = True
     clocks = skin.derived.clocks_per_us
@@ -158,7 +157,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """The switch closes at any time of a scan, for 30 to 300 us before it opens again."""
+    """Outcomes of a switch that closes at any time of a scan, for 30 to 300 us before it opens again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)
@@ -189,7 +188,7 @@ SKINS = {name: REFERENCE.replace(labeller=name) for name in LABELLERS}
 
 
 def arm(size: int, quarters: int) -> np.ndarray:
-    """(size, size) bool: an arm one cell wide that winds inwards, a free cell between its turns."""
+    """(size, size) bool: an arm one cell wide that winds inward, a free cell between its turns."""
     cells = np.zeros((size, size), bool)
     y, x, (dy, dx) = 0, 0, (0, 1)
     cells[y, x] = True
@@ -202,7 +201,7 @@ def arm(size: int, quarters: int) -> np.ndarray:
 
 
 def _winding(skin: Skin, quarters: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Turned and mirrored in any way."""
+    """Outcomes of the winding arm, turned and mirrored at random."""
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)
@@ -260,7 +259,7 @@ CROSSING = Knob(
 
 
 def _many(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Single cells, no two of which touch."""
+    """Outcomes of isolated single cells."""
     cells = np.zeros((draws, skin.rows // 2, skin.columns // 2), bool)
     for each in cells:
         each.flat[rng.choice(each.size, int(count), replace=False)] = True

@@ -1,9 +1,8 @@
-"""The host's share of a touch, measured: the driver that reads a real board, on a pseudo-terminal.
+"""The host's share of a touch, measured: the driver reads a board on a pseudo-terminal.
 
-A process of its own is the board and its USB bridge. It runs the compiled gateware, which answers the driver's
-requests, and writes what the bridge delivers when the bridge would deliver it. This program opens the port, as any
-does, and waits for frames. What is between the host's USB controller and the port is left out: the controller's
-interrupt and the kernel's driver of the chip. Here writing to the pseudo-terminal stands for them.
+A process of its own is the board and its USB bridge: it runs the compiled gateware, answers requests, and writes each
+packet when the bridge would deliver it. This program opens the port and waits for frames. Writing to the
+pseudo-terminal stands for the USB controller's interrupt and the kernel's driver.
 """
 
 from __future__ import annotations
@@ -30,40 +29,40 @@ from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
 TOUCHES = 100
 
 PHASE = 0.7548776662466927
-"""Its multiples lie evenly in a period of the bridge, whatever their number, and beside those of the scan."""
+"""Its multiples sample a bridge period evenly, whatever their number, independent of the scan."""
 
 LEAD_US = 5_000
-"""So long before a touch everything comes when the bridge delivers it; what came earlier is written at once."""
+"""Time before a touch from which packets are written on time; earlier ones are written at once."""
 
 SPIN_S = 300e-6
-"""A sleep may take longer by this, so the rest of a wait is spent looking at the clock."""
+"""Possible oversleep; the rest of a wait polls the clock."""
 
 LATE_S, LATE_US = 0.5e-3, 2_000
-"""A touch is left out where this machine was too busy to write a packet in time, by more than LATE_S, in the last
-LATE_US before the touch's own: what then comes at once would keep the driver busy as no bridge does."""
+"""A touch is left out if a busy machine wrote a packet late by more than LATE_S in the last LATE_US before the touch's
+own: a burst would keep the driver busy as no bridge does."""
 
 TRIES = 3
-"""Touches that are played for each that is wanted, at most."""
+"""Most touches played per wanted one."""
 
 WAIT_S = 10.0
-"""For a frame; far longer than it takes."""
+"""Timeout for a frame, far longer than needed."""
 
 TIME_MASK = (1 << 24) - 1
-"""Of a frame's time on the wire."""
+"""Mask of a frame's time on the wire."""
 
 
 @dataclasses.dataclass(frozen=True)
 class HostShare:
-    """From the bytes at the port to the zones in user code, on one machine."""
+    """Times from the bytes at the port to the zones in user code, on one machine."""
 
     us: Spread
     touches: int
     left_out: int
-    """Touches that were not written in time, because the machine was busy (:data:`LATE_S`)."""
+    """Touches left out because the machine was busy (:data:`LATE_S`)."""
     machine: str
-    """Where it was measured."""
+    """Description of the machine."""
     times: MixedTimes = dataclasses.field(repr=False, compare=False)
-    """Each of them, in us."""
+    """The times in us."""
 
 
 def measured(
@@ -73,8 +72,8 @@ def measured(
     touches: int = TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> HostShare | None:
-    """Of touches by these contacts in turn, (R, C) bool. None where there are no pseudo-terminals, and where the
-    machine is too busy to play a single touch in time."""
+    """The host's share over touches by these (R, C) bool contacts in turn. None without pseudo-terminals, or if the
+    machine is too busy for a single touch."""
     if not hasattr(os, "openpty"):
         return None
     found: list[float] = []
@@ -103,7 +102,7 @@ def measured(
 
 
 def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
-    """What user code does for a touch: wait for the frame that shows it, take its zones. Returns the time in us."""
+    """Wait for the frame of a touch and take its zones, as user code does. Returns the time in us."""
     while True:
         zones = board.next(WAIT_S)
         tuple(zones)
@@ -113,7 +112,7 @@ def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
 
 
 def machine() -> str:
-    """This machine and its Python, in a few words."""
+    """This machine and its Python in a few words."""
     processor = platform.processor() or platform.machine()
     if (about := Path("/proc/cpuinfo")).exists():
         names = [line.partition(":")[2].strip() for line in about.read_text().splitlines() if "model name" in line]
@@ -124,7 +123,7 @@ def machine() -> str:
 
 
 class _Player:
-    """The board and its bridge."""
+    """A player of the board and its bridge."""
 
     def __init__(self, skin: Skin, settings: BridgeSettings, contacts: Sequence[np.ndarray], touches: int):
         import tty  # no such module on Windows
@@ -136,15 +135,15 @@ class _Player:
         self.port = os.ttyname(self._slave)
         self.go = context.Event()
         self.written_s = context.RawArray("d", touches)
-        """By touch when the packet with its last byte was about to be written, on ``time.monotonic``."""
+        """Per touch, ``time.monotonic`` just before the packet with its last byte was written."""
         self.time_us = context.RawArray("q", [-1] * touches)
-        """By touch the time of its frame as it is on the wire."""
+        """Per touch, its frame's time on the wire."""
         self.late_s = context.RawArray("d", touches)
-        """By touch by how much that packet, or one shortly before, was written too late, at most."""
+        """Per touch, the largest lateness of that packet and those shortly before."""
         self.process = context.Process(target=self._run, daemon=True)
 
     def close(self) -> None:
-        """Give the pseudo-terminal back."""
+        """Close the pseudo-terminal."""
         os.close(self._master)
         os.close(self._slave)
 

@@ -16,17 +16,17 @@ from contactfpga_sim.lab.spread import Spread
 EXACT, MEASURED, PAPER = style.BLUE, style.ORANGE, style.GRAY
 
 PALE = 0.35
-"""How much of a bar's color is left from the median to the worst."""
+"""Share of a bar's color from the median to the worst."""
 
 
 def save(found: Finger, title: str, path: Path) -> Path:
-    """Draw it; the same numbers give the same file."""
+    """Draw the picture; the same numbers give the same file."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture(found, title), path)
 
 
 def picture(found: Finger, title: str) -> Figure:
-    """Stages from above in their order, each alone, then the sums; times along."""
+    """Stages downward in order, each alone, then the sums; times along."""
     bars = _bars(found)
     figure = style.new(0.36 * (len(bars) + 1) + 2.2)
     above, below = figure.subplots(2, 1, height_ratios=[len(bars) + 0.3, 2.6])

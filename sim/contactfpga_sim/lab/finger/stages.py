@@ -1,4 +1,4 @@
-"""The stages from a touch to user code: what is exact, and what is measured on one machine."""
+"""The stages from a touch to user code: exact ones, and one measured on this machine."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from contactfpga_sim.lab.spread import MEDIAN, MOST, MixedTimes, Spread, summed
 from contactfpga_sim.lab.usb import BridgeSettings, delivered
 
 PAPER_US = 6000.0
-"""What the paper states for its sheet and control together, from a touch to the decision to turn back, in us."""
+"""The paper's time for sheet and control together, from a touch to the decision to turn back, in us."""
 
 ASSUMED_HOST_US = 1e6 * Usb().host_s
-"""From the host's USB controller to the decision, as ``contactfpga study arm`` takes it."""
+"""Time from the host's USB controller to the decision, as in ``contactfpga study arm``."""
 
 
 class TooFast(ContactFPGAError, ValueError):
@@ -29,14 +29,14 @@ class TooFast(ContactFPGAError, ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Finger:
-    """What :func:`measure` found. Times in us; all but ``host`` and ``user_code_us`` are exact."""
+    """Results of :func:`measure`. Times in us; all but ``host`` and ``user_code_us`` are exact."""
 
     board: Latency
     settings: BridgeSettings
     bridge_us: Spread
     """From the last byte on the wire to the host's USB controller."""
     usb_us: Spread
-    """From the touch to there."""
+    """From the touch to the host's USB controller."""
     host: HostShare | None
     """None: not measured."""
     user_code_us: Spread | None
@@ -44,11 +44,11 @@ class Finger:
 
     @property
     def decision_us(self) -> Spread:
-        """From the touch to the decision, with :data:`ASSUMED_HOST_US` in place of what a machine takes."""
+        """From the touch to the decision, with :data:`ASSUMED_HOST_US` in place of the host's time."""
         return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
 
     def as_json(self) -> dict[str, Any]:
-        """All of it as plain values."""
+        """All results as plain values."""
         board = dataclasses.asdict(dataclasses.replace(self.board, recorded=()))
         del board["recorded"]
         shares = self.host
@@ -79,8 +79,8 @@ def measure(
     host_touches: int = host.TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> Finger:
-    """The board's stages as :func:`contactfpga_sim.lab.latency.measure` finds them, the bridge's over all of its phases
-    for each touch, and the host's of ``host_touches``, 0 for none.
+    """The board's stages by :func:`contactfpga_sim.lab.latency.measure`, the bridge's over all its phases, and the
+    host's over ``host_touches``, 0 for none.
 
     Raises ValueError for a contact that does not fit, :class:`TooFast`, and :class:`~contactfpga_sim.lab.latency.Late`.
     """

@@ -1,1 +1,1 @@
-"""No more than the scene needs: the cheapest Skin that meets stated errors and a stated time on given scenes."""
+"""The cheapest Skin that meets stated errors and a stated time on given scenes."""

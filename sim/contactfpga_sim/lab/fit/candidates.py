@@ -1,4 +1,4 @@
-"""The Skins that are tried: every method at every pitch under every cover, all on sheets of one size."""
+"""The Skins to try: every method at every pitch under every cover, on sheets of one size."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:
-    """The methods of a labeller: connectivity makes a difference to exact ones."""
+    """The methods of a labeller; connectivity matters to exact ones."""
     settings = {"labeller": labeller.name, "report": "moments"}
     return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
 
 
 METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
-"""Barycenters divided on the board are none: they cost more LUT4 and save a few microseconds per zone."""
+"""Methods to try. On-board division is not among them: it costs more LUT4 and saves only microseconds per zone."""
 
 COARSEST_MM, FINEST_MM = 32.0, 4.0
-"""Pitches between which every whole number of columns is tried."""
+"""Range of pitches, with every whole number of columns."""
 
 
 SHEET = ("rows", "columns", "pitch_x_mm", "pitch_y_mm")
@@ -35,15 +35,15 @@ SHEET = ("rows", "columns", "pitch_x_mm", "pitch_y_mm")
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """A Skin to try, or why there is none."""
+    """A Skin to try, or the reason for its refusal."""
 
     settings: tuple[tuple[str, Any], ...]
-    """What differs from the Skin asked for, in the order of the names."""
+    """Differences from the requested Skin, sorted by name."""
     skin: Skin | None
     refusal: str = ""
-    """What Skin or Cover says."""
+    """Error message of Skin or Cover."""
     cover: Cover | None = None
-    """Through which contacts press."""
+    """Cover through which contacts press."""
 
 
 def candidates(
@@ -56,7 +56,7 @@ def candidates(
     covers: Faces = BARE,
 ) -> list[Candidate]:
     """``base`` with each pitch (x, y) near the given ones that divides the sheet, each cover, method, scan and baud
-    rate; without ``scans`` those that columns of ``base`` can have: they are driven with precharge, or they are not."""
+    rate. Default ``scans``: those that fit the columns of ``base``, with or without precharge."""
     if scans is None:
         scans = [name for name, scan in SCANS.items() if not scan.waits or base.precharge_us]
     found = {}
@@ -95,9 +95,9 @@ def _candidate(base: Skin, settings: dict[str, Any], cover: Cover | None, wide: 
 
 
 def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
-    """Of the sheet: that of the Skin asked for, else what the sources ask for, else that of the reference Skin.
+    """Size of the sheet: the requested Skin's, else the sources', else the reference Skin's.
 
-    Raises ValueError where two of them disagree.
+    Raises ValueError if two disagree.
     """
     asked = {one: size for one in sources if (size := one.size_mm())}
     if base is not None:
@@ -117,8 +117,8 @@ def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
 
 
 def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[float] | None) -> list[Size]:
-    """Pitches (x, y) in mm to try: those asked for, else those of every whole number of columns from
-    :data:`COARSEST_MM` to :data:`FINEST_MM` with that of the Skin asked for; of a recording only its own."""
+    """Pitches (x, y) in mm to try: those requested, else every whole number of columns from :data:`COARSEST_MM` to
+    :data:`FINEST_MM` and the requested Skin's; for a recording only its own."""
     for pitch in asked or ():
         if not 0 < pitch < math.inf:
             raise ValueError(f"--pitch-mm is {pitch}; it must be above 0")

@@ -1,4 +1,4 @@
-"""The covers that are tried on each sheet, and how well a fingertip is felt through one."""
+"""The covers to try on each sheet, and how well a fingertip is felt through one."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from contactfpga.design.cover import Cells, Cover, CoverError, Ellipse, Load, ce
 from contactfpga_sim.lab import covers
 
 KINDS = ("caps", "tiles")
-"""Of :data:`contactfpga_sim.lab.covers.COVERS`: those that can be made with any switch."""
+"""Keys of :data:`contactfpga_sim.lab.covers.COVERS` that work with any switch."""
 
 DOMES_N = (0.15, 0.25, 0.4, 0.6, 1.0)
-"""Closing forces of the switches below them."""
+"""Closing forces of the switches below the covers."""
 
 Faces = dict[str, Callable[[float], Cover | None]]
-"""By name: the cover of a sheet with this pitch in mm; None: there is none."""
+"""Covers by name, as functions of the pitch in mm; None: no cover."""
 
 BARE: Faces = {"bare": covers.bare}
 
 
 def faces(kinds: Sequence[str] = KINDS, domes_n: Sequence[float] = DOMES_N, foam_mm: float = 2.0) -> Faces:
-    """Each kind; caps and tiles with each switch under foam of this thickness."""
+    """Each kind; caps and tiles with each switch, under foam of this thickness."""
     found: Faces = {}
     for kind in kinds:
         if kind not in KINDS:
@@ -43,12 +43,12 @@ def _on_domes(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cov
 
 
 def own(cover: Cover) -> Faces:
-    """One cover for every sheet."""
+    """The same cover for every sheet."""
     return {"the file's": lambda pitch_mm: cover}
 
 
 def refusal(cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
-    """Why switches at this pitch cannot lie under the cover; empty where they can."""
+    """Why switches at this pitch do not fit the cover; empty if they do."""
     if cover is None or cover.model == "patch":
         return ""
     try:
@@ -59,23 +59,23 @@ def refusal(cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
 
 
 def feels(cover: Cover | None) -> bool:
-    """Whether it goes by force."""
+    """Whether the cover depends on force."""
     return cover is not None and cover.model != "patch"
 
 
 TOUCHES = 8
-"""Touches of a fingertip that are looked at for each scene."""
+"""Fingertip touches per scene."""
 
 FINGERTIP_M = (12e-3, 10e-3)
-"""Length and width of its ellipse."""
+"""Length and width of the fingertip's ellipse."""
 
 LINES = 9
-"""Rows and columns of the piece of a sheet on which they lie; they touch its middle cell."""
+"""Rows and columns of the piece of sheet; touches are on its middle cell."""
 
 
 def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers: Sequence[int]) -> list[float]:
-    """0 or 1 for each of the :data:`TOUCHES` of each number: 1 where a fingertip that presses with ``force_n`` at a
-    random place in the middle of a sheet, turned at random, closes no switch. Closing forces are drawn for each."""
+    """For each of the :data:`TOUCHES` of each number, 1 if a fingertip with ``force_n``, randomly placed and turned in
+    the sheet's middle, closes no switch, else 0. Closing forces are drawn for each."""
     pitch_x, pitch_y = (pitch * 1e-3 for pitch in pitch_mm)
     cells = cells_of(cover, LINES, LINES, pitch_x, pitch_y)
     found = []

@@ -1,4 +1,4 @@
-"""Errors and times of one Skin on the scenes of one source, kept by all that they depend on."""
+"""Errors and times of one Skin on the scenes of one source, cached by their inputs."""
 
 from __future__ import annotations
 
@@ -21,15 +21,14 @@ from contactfpga_sim.lab.fit.sources import Recorded, Source
 from contactfpga_sim.lab.fit.trial import FitTask
 
 Values = dict[str, list[float]]
-"""By metric, a value for each scene, or for each touch of a fingertip."""
+"""By metric, a value per scene or per fingertip touch."""
 
 
 def errors_of(
     task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, others: bool
 ) -> list[dict[str, Interval]]:
-    """By metric, of each Skin's zones against what there is; all of them have the same sheet under the same cover.
-    ``others``: on all scenes that are not used to choose; else on as many as it takes to decide. Frames of a recording
-    do not depend on chance, so all of them are looked at."""
+    """Errors by metric of each Skin's zones; all Skins have the same sheet and cover. ``others``: on all scenes
+    reserved for the report; else on as many as a decision needs. A recording has no chance in it: all frames count."""
     count = source.most(task.count)
     ends = [count] if others or isinstance(source, Recorded) else racing.ends(count)
     values: list[Values] = [{} for _ in skins]
@@ -72,12 +71,12 @@ def _compared(looks: Sequence[Look], skin: Skin) -> Values:
 
 
 def exact(skin: Skin) -> bool:
-    """Whether its zones are the connected pieces of the cells: then they depend on the connectivity alone."""
+    """Whether its zones are exactly the connected pieces, and so depend on connectivity alone."""
     return skin.report == "cells" or (skin.report == "moments" and labellers.find(skin.labeller).exact)
 
 
 def speed_of(task: FitTask, source: Source, skin: Skin, cover: Cover | None, others: bool, checked: int) -> Speed:
-    """Of touches spread over the same scenes; ``checked`` of them go through the compiled gateware as well."""
+    """Times of touches over the same scenes; ``checked`` of them also go through the compiled gateware."""
 
     def new() -> dict[str, float]:
         frames = [cells for cells in source.cells(skin, task.base, numbers, count, cover) if cells.any()]

@@ -1,9 +1,8 @@
-"""When enough scenes were looked at: a Skin that surely misses a limit is dropped, one that surely meets all is kept.
+"""Sequential test: a Skin that surely misses a limit is dropped, one that surely meets all is kept.
 
-Scenes are looked at in batches, and after each batch a Skin may be decided. A limit counts as met or missed where the
-end of a confidence interval says so; each side errs with a probability of at most 2.5 %, shared equally by all looks.
-Shares have Chernoff's interval, which holds for any values between 0 and 1 and any number of them, other errors that of
-the normal distribution.
+After each batch of scenes a Skin may be decided, by the ends of confidence intervals; each side errs with at most 2.5
+%, shared equally by all looks. Shares have Chernoff's interval, valid for any values from 0 to 1 and any count; other
+errors have the normal distribution's.
 """
 
 from __future__ import annotations
@@ -17,17 +16,17 @@ import numpy as np
 from contactfpga_sim.lab.fit.trial import SHARES, Goals
 
 FIRST = 20
-"""Scenes in the first batch; each look has twice as many as the one before."""
+"""Scenes in the first batch; each look doubles the number."""
 
 ENOUGH = 30
-"""Values from which on their mean is taken to have a normal distribution."""
+"""Values from which their mean counts as normally distributed."""
 
 ERR = 0.025
-"""Probability with which a side of the interval errs, over all looks."""
+"""Error probability of one side of the interval, over all looks."""
 
 
 def ends(count: int) -> list[int]:
-    """Scenes after each batch, ``count`` at last."""
+    """Scenes after each batch, finally ``count``."""
     found = []
     reach = FIRST
     while reach < count:
@@ -50,7 +49,7 @@ def decided(goals: Goals, values: dict[str, list[float]], looks: int) -> bool | 
 
 
 def bounds(name: str, values: Sequence[float], err: float) -> tuple[float, float]:
-    """Of the mean of a metric, each of which errs with at most this probability."""
+    """Bounds of a metric's mean, each wrong with at most this probability."""
     known = np.array([value for value in values if not math.isnan(value)], float)
     if not len(known):
         return -math.inf, math.inf
@@ -66,7 +65,7 @@ def bounds(name: str, values: Sequence[float], err: float) -> tuple[float, float
 
 def chernoff(mean: float, count: int, err: float, end: float) -> float:
     """The value between ``mean`` and ``end``, 0 or 1, whose relative entropy is ln(1/err)/count: the mean of values
-    between 0 and 1 lies beyond it with a probability of at most ``err`` (Hoeffding 1963, theorem 1)."""
+    from 0 to 1 is beyond it with probability at most ``err`` (Hoeffding 1963, theorem 1)."""
     most = math.log(1 / err) / count
     near, far = mean, end
     for _ in range(60):
@@ -76,6 +75,6 @@ def chernoff(mean: float, count: int, err: float, end: float) -> float:
 
 
 def _entropy(p: float, q: float) -> float:
-    """Of a coin with the probability p relative to one with q."""
+    """Relative entropy of coins with probabilities p and q."""
     parts = ((p, q), (1 - p, 1 - q))
     return sum(one * math.log(one / other) if other else math.inf for one, other in parts if one)

@@ -1,5 +1,4 @@
-"""The search: the sheets with the fewest wires first, errors and times of each, then the size of those that are good
-enough."""
+"""The search: sheets with the fewest wires first; errors and times of each, then the size of the good ones."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ from contactfpga_sim.lab.fit.measuring import errors_of, exact, speed_of
 from contactfpga_sim.lab.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 
 CHECKED = 2
-"""Of the answer's reported touches, this many go through the compiled gateware as well."""
+"""Reported touches of the answer that also go through the compiled gateware."""
 
 ZONES_ON_HOST = "reports no zones: say with --host-us how long the host takes to find them"
 
@@ -30,9 +29,8 @@ def fit(
     step: Step = lambda name, of: None,
     so_far: SoFar | None = None,
 ) -> Fit:
-    """Choose; ``step(kind of work, pieces of that kind)`` is called after each piece. What was worked out before with
-    the same code is kept. Neither the order of the candidates nor that of the sources makes a difference. ``so_far`` is
-    there for those who end the search before it is done."""
+    """Choose a Skin; ``step(kind of work, pieces of that kind)`` is called after each piece. Results of the same code
+    are cached. The order of candidates and sources does not matter. ``so_far`` serves a search that is interrupted."""
     so_far = {} if so_far is None else so_far
     ordered = sorted(tried, key=lambda one: repr(one.settings))
     impossible = [Trial(one, refusals=(one.refusal,)) for one in ordered if one.skin is None]
@@ -82,8 +80,8 @@ def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor:
 def _judged(
     task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, before: int
 ) -> list[Trial]:
-    """All with the limits that they miss on the scenes to choose with; times only of those whose errors are small
-    enough. ``before``: pieces of work of the sheets before."""
+    """All candidates with the limits that they miss on the choosing scenes; times only of those with small enough
+    errors. ``before``: pieces done on earlier sheets."""
     sheets: dict[Settings, dict[Settings, Candidate]] = {}
     for one in tried:
         sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one)
@@ -142,12 +140,12 @@ Settings = tuple[tuple[str, Any], ...]
 
 
 def _sheet(one: Candidate) -> Settings:
-    """The settings of the sheet, and its cover."""
+    """The sheet's settings, and its cover."""
     return tuple((name, value) for name, value in one.settings if name in (*SHEET, "cover"))
 
 
 def _sees(one: Candidate) -> Settings:
-    """The settings that decide what zones it finds."""
+    """The settings that decide which zones it finds."""
     assert one.skin is not None
     if exact(one.skin):
         return (("connectivity", one.skin.connectivity),)
@@ -155,7 +153,7 @@ def _sees(one: Candidate) -> Settings:
 
 
 def _words(task: FitTask, measured: Sequence[Measurement], sure: bool = True) -> tuple[str, ...]:
-    """The limits that are missed; of each source where there are several."""
+    """The missed limits, per source if there are several."""
     several = len(task.sources) > 1
     return tuple(
         f"{name}: {words}" if several else words
@@ -165,7 +163,7 @@ def _words(task: FitTask, measured: Sequence[Measurement], sure: bool = True) ->
 
 
 def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurement:
-    """With the time that the host takes to find zones, where it has to."""
+    """The measurement plus the host's labelling time, if the host labels."""
     if skin is None or skin.report != "cells" or task.host_us is None:
         return found
     assert found.speed is not None
@@ -176,7 +174,7 @@ def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurem
 def _reported(
     task: FitTask, trials: Sequence[Trial], executor: Executor, step: Step, checked: int
 ) -> tuple[tuple[Measurement, ...], ...]:
-    """Measured on the other scenes; touches of the first one are checked against the gateware."""
+    """Measurements on the other scenes; touches of the first Skin are checked against the gateware."""
     jobs: dict[Hashable, tuple[Any, ...]] = {}
     for number, one in enumerate(trials):
         for source in task.sources:

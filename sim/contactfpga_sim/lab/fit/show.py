@@ -1,4 +1,4 @@
-"""What a fit found, as a table, as text, as JSON and as the Skin's file."""
+"""A fit's result as a table, text, JSON and a Skin file."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from contactfpga_sim.lab.fit.sources import Recorded
 from contactfpga_sim.lab.fit.trial import Fit, Measurement, Trial
 
 HEADS = ("zones by", "scan", "cover", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
-"""Cover and baud are left out where all have the same."""
+"""Column headings; cover and baud are omitted if all have the same."""
 
 SHEETS = 12
-"""Sheets that are refused of which a line is shown: the finest."""
+"""Refused sheets that get a line: the finest."""
 
 METRIC_HEADS = ("scenes miscounted", "contacts missed", "barycenter", "area")
 
 
 def printed(found: Fit) -> None:
-    """Print tables and notes for people."""
+    """Print tables and notes."""
     _print(rows(found), bold="the answer")
     _print(reported(found), keys=1)
     for line in notes(found):
@@ -34,20 +34,20 @@ def printed(found: Fit) -> None:
 
 
 def printed_so_far(trials: Iterable[Trial]) -> None:
-    """Print what is known when the search was interrupted."""
+    """Print the results of an interrupted search."""
     _print(rows_so_far(trials))
 
 
 def _print(lines: Sequence[Sequence[str]], keys: int = 4, bold: str | None = None) -> None:
-    """Of the Skins what tells them apart comes first, and the verdict last."""
+    """Print Skins: first what distinguishes them, last the verdict."""
     styles = {number: "bold" for number, line in enumerate(lines[1:]) if line[-1] == bold}
     tables.show(lines, keys=keys, texts=[len(lines[0]) - 1] if keys > 1 else [], styles=styles)
 
 
 def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
     """The head, a line for the refused ones of each sheet with fewer wires and of each cover on the answer's sheet, the
-    answer and the runner-up; without an answer a line for each sheet, the nearest one first. ``impossible``: at the end
-    those for which there is no Skin."""
+    answer and the runner-up; without an answer a line per sheet, the nearest first. ``impossible``: end with the Skins
+    that cannot exist."""
     lines = [_row(one, _why(one, of)) for one, of in _told(fit)]
     if fit.answer:
         lines.append(_row(fit.answer, "the answer"))
@@ -59,9 +59,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """Of the refused ones those to show, each the nearest of how many: all on the answer's sheet under its cover, one
-    for each other cover there, one for each sheet with fewer wires, no more than :data:`SHEETS`; without an answer one
-    for each sheet."""
+    """The refused trials to show, each the nearest of a number: all on the answer's sheet under its cover, one per
+    other cover there, one per sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer
@@ -91,13 +90,13 @@ def _without_same(table: list[list[str]]) -> list[list[str]]:
 
 
 def rows_so_far(trials: Iterable[Trial]) -> list[list[str]]:
-    """The head, and a line for each Skin that was measured when the search was ended, the nearest one first."""
+    """The head, and a line for each measured Skin of an interrupted search, the nearest first."""
     nearest = sorted(trials, key=lambda one: (one.excess, one.cost))
     return _without_same([list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)])
 
 
 def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
-    """The same for JSON."""
+    """The results of an interrupted search for JSON."""
     return {"interrupted": True, "measured": [_trial(one) for one in sorted(trials, key=lambda one: one.excess)]}
 
 
@@ -113,7 +112,7 @@ def _bytes(trial: Trial) -> str:
 
 
 def _latency(speeds: Sequence[Speed]) -> str:
-    """Median and worst, of the source that takes longest."""
+    """Median and worst latency of the slowest source."""
     if not speeds:
         return ""
     return f"{max(one.median_us for one in speeds):.0f} / {max(one.worst_us for one in speeds):.0f}"
@@ -156,7 +155,7 @@ def name(trial: Trial) -> str:
 
 
 def reported(fit: Fit) -> list[list[str]]:
-    """The head, and a line for each Skin and source of what was measured on the other scenes."""
+    """The head, and a line per Skin and source, measured on the other scenes."""
     feels = any("unfelt" in one.errors for measured in fit.reported for one in measured)
     metrics = [*METRICS, "unfelt"] if feels else METRICS
     felt = [f"not felt at {fit.task.goals.felt_n:g} N"] * feels
@@ -179,7 +178,7 @@ def _error(metric: str, error: Interval) -> str:
 
 
 def notes(fit: Fit) -> list[str]:
-    """What has to be said of the answer, or of there being none."""
+    """Remarks on the answer, or on its absence."""
     lines = []
     if fit.answer is None:
         lines.append("No Skin that was tried meets the limits.")
@@ -205,7 +204,7 @@ def notes(fit: Fit) -> list[str]:
 
 
 def toml(fit: Fit, command: str) -> str:
-    """The answer's file, with what was measured on top."""
+    """The answer's file, with its measurements on top."""
     assert fit.answer is not None
     lines = [command, f"{fit.answer.luts} LUT4 on {DEVICE.fpga}, {fit.answer.wires} wires"]
     for source, one in zip(fit.task.names, fit.reported[0], strict=True):
@@ -219,7 +218,7 @@ def toml(fit: Fit, command: str) -> str:
 
 
 def plain(fit: Fit) -> dict[str, Any]:
-    """For JSON; errors are shares and mm, times us."""
+    """The fit for JSON; errors are shares and mm, times us."""
     shown = [one for one in (fit.answer, fit.runner_up) if one] or list(fit.cheaper[:1])
     names = ("answer", "runner_up") if fit.answer else ("nearest",)
     others = {

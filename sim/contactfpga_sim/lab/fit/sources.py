@@ -1,7 +1,7 @@
-"""Where scenes come from: families, built-in scenes, scene files and recordings, one scene per number.
+"""Sources of scenes: families, built-in scenes, scene files and recordings, one scene per number.
 
-A source's scenes depend on what it says and on the number only, never on a name or an order. Numbers below a count
-serve to choose, those from it on to report.
+Scenes depend on the source's content and the number only, never on name or order. Numbers below a count are for
+choosing, later ones for the report.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, Scene
 
 SHIFT_MM = 10.0
-"""A built-in scene lies in one place: it is moved at random by up to this much along x and y."""
+"""Largest random shift of a built-in scene along x and y."""
 
 SECONDS = 1.0
-"""A built-in scene is looked at in a random instant of its first second."""
+"""A built-in scene is sampled at a random instant of its first second."""
 
 COUNT = 500
-"""Scenes to choose with where nothing else is said."""
+"""Default number of choosing scenes."""
 
 Size = tuple[float, float]
 """Width and height of a sheet in mm."""
@@ -43,34 +43,34 @@ class Source(abc.ABC):
     """Scenes to choose a Skin with, and others to report."""
 
     def size_mm(self) -> Size | None:
-        """Of the sheet that these scenes ask for; None where any will do."""
+        """Sheet size that the scenes need; None: any."""
         return None
 
     def most(self, count: int) -> int:
-        """Scenes there are to choose with, ``count`` at most; and as many to report."""
+        """Available choosing scenes, at most ``count``; as many are for the report."""
         return count
 
     @abc.abstractmethod
     def looks(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[Look]:
-        """The scenes with these numbers, below twice ``count``, on a sheet under a cover; ``base``: the Skin asked
-        for."""
+        """The scenes with these numbers, below twice ``count``, on a sheet under a cover; ``base``: the requested
+        Skin."""
 
     @abc.abstractmethod
     def cells(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[np.ndarray]:
-        """(R, C) bool of the same, without what there is to be found."""
+        """The pressed (R, C) bool cells of these scenes, without the true contacts."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Placed(Source):
-    """Contacts at places drawn at random."""
+    """Contacts at random places."""
 
     @abc.abstractmethod
     def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
-        """A scene, and the instant in s at which it is looked at."""
+        """A scene, and its sampling instant in s."""
 
     def looks(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
@@ -97,7 +97,7 @@ class Family(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class BuiltIn(Placed):
-    """One of :data:`contactfpga_sim.model.scenes.scene.CONTACTS`, made for the Skin asked for."""
+    """One of :data:`contactfpga_sim.model.scenes.scene.CONTACTS`, made for the requested Skin."""
 
     scene: str
     seed: int = 0
@@ -114,7 +114,7 @@ class BuiltIn(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Shifted:
-    """A value over time, moved."""
+    """A time-dependent value, moved."""
 
     value: Value
     by: float
@@ -129,7 +129,7 @@ def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
 
 @dataclasses.dataclass(frozen=True)
 class File(Placed):
-    """What a scene file says."""
+    """The contacts of a scene file."""
 
     says: SceneFile
 
@@ -143,9 +143,8 @@ class File(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Recorded(Source):
-    """A recording: cells of one sheet, and no contacts. What there is to be found are their connected pieces, by the
-    connectivity of the Skin asked for. Scenes to choose come from its first half, those to report from the second,
-    evenly spaced in each."""
+    """A recording: cells of one sheet without contacts. The truth is their connected pieces, by the requested Skin's
+    connectivity. Choosing scenes are from its first half, report scenes from the second, evenly spaced."""
 
     path: str
     digest: str
@@ -153,7 +152,7 @@ class Recorded(Source):
 
     @property
     def recording(self) -> Recording:
-        """What the file holds."""
+        """The file's recording."""
         return _recording(self.path, self.digest, self.threshold)
 
     def size_mm(self) -> Size | None:
@@ -184,11 +183,11 @@ def _recording(path: str, digest: str, threshold: float | None) -> Recording:
 
 
 def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
-    """By the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a recording.
+    """A source by the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a
+    recording.
 
-    ``seed``: of the places, in the place of the file's. ``threshold``: above which a recording's numbers are pressed.
-    A family hides the built-in scene of its name.
-    Raises ValueError for anything else.
+    ``seed`` of the places replaces the file's. ``threshold``: above it a recording's numbers are pressed. Families take
+    precedence over scenes. Raises ValueError for anything else.
     """
     if name in FAMILIES:
         return Family(name, seed or 0)
@@ -208,5 +207,5 @@ def source(name: str, seed: int | None = None, threshold: float | None = None) -
 
 
 def default_count(sources: Sequence[Source]) -> int:
-    """Scenes to choose with: the most that a file asks for."""
+    """Choosing scenes: the most that a file requests."""
     return max((one.says.count for one in sources if isinstance(one, File)), default=COUNT)

@@ -1,4 +1,4 @@
-"""Writes what `contactfpga fit` chooses for the examples into docs/fit.md."""
+"""Writes the choices of `contactfpga fit` for the examples into docs/fit.md."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga_sim.lab.fit.search import fit
 
 
 def section(arguments: str) -> str:
-    """The command and what it says, but for the settings that Skin itself refuses."""
+    """The command and its output, without settings that Skin itself refuses and the check of the runner-up."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
@@ -21,7 +21,9 @@ def section(arguments: str) -> str:
     task, tried = asked(parser.parse_args(shlex.split(arguments)))
     with pool.executor(None, None) as executor, pool.progress() as step:
         found = fit(task, tried, executor, step)
-    tables = (show.rows(found, impossible=False), show.reported(found))
+    head, checked = show.reported(found)[:2]
+    checked[0] = checked[0].partition(":")[0]
+    tables = (show.rows(found, impossible=False), [head, checked])
     none = f"Skin itself refuses {len(found.impossible)} more settings."
     return "\n\n".join((f"    {command}", *map(writer.table_of, tables), " ".join((*show.notes(found), none))))
 

@@ -1,4 +1,4 @@
-"""What is asked, what a Skin has to meet, what was tried, and what came of it."""
+"""The task, its goals, the trials and the result of a fit."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from contactfpga_sim.lab.fit.sources import Source
 
 @dataclasses.dataclass(frozen=True)
 class Measurement:
-    """Of one Skin on the scenes of one source."""
+    """One Skin on the scenes of one source."""
 
     errors: dict[str, Interval]
-    """By metric: of its zones against what there is."""
+    """Errors of its zones by metric."""
     speed: Speed | None = None
-    """None where it was not looked at, because errors are too large."""
+    """None if not measured, because errors are too large."""
 
 
 DOUBT = ": too few scenes to tell"
@@ -31,11 +31,11 @@ DOUBT = ": too few scenes to tell"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Goals:
-    """Limits; None: none. A mean error meets its limit when the upper end of its 95 % interval does, so that scenes
-    that were not looked at will most likely not break it; a time does when the worst that was measured does."""
+    """Limits; None: no limit. A mean error meets its limit if the upper end of its 95 % interval does, so that unseen
+    scenes most likely agree; a time does if the worst measured one does."""
 
     miscounted: float | None = 0.05
-    """Share of scenes with another number of zones than of contacts."""
+    """Share of scenes with a wrong number of zones."""
     missed: float | None = 0.05
     """Share of contacts without a zone."""
     barycenter_mm: float | None = 5.0
@@ -45,9 +45,9 @@ class Goals:
     latency_us: float | None = 1000.0
     """From the touch to the last byte of the frame that holds all of it."""
     unfelt: float | None = 0.01
-    """Share of touches of a fingertip that close no switch; of covers that go by force."""
+    """Share of fingertip touches that close no switch; for covers that depend on force."""
     felt_n: float = 2.0
-    """Force in N with which it touches."""
+    """Force in N of these touches."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -56,8 +56,8 @@ class Goals:
                 raise ValueError(f"the limit of {field.name} is {value}; it must be above 0")
 
     def check_count(self, count: int, feeling: bool = False) -> None:
-        """Raises ValueError where this many scenes without an error could not show that a share is below its limit;
-        ``feeling``: fingertips touch, too."""
+        """Raises ValueError if this many scenes without an error could not show that a share is below its limit;
+        ``feeling``: includes fingertip touches."""
         for name, each in (("miscounted", 1), ("missed", 1), ("unfelt", TOUCHES if feeling else 0)):
             limit, of = getattr(self, name), count * each
             if of and limit is not None and Z95**2 / (of + Z95**2) > limit:
@@ -73,10 +73,10 @@ class Goals:
         return [(name, limit) for name, limit in given if limit is not None]
 
     def misses(self, found: Measurement, sure: bool = True) -> list[tuple[float, str]]:
-        """For each limit that is not met: how many times it is exceeded, and what was measured. Where one is surely
-        missed, those that too few scenes leave open are left out: a Skin that is dropped early was looked at on few.
+        """For each missed limit: the factor by which it is exceeded, and the measurement. If one is surely missed,
+        limits left open by few scenes are omitted.
 
-        ``sure``: errors are judged by the upper ends of their intervals, else by their means.
+        ``sure``: judge errors by the upper ends of their intervals, else by their means.
         """
         missed = list(self._missed(found, sure))
         beyond = [one for one in missed if not one[1].endswith(DOUBT)]
@@ -103,12 +103,12 @@ class Goals:
             yield over, f"{what}, limit {self.latency_us:.0f} us"
 
     def margin(self, found: Measurement) -> float:
-        """The greatest upper end of an error as a share of its limit."""
+        """The largest ratio of an error's upper end to its limit."""
         ends = (found.errors[name].high / limit for name, limit in self.limits() if name in found.errors)
         return max(ends, default=0.0)
 
     def excess(self, found: Measurement) -> float:
-        """How many times the limit that is missed most is exceeded; 1 where all are met."""
+        """The largest factor by which a limit is exceeded; 1 if all are met."""
         return max((over for over, _ in self.misses(found)), default=1.0)
 
 
@@ -121,7 +121,7 @@ _ERRORS = (
 )
 
 SHARES = ("miscounted", "missed", "unfelt")
-"""Errors that lie between 0 and 1."""
+"""Errors that are shares from 0 to 1."""
 
 
 def _number(value: float) -> str:
@@ -129,52 +129,51 @@ def _number(value: float) -> str:
 
 
 SoFar = dict[Candidate, "Trial"]
-"""What is known of each candidate while the search goes on; all of them but those that Skin refuses."""
+"""Results of each candidate so far, without those that Skin refuses."""
 
 Step = Callable[[str, int], None]
-"""Called after each piece of work with its kind, and how many pieces of that kind there are."""
+"""Called after each piece of work with its kind, and the number of pieces of that kind."""
 
 TIMED = 48
-"""Touches of each source whose time is worked out."""
+"""Touches of each source that are timed."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FitTask:
-    """What is asked."""
+    """A fitting task."""
 
     sources: tuple[Source, ...]
     names: tuple[str, ...]
-    """Of the sources, to be shown."""
+    """Names of the sources to show."""
     base: Skin
     goals: Goals
     count: int
-    """Scenes of each source to choose with; as many others are reported."""
+    """Choosing scenes of each source; as many others are for the report."""
     host_us: float | None = None
-    """How long the host takes to find zones in a bitmap; None: it does not."""
+    """Host time to find zones in a bitmap; None: the host does not."""
     quick: bool = False
-    """Only those that meet the goals are synthesized; which of the refused ones with as many wires are cheaper is not
-    said."""
+    """Synthesize only those that meet the goals; refused ones with as many wires are not ranked."""
     timed: int = TIMED
 
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A candidate with what was found."""
+    """A candidate with its results."""
 
     candidate: Candidate
     measured: tuple[Measurement, ...] = ()
     """One for each source."""
     refusals: tuple[str, ...] = ()
     excess: float = math.inf
-    """How many times the limit that is missed most is exceeded."""
+    """The largest factor by which a limit is exceeded."""
     margin: float = math.inf
-    """The greatest upper end of an error as a share of its limit."""
+    """The largest ratio of an error's upper end to its limit."""
     luts: int | None = None
-    """On the :data:`contactfpga_sim.lab.fit.cost.DEVICE`; None where it was not worked out."""
+    """LUT4 on the :data:`contactfpga_sim.lab.fit.cost.DEVICE`; None if not computed."""
 
     @property
     def skin(self) -> Skin:
-        """The Skin that was tried."""
+        """The Skin of the candidate."""
         assert self.candidate.skin is not None
         return self.candidate.skin
 
@@ -185,32 +184,32 @@ class Trial:
 
     @property
     def bytes(self) -> float:
-        """Median of a frame's bytes, of the source with the longest frames."""
+        """Median bytes of a frame, of the source with the longest frames."""
         return max((one.speed.bytes for one in self.measured if one.speed), default=math.nan)
 
     @property
     def cost(self) -> tuple[float, ...]:
-        """Wires, then LUT4, then bytes, then how close errors come to their limits."""
+        """Ranking key: wires, LUT4, bytes, then errors relative to limits."""
         return (self.wires, math.inf if self.luts is None else self.luts, self.bytes, self.margin)
 
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """What came of it."""
+    """Result of a fit."""
 
     task: FitTask
     answer: Trial | None
     runner_up: Trial | None
     cheaper: tuple[Trial, ...]
-    """Those refused that cost less than the answer, the cheapest first; or, without an answer, the nearest first."""
+    """Refused trials cheaper than the answer, the cheapest first; without an answer, the nearest first."""
     impossible: tuple[Trial, ...]
-    """Those for which there is no Skin."""
+    """Candidates that Skin refuses."""
     dearer: int
-    """Candidates that cost more than the answer."""
+    """Number of candidates more expensive than the answer."""
     reported: tuple[tuple[Measurement, ...], ...]
-    """Of the answer and the runner-up, or of the nearest: measured on scenes that were not used to choose."""
+    """Measurements of the answer and the runner-up, or of the nearest, on scenes not used to choose."""
     broken: tuple[str, ...]
-    """Limits that the answer misses there."""
+    """Limits that the answer misses on those scenes."""
 
 
 def gathered(
@@ -221,8 +220,8 @@ def gathered(
     before: int = 0,
     found: dict[Any, Any] | None = None,
 ) -> dict[Any, Any]:
-    """What each job, a function with its arguments, gives; ``before``: pieces of this kind that are done already;
-    ``found``: where it is put as soon as it is there."""
+    """The result of each job, a function with its arguments; ``before``: pieces of this kind already done; ``found``
+    receives each result at once."""
     futures: dict[Future[Any], Any] = {executor.submit(*job): key for key, job in jobs.items()}
     found = {} if found is None else found
     for future in as_completed(futures):

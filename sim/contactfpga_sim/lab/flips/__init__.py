@@ -1,1 +1,1 @@
-"""Bits of the running gateware flipped one by one: masked, told, or silently wrong."""
+"""Bits of the running gateware flipped one by one: masked, reported, or silently wrong."""

@@ -1,4 +1,4 @@
-"""All flips of all designs, in blocks that are kept, and their table; the designs, and what each takes of an FPGA."""
+"""All flips of all designs in cached blocks, and their table; the designs, and their size."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ DESIGNS: dict[str, dict[str, Any]] = {
     "run, on_change, dual": {"send": "on_change", "dual": True},
     "serial, dual": {"labeller": "serial", "dual": True},
 }
-"""Fields that differ from the reference Skin's."""
+"""Differences from the reference Skin."""
 
 
 def skin(design: str) -> Skin:
-    """The design with the clock and the line of the study."""
+    """The design with the study's clock and line."""
     return Skin(clock_hz=CLOCK_HZ, baud=BAUD, **DESIGNS[design])
 
 
@@ -44,7 +44,7 @@ def luts(design: str) -> int:
 
 
 BLOCK = 25
-"""Flips that one process follows before it is asked again."""
+"""Flips per piece of work of a process."""
 
 
 class Row(NamedTuple):
@@ -62,10 +62,10 @@ def run(
     done: Callable[[int], None],
     within_s: float | None = None,
 ) -> list[Row]:
-    """This many flips of register bits and of memory bits of each design. ``done`` is told the number of blocks
+    """This many flips of register bits and of memory bits of each design. ``done`` receives the number of blocks
     whenever one is finished.
 
-    ``within_s``: no block is begun later than that, but for the first of each; the rest is left out.
+    ``within_s``: time after which only each design's first block is begun.
     """
     counts = {False: math.ceil(registers / BLOCK), True: math.ceil(memories / BLOCK)}
     blocks = [(name, memory, block) for memory, count in counts.items() for block in range(count) for name in names]
@@ -94,7 +94,7 @@ def run(
 
 
 def _first(blocks: Iterable[list[FlipOutcome] | None]) -> Iterator[FlipOutcome]:
-    """Flips of the blocks up to the first that is not there: which ones are there may depend on what came of them."""
+    """Flips of the blocks before the first missing one; which blocks exist may depend on their outcome."""
     for found in itertools.takewhile(lambda block: block is not None, blocks):
         yield from found or ()
 
@@ -113,7 +113,7 @@ def _key(design: str, memory: bool, block: int) -> str:
 
 
 def finished(names: Iterable[str]) -> list[Row]:
-    """All flips of these designs that were followed before: of each the blocks up to the first one that was not."""
+    """All cached flips of these designs, of each the blocks before the first missing one."""
     return [
         Row(name, FlipOutcome(*one))
         for memory in (False, True)

@@ -1,4 +1,4 @@
-"""One flip, followed until it is gone or half a second is over, and what the host heard of it."""
+"""One flip, followed until it is gone or half a second is over, and the host's reaction."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ from contactfpga_sim.model.board.state import Bit, Storage
 from contactfpga_sim.model.sheet.matrix import Contention
 
 SETTLED_STEPS = 4
-"""The driver hears this many more once the board is what it was."""
+"""Steps that the driver still hears once the board has recovered."""
 QUIET_S = {"always": 0.02, "on_change": 0.12}
-"""Silence for longer is told: nothing comes though frames, or keep-alives, have to."""
+"""Longest silence that is not reported: frames or keep-alives are due earlier."""
 COUNTED = ("lost", "unexplained", "restarts", "foreign_skin", "foreign_version", "skin_changes", "unknown_kinds")
-"""Counters of the driver that stay 0 on a good line."""
+"""Driver counters that stay 0 on a good line."""
 
 Outcome = Literal["masked", "told", "silent"]
 
 
 class Flip(NamedTuple):
-    """What is flipped, and when."""
+    """Place and time of a flip."""
 
     bit: Bit
     cycle: int
 
 
 class FlipOutcome(NamedTuple):
-    """What came of it."""
+    """Outcome of a flip."""
 
     name: str
     memory: bool
     outcome: Outcome
     kind: str
-    """What is wrong, or by what it is told."""
+    """The error, or the means by which it is reported."""
     frames: int
-    """Silently wrong ones."""
+    """Number of silently wrong frames."""
     seconds: float
-    """From the first frame that was silently wrong until the next right one."""
+    """Time from the first silently wrong frame until the next right one."""
     gone_s: float
-    """When the board was again what it would have been; infinite if it was not within the time."""
+    """Time of the board's full recovery; infinite if later than the study."""
     fights: int = 0
     """Clocks in which a column was driven against a row."""
 
@@ -59,7 +59,7 @@ def module(name: str) -> str:
 
 
 def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Flip]:
-    """Random flips: each bit of all registers, or of all memories, is as likely, and so is each clock."""
+    """Random flips, uniform over the bits of all registers, or of all memories, and over clocks."""
     rng = np.random.default_rng([seed, memory])
     places = reference.board.places
     bits = np.array([place.bits * (place.memory == memory) for place in places])
@@ -74,7 +74,7 @@ def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Fli
 
 
 def follow(reference: Reference, flip: Flip) -> FlipOutcome:
-    """Flip it and say what comes of it."""
+    """Flip the bit and judge the outcome."""
     before = reference.board.fights
     listener, heard, gone_s = _run(reference, flip)
     return _judged(reference, flip, listener, heard, gone_s)._replace(fights=reference.board.fights - before)
@@ -107,7 +107,7 @@ def _silent(
 
 
 def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFrame], float]:
-    """The host after it, all frames since, and how long the board was another one."""
+    """The host afterwards, all frames since, and how long the board differed."""
     board, skin, clocks = reference.board, reference.skin, reference.step_clocks
     number = flip.cycle // clocks
     board.go_to(reference.steps[number].moment)
@@ -132,13 +132,13 @@ def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFram
 
 
 def _advance(board: CompiledBoard, clocks: int) -> None:
-    """Run on where pins meet at different levels, too: they are counted."""
+    """Run on, counting clocks in which pins are driven against each other."""
     with contextlib.suppress(Contention):
         board.run(clocks)
 
 
 def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame], gone_s: float, begun_s: float) -> str:
-    """The first of the ways in which the host knows."""
+    """The first way by which the host notices."""
     stats = listener.conversation.stats
     if listener.surprises:
         return "another Skin"
@@ -154,8 +154,7 @@ def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame],
 
 
 def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[DeliveredFrame, str]]:
-    """Frames that say what was not there or a time that was not theirs, and moments at which the host believes in a
-    frame that a newer one should have replaced."""
+    """Frames with a wrong sheet or time, and moments at which the host holds an outdated frame."""
     found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
     if reference.skin.send == "on_change":
         found += ((one, "stale") for one in _stale(reference, heard))
@@ -163,7 +162,7 @@ def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[Deli
 
 
 def _since_restart(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """The same with times as if the board had not been restarted: the first frame after it is as late as usual."""
+    """Frames with times as if the board had not restarted: the first one after it has the usual delay."""
     begun: dict[int, float] = {0: 0.0}
     for one in heard:
         shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)
@@ -179,7 +178,7 @@ def _kind(reference: Reference, one: DeliveredFrame) -> str:
 
 
 def _stale(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """For each change of the sheet that the host does not know of in time: that moment."""
+    """The moment of each sheet change that the host learns too late."""
     late = reference.late_s[1] + reference.slack_s
     for before, after in itertools.pairwise(heard):
         if after.time_s - before.time_s > QUIET_S["on_change"]:

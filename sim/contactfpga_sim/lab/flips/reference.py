@@ -1,4 +1,4 @@
-"""The run without a flip, which all others are compared with, and can be entered at many moments."""
+"""The run without a flip: the reference for all others, with many entry points."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from contactfpga_sim.lab.flips import touches
 from contactfpga_sim.model.board.state import Checkpoint, StateBoard
 
 CLOCK_HZ, BAUD = 5_000_000, 1_250_000
-"""Five twelfths of the reference Skin's: as many frames are scanned per second, in fewer clocks."""
+"""Five twelfths of the reference Skin's: as many frames per second in fewer clocks."""
 
 FIRST_S, LAST_S = 0.1, 0.6
-"""When bits are flipped: a hello comes in the time after each."""
+"""Range of flip times; a hello follows each."""
 AFTER_S = 0.5
-"""How long a flip is followed."""
+"""Time for which a flip is followed."""
 
 
 class DeliveredFrame(NamedTuple):
-    """A frame that the driver passed on."""
+    """A frame that the driver delivered."""
 
     time_s: float
-    """When its last byte came."""
+    """Arrival of its last byte."""
     said: touches.Said
     late_s: float
-    """By how much that is after its time of scan, as it says."""
+    """Delay after its own scan time."""
     flagged: bool
     restarts: int = 0
-    """Of the board, as the driver has counted: its time begins anew with each."""
+    """Board restarts by the driver's count; board time restarts with each."""
 
 
 @dataclasses.dataclass
@@ -53,7 +53,7 @@ class Listener:
         return cls(Conversation("the board", expected=skin, rng=random.Random(1)))
 
     def hear(self, events: np.ndarray, clock_hz: int) -> list[DeliveredFrame]:
-        """Bytes as they came; each packet is handed on with its delimiter."""
+        """Feed bytes as they arrived; each packet is delivered with its delimiter."""
         data = events["data"].astype(np.uint8)
         ends = np.flatnonzero(data == framing.DELIMITER) + 1
         found: list[DeliveredFrame] = []
@@ -77,20 +77,20 @@ def _heard(event: Arrival, now: float, restarts: int) -> DeliveredFrame:
 
 
 class Step(NamedTuple):
-    """The beginning of a sheet."""
+    """The beginning of one sheet state."""
 
     moment: Checkpoint
     listener: Listener
     events: np.ndarray
-    """Bytes until the next one."""
+    """Bytes until the next step."""
     heard: list[DeliveredFrame]
-    """Frames among them."""
+    """Frames of these bytes."""
 
 
 class Reference:
-    """A Skin's board while touches move, from power-up until the last flip has been followed.
+    """A Skin's board with moving touches, from power-up until the last flip is over.
 
-    Each instance has a board of its own, ``board``, to be flipped.
+    Each instance has a board of its own, ``board``, for flips.
     """
 
     def __init__(self, skin: Skin):
@@ -116,7 +116,7 @@ class Reference:
 
     @property
     def slack_s(self) -> float:
-        """By how much frames of another phase of the scan may be later or earlier: two scans, and a hello."""
+        """Allowed time shift of frames at another scan phase: two scans and a hello."""
         return self.late_s[1] - self.late_s[0] + 0.5e-3
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Shares of flips, by design and by module, and what they cost."""
+"""Shares of flips by design and module, and their cost."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Design(NamedTuple):
     luts: int
     """LUT4 of a UP5K."""
     registers: int
-    """Bits of flip-flops, those in front of and after memories among them."""
+    """Flip-flop bits, including those around memories."""
     memories: int
     """Bits of memory."""
 
 
 class Share(NamedTuple):
-    """How many of some flips came out so."""
+    """Share of flips with an outcome."""
 
     hits: int
     of: int
@@ -46,7 +46,7 @@ class Share(NamedTuple):
 
 
 def measured(names: Iterable[str]) -> list[Design]:
-    """Bits and LUT4 of designs; needs the programs of the extra ``boards``."""
+    """Bits and LUT4 of designs; needs the programs of extra ``boards``."""
     found = []
     for name in names:
         board = StateBoard(campaign.skin(name))
@@ -77,18 +77,18 @@ def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
 
 
 def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
-    """How many of them came out so."""
+    """The share of rows with this outcome."""
     return Share(sum(row.found.outcome == outcome for row in rows), len(rows))
 
 
 def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:
-    """For how long the silently wrong ones are wrong: median and longest, in ms."""
+    """Duration of silently wrong output: median and longest, in ms."""
     times = sorted(1e3 * row.found.seconds for row in rows if row.found.outcome == "silent")
     return (times[len(times) // 2], times[-1]) if times else (math.nan, math.nan)
 
 
 def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
-    """The same by what ``key`` says; first those with the most silently wrong ones."""
+    """Rows grouped by ``key``, the most silently wrong first."""
     parts: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         parts[key(row)].append(row)

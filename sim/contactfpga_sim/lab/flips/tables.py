@@ -1,4 +1,4 @@
-"""The tables of docs/flips.md, and its curve: flips that are silently wrong against what a design costs."""
+"""The tables of docs/flips.md, and its curve of silently wrong flips against a design's cost."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ KINDS = ("design", "outcome", "by", "flips")
 REGISTERS, MEMORIES = 400, 100
 """Flips of each design."""
 LONGEST_S = 25 * 60.0
-"""After which no more flips begin."""
+"""Time after which no more flips begin."""
 LONG_S = 0.005
-"""Longer than any fault that spoils a frame or two."""
+"""Limit above which a fault spoils more than a frame or two."""
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
-"""In words."""
+"""Outcomes in words."""
 
 
 class FlipResults(NamedTuple):
-    """What the sections share."""
+    """Results shared by the sections."""
 
     rows: Sequence[Row]
     designs: Sequence[Design]
 
 
 def compute() -> FlipResults:
-    """As many flips as there is time for, and the size of each design."""
+    """As many flips as time allows, and the size of each design."""
     with pool.executor() as executor, pool.progress() as step:
         done = functools.partial(step, "blocks of flips")
         rows = campaign.run(list(DESIGNS), REGISTERS, MEMORIES, executor, done, LONGEST_S)
@@ -59,7 +59,7 @@ def draw(folder: Path, found: FlipResults) -> list[Path]:
 
 
 def worst_text(found: FlipResults) -> str:
-    """What the flips of registers and of memories did at worst, with one copy and with two, and how rare that is."""
+    """The worst flips of registers and memories, with one copy and with two, and their rate."""
     rows = found.rows
     groups = [
         (f"Flips of {'memory' if memory else 'registers'} with {'two copies' if dual else 'one copy'}", some)
@@ -140,7 +140,7 @@ def modules_table(found: FlipResults) -> str:
 
 
 def ways_table(found: FlipResults) -> str:
-    """What is wrong with each design, or reports the flip."""
+    """Errors and reports of each design."""
     lines = []
     for design in found.designs:
         some = [row for row in found.rows if row.design == design.name and row.found.outcome != "masked"]
@@ -151,11 +151,11 @@ def ways_table(found: FlipResults) -> str:
 
 
 GOAL = 1.0
-"""Per cent."""
+"""Goal in percent."""
 
 
 def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
-    """Write it."""
+    """Draw the curve."""
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):

@@ -1,4 +1,4 @@
-"""What touches the sheet meanwhile, and all that a truthful frame can say of it."""
+"""The touches during a flip, and all truthful frames about them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from contactfpga.zones.zone import Zones
 from contactfpga_sim.model import golden
 
 STEP_S = 0.005
-"""Another sheet comes this often."""
+"""Interval of sheet changes."""
 PERIOD, REST = 8, 3
-"""For a scan that waits until something touches the sheet nothing does so in the last ``REST`` of ``PERIOD`` sheets."""
+"""For a scan that waits for touch, the last ``REST`` of every ``PERIOD`` sheets are empty."""
 
 Said = tuple[int, int, tuple[tuple[int, int, int], ...]]
-"""Pressed cells, zones in all, and the moments of those that are listed."""
+"""Pressed cells, total zones, and the moments of the listed ones."""
 
 
 def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
     """(count, rows, columns) bool: three touches of different sizes that move a cell at a time, and come and go. A scan
-    that waits until something touches the sheet has to wait now and then."""
+    that waits for touch sometimes waits."""
     rng = np.random.default_rng(seed)
     cells = np.zeros((count, skin.rows, skin.columns), bool)
     for rows, columns in ((2, 2), (3, 3), (4, 2)):
@@ -39,14 +39,14 @@ def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
 
 
 def said(zones: Zones) -> Said:
-    """What a frame says."""
+    """The content of a frame."""
     moments = tuple(sorted((int(area), int(x), int(y)) for area, x, y in zones.frame.moments.tolist()))
     return zones.pressed, zones.total_zones, moments
 
 
 class TruthWindow:
-    """What frames may say at each step: any scan of the sheet, which may have changed between two of its rows. A scan
-    that looks first which rows are touched passes over those that were not.
+    """Possible frames at each step: any scan of the sheet, which may change between two rows. A scan that first selects
+    touched rows skips the others.
 
     ``sheets``: (n, rows, columns) bool.
     """
@@ -55,11 +55,11 @@ class TruthWindow:
         self._skin = skin
         self._known: dict[bytes, Said] = {}
         self.still = [self._says(cells) for cells in sheets]
-        """What a scan of each sheet says that does not change meanwhile."""
+        """Content of a scan of each unchanging sheet."""
         self._changing = [self._between(*pair) for pair in itertools.pairwise(sheets)]
 
     def holds(self, what: Said, first: int, last: int) -> bool:
-        """Whether a scan can say this while the sheets from ``first`` to ``last`` are there."""
+        """Whether a scan can report this during the sheets from ``first`` to ``last``."""
         last = min(last, len(self.still) - 1)
         return what in self.still[first : last + 1] or any(what in self._changing[step] for step in range(first, last))
 

@@ -1,1 +1,1 @@
-"""Places finer than the pitch: how often the stated uncertainty covers the contact, also under a wrong model of it."""
+"""Places finer than the pitch: coverage of the stated uncertainty, also under a wrong contact model."""

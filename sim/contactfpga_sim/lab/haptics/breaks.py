@@ -1,7 +1,7 @@
-"""Where force joined to location fails: one thing that is not as assumed is increased until what is stated is wrong.
+"""Where force joined to location fails: one assumption is violated more and more until the stated result is wrong.
 
-Each value of a knob is tried with contacts at random places and of random forces, as many as it takes to say whether
-the stated 95 % hold for 90 % of them. The system says so where it does for half of those for which they do not hold.
+Each value is tried with contacts at random places and forces until it is clear whether the stated 95 % hold for 90 % of
+them. It counts as reported if half of the failing ones are.
 """
 
 from __future__ import annotations
@@ -24,45 +24,44 @@ from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, CoverageCase
 
 HOLDS = 0.9
-"""The share of contacts that has to be as stated. It lies below the 95 % that are stated, as chance alone puts as many
-on either side of those."""
+"""The required share of contacts within the stated interval, below the stated 95 % to allow for chance."""
 
 TELLS = 0.5
-"""The share of contacts that are not as stated and have to be told of."""
+"""The share of failing contacts that must be reported."""
 
 CLOSE_N = 1.0
-"""How near an estimate of a push has to be."""
+"""Allowed error of a push."""
 
 PUSH_N, LEVER_M = 12.0, 0.05
 SURFACE = Cylinder(0.038)
 SIGMA_N = 0.05
 REACH_M = 0.0036
-"""How far 12 N close switches, which is as unsure as a zone's place is: half of it along each axis."""
+"""Distance at which 12 N close switches, which is as uncertain as a zone's place: half of it along each axis."""
 
 SLOW = 480
-"""Draws at most of what takes 10 ms each."""
+"""Most draws of methods that need 10 ms each."""
 
 TRIES = 50
-"""Touches for one that closes a switch."""
+"""Attempts per touch that closes a switch."""
 
 CHI2_3 = 7.815
-"""Three degrees of freedom stay below it in 95 of 100 cases."""
+"""95 % quantile of chi-squared with three degrees of freedom."""
 
 Random = np.random.Generator
 
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """What is done to a link with units, and what is not as assumed."""
+    """Load on a link with units, and violated assumptions."""
 
     unseen_n: float = 0.0
-    """Push of a second contact that the sheet does not show."""
+    """Push of a second contact that the sheet does not see."""
     drift_n: float = 0.0
     torsion_nm: float = 0.0
     ends_n: float = math.inf
-    """What a unit can read at most, either way."""
+    """Range of a unit, either way."""
     elsewhere_m: float = 0.0
-    """How far the zone is from the contact."""
+    """Distance of the zone from the contact."""
     preload_n: float | None = None
 
 
@@ -81,7 +80,7 @@ def cells(load: Disturbance) -> LoadCells:
 
 
 def pressed(load: Disturbance, made: LoadCells, rng: Random) -> tuple[Floats, Floats, Contacts]:
-    """Place and force of one contact, and what is found of it."""
+    """Place and force of one contact, and the estimate."""
     x, y = rng.uniform(0, 2 * math.pi * SURFACE.radius_m), rng.uniform(-LEVER_M, LEVER_M)
     point, normal = (np.array(each) for each in SURFACE.place(x, y))
     across = np.array([0.0, 0.0, 1.0])
@@ -111,7 +110,7 @@ def _told(found: Contacts, alarm: bool) -> tuple[str, ...]:
 
 
 def force(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
-    """The force at the zone, by the zone's place."""
+    """Outcomes of the force at a zone, from the zone's place."""
     made, trials = cells(load), []
     for _ in range(count):
         _, exerted, found = pressed(load, made, rng)
@@ -123,7 +122,7 @@ def force(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
 
 
 def _center(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
-    """The center of pressure, by the units alone."""
+    """Outcomes of the center of pressure, from the units alone."""
     made, trials = cells(load), []
     around = 2 * math.pi * SURFACE.radius_m
     for _ in range(count):
@@ -140,7 +139,7 @@ def _center(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
 
 
 def _friction(kind: str, drag: float, rng: Random, count: int) -> list[Outcome]:
-    """Two fingers that push and drag: whether the stated interval holds the push of the first, or how near it is."""
+    """Outcomes of two fingers that push and drag: whether the stated interval holds the first push, or its error."""
     made, trials = cells(Disturbance()), []
     for _ in range(count):
         places = [SURFACE.place(rng.uniform(0, 0.09), at) for at in (-0.03, 0.03)]
@@ -159,13 +158,13 @@ def _friction(kind: str, drag: float, rng: Random, count: int) -> list[Outcome]:
 
 
 def holds(contact: Contact, push_n: float) -> bool:
-    """Whether the push lies in the stated interval."""
+    """Whether the stated interval holds the push."""
     least, largest = contact.interval_n or (math.inf, None)
     return least <= push_n and (largest is None or push_n <= largest)
 
 
 def _located(case: CoverageCase, rng: Random, count: int) -> list[Outcome]:
-    """Places on a flat sheet, of contacts that close a switch."""
+    """Outcomes of places on a flat sheet, for contacts that close a switch."""
     finder, trials = coverage.locator(case), []
     for _ in range(TRIES * count):
         one = coverage.press(case, rng)
@@ -250,4 +249,4 @@ KNOBS = {
               "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
     )
 }  # fmt: skip
-"""Every knob by its name, in the order of the page."""
+"""Knobs by name, in the page's order."""

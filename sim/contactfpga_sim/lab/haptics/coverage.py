@@ -1,4 +1,4 @@
-"""Simulated contacts on a flat sheet: a push rises, switches close, units read; what is found against what was."""
+"""Simulated contacts on a flat sheet: a push rises, switches close, units read; the estimate against the truth."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from contactfpga.skin.sheet import Sheet
 
 LINES = 16
 MIDDLE = 7
-"""Contacts lie in the cell from this switch to the next."""
+"""Contacts are in the cell from this switch to the next."""
 
 POINT, PATCH = Model("halfspace", "point"), Model("bonded", "patch")
 BALL = Ball(0.005, 4.6e5)
@@ -29,61 +29,61 @@ RING_M = 0.075
 
 @functools.cache
 def reach_of(model: Model, ball: Ball = BALL) -> Reach:
-    """Of 5 mm of foam over the prototype's switches."""
+    """The reach of 5 mm of foam over the prototype's switches."""
     return Reach(PaddedSheet(Switch(), 0.005, ball), model)
 
 
 @functools.cache
 def units() -> LoadCells:
-    """Three on a plane, as the pages have them."""
+    """Three units on a plane, as on the pages."""
     found = tripod(RING_M).units
     return LoadCells([dataclasses.replace(unit, sigma_n=UNIT_SIGMA_N) for unit in found])
 
 
 @dataclasses.dataclass(frozen=True)
 class CoverageCase:
-    """A method, what it assumes, and what is true."""
+    """A method, its assumptions, and the truth."""
 
     method: str
     pitch_mm: float
     push_n: tuple[float, float] = (5.0, 30.0)
-    """Range of the push at the end."""
+    """Range of the final push."""
     spread: float = 0.1
-    """Of thresholds."""
+    """Assumed spread of thresholds."""
     force_sigma_n: float = 0.5
     assumed: Model = POINT
     true: Model = POINT
     true_spread: float | None = None
-    """None: as assumed."""
+    """True spread; None: as assumed."""
     true_sigma_n: float | None = None
     drift_n: float = 0.0
-    """Of one unit."""
+    """Drift of one unit."""
     ball: Ball = BALL
-    """Of a true patch."""
+    """Ball of the true patch."""
     late_n: float = 0.0
-    """By how much a push rises until it is measured."""
+    """Rise of the push until it is measured."""
     inside_mm: float | None = None
-    """How far inside the outermost column contacts lie; None: in the middle."""
+    """Distance of contacts inside the outermost column; None: in the middle."""
     wrong: str = ""
-    """What the method does not know."""
+    """The violated assumption."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Coverage:
-    """Over all contacts that closed a switch."""
+    """Results over all contacts that closed a switch."""
 
     count: int
     rms_m: float
     barycenter_m: float
-    """Error of the barycenter, root mean square."""
+    """RMS error of the barycenter."""
     covered: float
     """Share of contacts within the stated radius."""
     radius_m: float
-    """Median of the stated radius."""
+    """Median stated radius."""
     theory_m: float
-    """Median of the smallest radius that noise allows; NaN where no formula has it."""
+    """Median of the smallest radius that noise allows; NaN without a formula."""
     disagreed: float
-    """Share of contacts of which it said that no place explains all."""
+    """Share of contacts for which the method reported that no place explains all."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Pressed:
 
 
 def locator(case: CoverageCase) -> Locator:
-    """As the case assumes it to be."""
+    """The locator under the case's assumptions."""
     sheet = Sheet(
         rows=LINES,
         columns=LINES,
@@ -140,7 +140,7 @@ def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
 
 
 def press(case: CoverageCase, rng: np.random.Generator) -> Pressed:
-    """A push that rises at a random place of a cell."""
+    """A rising push at a random place of a cell."""
     pitch = 1e-3 * case.pitch_mm
     x, y = (MIDDLE + rng.random(2)) * pitch
     x = x if case.inside_mm is None else 1e-3 * case.inside_mm
@@ -164,30 +164,30 @@ def _closings(case: CoverageCase, rng: np.random.Generator, one: Pressed) -> lis
 
 
 def by_barycenter(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Static, with the push known."""
+    """Static estimate from the known push."""
     rows, columns = np.mean(one.cells, axis=0) * 1e-3 * case.pitch_mm
     return finder.barycenter(float(columns), float(rows), _measured(case, rng, one.push_n)), math.nan
 
 
 def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Static, with cells and push known."""
+    """Static estimate from cells and known push."""
     return finder.locate(one.cells, _measured(case, rng, one.push_n)), math.nan
 
 
 def by_closings(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """With the push at each closing."""
+    """Estimate from the push at each closing."""
     closings = _closings(case, rng, one)
     return finder.locate(one.cells, _measured(case, rng, one.push_n), closings), bound_m(case, one)
 
 
 def by_center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """By three units alone."""
+    """Estimate from three units alone."""
     found = _center(case, finder, rng, one)
     return found, found.radius_m
 
 
 def by_both(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Closings and units."""
+    """Estimate from closings and units."""
     center = _center(case, finder, rng, one)
     found = finder.locate(one.cells, one.push_n, _closings(case, rng, one), center)
     return found, math.nan
@@ -209,8 +209,8 @@ def _middle_m(case: CoverageCase) -> float:
 
 
 def bound_m(case: CoverageCase, one: Pressed) -> float:
-    """The smallest radius that holds 95 % and that noise allows, from how steeply each closing's force depends on the
-    place (Cramér and Rao); NaN with less than two closings, or with two and the contact on their line."""
+    """The smallest 95 % radius that noise allows, from the slope of each closing's force over the place (Cramér-Rao);
+    NaN with fewer than two closings, or with two in line with the contact."""
     reach, pitch = reach_of(case.assumed), 1e-3 * case.pitch_mm
     if not case.force_sigma_n and not case.spread:
         return math.nan
@@ -250,7 +250,7 @@ RIGHT = (
     CoverageCase("center of pressure", 10.0, (12.0, 12.0)),
     CoverageCase("closings + center of pressure", 5.0, RAMP),
 )
-"""What is assumed is true."""
+"""Cases with true assumptions."""
 
 WRONG = (
     CoverageCase("set", 5.0, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
@@ -259,4 +259,4 @@ WRONG = (
     CoverageCase("closings", 5.0, RAMP, true_sigma_n=2.0, wrong="forces off by 2 N, taken for 0.5 N"),
     CoverageCase("center of pressure", 10.0, (12.0, 12.0), drift_n=0.2, wrong="a unit drifted by 0.2 N"),
 )
-"""What is assumed is not."""
+"""Cases with violated assumptions."""

@@ -1,7 +1,7 @@
 """End to end: contacts press a sheet on three units, the compiled gateware sends, driver and haptics answer.
 
-A push rises as the arm's does, 1.6 N per ms. After the first switch has closed the place is asked again and again, by
-each method, from what the host has by then.
+A push rises as the arm's does, 1.6 N per ms. Once the first switch has closed, each method repeatedly estimates the
+place from the host's data so far.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ from contactfpga_sim.model.scenes.scene import Scene
 RATE_N_S = 1600.0
 MOST_N = 30.0
 LEAD_S = 1.5e-3
-"""From power-up until the first switch closes. The push has begun before; what it did then changes no answer."""
+"""Time from power-up until the first switch closes; the push begins earlier, without effect on the answers."""
 LOOK_S = 20e-6
 RING_M = 0.075
 GAIN_N = 0.02
 ZERO = 300.0
 
 TIMES_S = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 15e-3)
-"""After the first switch has closed."""
+"""Times after the first switch closed."""
 
 METHODS = ("barycenter", "center of pressure", "closings", "closings + center of pressure")
 
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
-    """A sheet, and how good its parts are."""
+    """A sheet, and the quality of its parts."""
 
     name: str
     pitch_mm: float
     unit_sigma_n: float = 0.05
     spread: float = 0.0
-    """Of the switches' thresholds, as a share of them."""
+    """Relative spread of the switches' thresholds."""
     lines: int = 16
 
     @property
@@ -82,19 +82,19 @@ class Touching:
 
     setting: Setting
     place_m: Floats
-    """(2,)"""
+    """Place on the sheet in m, (2,)."""
     seed: int
 
     @functools.cached_property
     def closing_n(self) -> Floats:
-        """(rows, columns): the push that closes each switch."""
+        """(rows, columns): the push in N that closes each switch."""
         along = 1e-3 * self.setting.pitch_mm * np.arange(self.setting.lines)
         x, y = np.meshgrid(along, along)
         spread = 1 + self.setting.spread * np.random.default_rng([self.seed, 7]).standard_normal(x.shape)
         return reach_of(POINT).closing_n(np.hypot(x - self.place_m[0], y - self.place_m[1])) * np.maximum(spread, 0.1)
 
     def push(self, seconds: float) -> float:
-        """In N."""
+        """Push in N."""
         return min(MOST_N, max(0.0, float(self.closing_n.min()) + RATE_N_S * (seconds - LEAD_S)))
 
     def pressed(self, seconds: float) -> np.ndarray:
@@ -103,7 +103,7 @@ class Touching:
         return found
 
     def board(self) -> VirtualBoard:
-        """That feels it."""
+        """A board that feels the touch."""
         cells, rng = self.setting.cells, np.random.default_rng([self.seed, 8])
         x, y = self.place_m + np.array(cells.sheet_m)
         each = np.linalg.pinv(cells.matrix) @ np.array([0, 0, -1, -y, x, 0])
@@ -119,7 +119,7 @@ class Touching:
 
 @dataclasses.dataclass
 class FrameArrival:
-    """A frame, and when the host had it and its readings."""
+    """A frame, with the host times of it and its readings."""
 
     zones: Zones
     came_s: float
@@ -127,7 +127,7 @@ class FrameArrival:
 
 
 def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
-    """All frames until then."""
+    """All frames until this time."""
     found: list[FrameArrival] = []
     open_ones: list[FrameArrival] = []
     with contactfpga.open(touching.board(), touching.setting.skin) as board:
@@ -147,7 +147,7 @@ def ramp(setting: Setting, seed: int) -> Touching:
 
 
 def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> dict[str, list[float]]:
-    """Of one contact, in m: for each method at each of these rising times; NaN while it has no answer."""
+    """Errors in m of one contact: for each method at each of these rising times; NaN without an answer."""
     touching, cells = ramp(setting, seed), setting.cells
     frames = heard(touching, LEAD_S + times_s[-1] + 0.2e-3)
     assert cells.noise.covariance is not None
@@ -171,7 +171,7 @@ def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> d
 def _places(
     finder: Locator, cells: LoadCells, watch: ClosingWatch, came: list[Zones], known: list[Zones]
 ) -> dict[str, tuple[float, float] | None]:
-    """By each method, on the sheet in m."""
+    """Place on the sheet in m by each method."""
     zone = came[-1][0] if came and len(came[-1]) else None
     coarse = None if zone is None or zone.x_mm is None else (1e-3 * zone.x_mm, 1e-3 * (zone.y_mm or 0.0))
     center = None
@@ -191,25 +191,25 @@ def _places(
 
 @dataclasses.dataclass(frozen=True)
 class PairForces:
-    """What is found of two contacts."""
+    """Estimates for two contacts."""
 
     zones: int
     off_n: tuple[float, ...]
-    """Of each push, where there are two zones."""
+    """Error of each push, if there are two zones."""
 
 
 FINGER_MM = 6.0
 FINGER = f"finger of {2 * FINGER_MM:g} mm"
 KINDS = POINTS, AT_ONCE, ONE_FIRST = ("point", FINGER, f"{FINGER}, one of them alone before")
 FIRST_S = 0.025
-"""For which it is alone."""
+"""Time for which the first contact is alone."""
 BOTH = 4
-"""Frames of both, the last of which is asked."""
+"""Frames of both contacts, the last of which counts."""
 
 
 def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> PairForces:
-    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found. Points
-    lie where each alone closes a switch; fingers lie anywhere, since they are wider than the pitch."""
+    """Two contacts at this distance at a random place and angle of the sheet of 10 mm, and their estimated pushes.
+    Points are where each alone closes a switch; fingers, wider than the pitch, are anywhere."""
     setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
     near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == POINTS else math.inf
@@ -240,7 +240,7 @@ def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) ->
 
 
 def pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Places in mm, each nearer than ``near_mm`` to a switch."""
+    """Two places in mm, each nearer than ``near_mm`` to a switch."""
     pitch = setting.pitch_mm
     while True:
         turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2

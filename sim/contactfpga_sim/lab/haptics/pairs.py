@@ -1,4 +1,4 @@
-"""What limits the pushes of two fingers: where they are along the line through both. Geometry alone, without a board.
+"""Limits of two fingers' pushes: their uncertain places along the line through both. Geometry alone, without a board.
 
 Three units on a plane measure the sum of the pushes and two moments. Each finger is a disc that closes the switches
 under it.
@@ -14,9 +14,9 @@ from contactfpga_sim.lab.haptics.felt import FINGER_MM, SETTINGS, pair
 METHODS = ("barycenters", "mean of all places that fit", "one place known")
 PUSH_N = 12.0
 STEP_MM = 0.4
-"""Between two places that are tried."""
+"""Step of the grid of places."""
 DRAWN = 2000
-"""Pairs of places that are tried for each pair of fingers."""
+"""Pairs of places per pair of fingers."""
 
 
 def errors(apart_mm: float, count: int, seed: int = 1) -> dict[str, Floats]:
@@ -48,7 +48,7 @@ def _exert(places: Floats) -> Floats:
 
 
 def _pushes(places: Floats, wrench: Floats, covariance: Floats) -> Floats:
-    """(2,): by least squares at each pair of places, and their mean, weighted by how likely the wrench is there."""
+    """(2,) pushes: least squares at each pair of places, averaged by the likelihood of the wrench."""
     weight, matrix = np.linalg.inv(covariance), _exert(places)
     normal = matrix.transpose(0, 2, 1) @ weight @ matrix
     pushes = np.linalg.solve(normal, matrix.transpose(0, 2, 1) @ (weight @ wrench)[:, None])[:, :, 0]
@@ -66,8 +66,7 @@ def _closed(pitch_mm: float, place_mm: Floats) -> Floats:
 
 
 def _fitting(pitch_mm: float, place_mm: Floats) -> Floats:
-    """(m, 2): all places of a grid from which a finger closes the same switches as from this one; none if it closes
-    none, or if no place of the grid does."""
+    """(m, 2): grid places at which a finger closes the same switches as here; none if it closes none."""
     closed = {tuple(each) for each in _closed(pitch_mm, place_mm)}
     if not closed:
         return np.empty((0, 2))

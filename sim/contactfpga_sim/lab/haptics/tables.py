@@ -23,7 +23,7 @@ from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
 RING_M = 0.03
 CONTACTS = 1000
-"""Of each line of the table of places."""
+"""Contacts per line of the table of places."""
 
 NAMED = (
     "hexapod at mid-length, 45 degrees",
@@ -35,7 +35,7 @@ NAMED = (
 
 
 def layouts_table() -> str:
-    """Arrangements of the page's link, and the best of all."""
+    """Arrangements of the page's link, and the best one."""
     found = compared(LINK, RING_M)
     rows = [["units", "a unit bears", "error of the place", "error of the force", "smallest force seen"]]
     rows += [_layout(one) for one in found if one.layout.name in NAMED]
@@ -54,7 +54,7 @@ def _layout(rating: Rating, before: str = "") -> list[str]:
 
 
 def places_table() -> str:
-    """Places as each method finds them, where its assumptions hold."""
+    """Places by each method under true assumptions."""
     rows = [["method", "pitch", "error", "the barycenter's", "stated radius", "over theory", "covers"]]
     for case in coverage.RIGHT:
         found = coverage.run(case, CONTACTS)
@@ -65,7 +65,7 @@ def places_table() -> str:
 
 
 def wrong_table() -> str:
-    """The same where they do not."""
+    """Places by each method under violated assumptions."""
     rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "reports it"]]
     for case in coverage.WRONG:
         found = coverage.run(case, CONTACTS)
@@ -83,28 +83,28 @@ def _percent(share: float) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The arrangements of units, and what is felt."""
+    """The arrangements of units, and the results."""
     return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *draw_felt(folder)]
 
 
 END_TO_END = 100
-"""Of each line; `make campaign` presses 1,000 in all."""
+"""Contacts per line; `make campaign` presses 1,000 in all."""
 
 LIMITS = 1000
-"""Pairs that tell what limits them."""
+"""Pairs of fingers for the limits."""
 APART_MM = (30.0, 60.0, 100.0)
 SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
 
 
 @functools.cache
 def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
-    """(contacts, times) errors in m of each method."""
+    """(contacts, times) errors in m by method."""
     each = [felt.errors(setting, seed, times_s) for seed in range(count)]
     return {method: np.array([one[method] for one in each]) for method in METHODS}
 
 
 def interval(errors: np.ndarray) -> tuple[float, float, float]:
-    """Root mean square, and its 95 % interval, from the spread of the squares; NaN are left out."""
+    """RMS and its 95 % interval, from the spread of the squares, without NaN."""
     squares = errors[~np.isnan(errors)] ** 2
     mean, half = squares.mean(), 1.96 * squares.std(ddof=1) / math.sqrt(len(squares))
     return math.sqrt(mean), math.sqrt(max(0.0, mean - half)), math.sqrt(mean + half)
@@ -136,7 +136,7 @@ def pairs_table() -> str:
 
 
 def limits_table() -> str:
-    """What limits the forces of two fingers."""
+    """Limits of the forces of two fingers."""
     rows = [["how fingers are located", "error of a push", "95 % interval"]]
     for method, errors in pairs.errors(60.0, LIMITS).items():
         middle, low, high = interval(errors)
@@ -146,7 +146,7 @@ def limits_table() -> str:
 
 @functools.cache
 def swept() -> dict[str, dict[str, Sweep]]:
-    """Every break."""
+    """All breaks, swept."""
     return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
 
 
@@ -157,7 +157,7 @@ def breaks_table() -> str:
 
 
 def breaks_pictures() -> str:
-    """A heading and a picture for each."""
+    """A heading and a picture for each break."""
     return "\n".join(
         f"### `{knob.name}`\n\n![{knob.title}](images/haptics/{knob.name}.svg)\n" for knob in breaks.KNOBS.values()
     )

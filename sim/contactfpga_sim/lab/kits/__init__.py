@@ -1,1 +1,1 @@
-"""What the kits come to: times from the finger to user code, sizes, and predictions that a builder can prove wrong."""
+"""The kits: times from the finger to user code, sizes, and predictions that a builder can prove wrong."""

@@ -1,4 +1,4 @@
-"""Tables of docs/kits.md and of the README: what the kits come to."""
+"""Tables of docs/kits.md and of the README."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from contactfpga_sim.lab.spread import Spread
 from contactfpga_sim.lab.usb import BridgeSettings
 
 NAMES = ("starter", "fast")
-"""In the order of the tables."""
+"""Names in the tables' order."""
 SEEDS = (1, 2, 3, 4, 5)
-"""Of place and route; the slowest counts."""
+"""Seeds of place and route; the slowest counts."""
 COVER = "| run, 6.4 mm, tiles |"
 PAPER = "| run, 6.4 mm, paper |"
 ARM = "| tiles | 6.4 | 0.4 | 5 |"
@@ -34,7 +34,7 @@ ARM_PAPER = "| flush, point force | 10 | 1 | 5 |"
 
 
 class KitFigures(NamedTuple):
-    """What is computed of a kit."""
+    """Computed figures of a kit."""
 
     kit: Kit
     finger: Finger
@@ -59,7 +59,7 @@ def _worst_first(us: Spread, digits: int = 0) -> str:
 
 
 def headline(found: list[KitFigures]) -> str:
-    """The README's table: worst first, both kits, and what they are compared with."""
+    """The README's table: worst first, both kits, and comparisons."""
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
     fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
     arm, paper_arm = (_worst_force(start) for start in (ARM, ARM_PAPER))
@@ -105,14 +105,14 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
 
 
 def _of_page(page: str, start: str, column: int) -> str:
-    """A cell of the row of a page's table that begins like this, up to a semicolon."""
+    """A cell of the table row with this beginning, up to a semicolon."""
     text = Path("docs", page).read_text(encoding="utf-8")
     found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
     return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
 
 
 def _worst_force(start: str) -> str:
-    """Of an arm's touches by UART, worst before mean."""
+    """Worst and mean force of an arm's touches by UART."""
     text = Path("docs/arm.md").read_text(encoding="utf-8")
     line = next(line for line in text.splitlines() if line.startswith(start))
     mean, worst = line.strip("|").split("|")[5].split(" / ")
@@ -140,7 +140,7 @@ def _stages(one: KitFigures) -> Iterator[tuple[str, ...]]:
 
 
 def built_table(found: list[KitFigures]) -> str:
-    """What each kit takes of its FPGA; Fmax is that of the slowest of :data:`SEEDS`."""
+    """FPGA resources of each kit; Fmax is the slowest of :data:`SEEDS`."""
     lines = []
     for one in found:
         first, slowest = one.built[0], min(one.built, key=lambda report: report.fmax_mhz)
@@ -161,7 +161,7 @@ def built_table(found: list[KitFigures]) -> str:
 
 
 def pins_table() -> str:
-    """What an iCEBreaker's 23 pins can serve, with guard lines and `alive` where there is room."""
+    """Sheets for an iCEBreaker's 23 pins, with guard lines and `alive` if they fit."""
     kit = kits.kit("starter").skin
     cases = {
         "16x16, rows on registers, columns driven back (the kit)": kit,
@@ -200,7 +200,7 @@ def _reversal(skin: Skin) -> Skin:
 
 
 def parts_table() -> str:
-    """What to buy for each kit: the sheet's own parts by count, and what stands in kit.toml."""
+    """Parts for each kit: the sheet's by count, and those of kit.toml."""
     lines = []
     for name in NAMES:
         kit = kits.kit(name)
@@ -216,7 +216,7 @@ def parts_table() -> str:
 
 
 def predictions_table() -> str:
-    """The newest prediction of each name, beside each other."""
+    """The kits' newest predictions side by side."""
     both = {name: predictions.load(kits.kit(name)) for name in NAMES}
     lines = []
     for key in dict.fromkeys(key for found in both.values() for key in found):

@@ -1,4 +1,4 @@
-"""The schematic of docs/maker.md: a corner of a sheet with its guard lines, resistors and diodes."""
+"""The schematic of docs/maker.md: a corner of a sheet with guard lines, resistors and diodes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 from contactfpga import picture_style as style
 
 SIZE = 4
-"""Rows and columns; a guard line comes after them."""
+"""Rows and columns, before the guard lines."""
 STEP = 1.5
 LEFT, TOP = 2.6, 2.1
-"""Where rows leave their resistors, and columns theirs."""
+"""Starts of rows and columns after their resistors."""
 WIRE = {"color": style.INK, "lw": 1.2, "solid_capstyle": "round"}
 
 
@@ -57,7 +57,7 @@ def _color(guard: bool) -> str:
 
 
 def _row(axes: Any, row: int) -> None:
-    """Pin, resistor in series, and for scans that read rows a pull-down."""
+    """Draw a row's pin and series resistor, and for row-reading scans a pull-down."""
     y, color = _y(row), _color(row == SIZE)
     axes.text(0, y, _name("row", row), ha="right", va="center", color=color)
     _line(axes, [(0.1, y), (0.5, y)], color)
@@ -72,7 +72,7 @@ def _row(axes: Any, row: int) -> None:
 
 
 def _column(axes: Any, column: int) -> None:
-    """Pin, resistor in series, pull-up."""
+    """Draw a column's pin, series resistor and pull-up."""
     x, color = _x(column), _color(column == SIZE)
     axes.text(x, TOP + 1.42, _name("column", column), ha="center", va="bottom", color=color)
     axes.plot(x, TOP + 1.3, "s", color=color, ms=4)
@@ -89,7 +89,7 @@ def _column(axes: Any, column: int) -> None:
 
 
 def _cell(axes: Any, row: int, column: int) -> None:
-    """From the column through switch and diode to the row; a guard line's switch is a wire."""
+    """Draw the path from the column through switch and diode to the row; a guard line's switch is a wire."""
     x, y = _x(column), _y(row)
     guard = SIZE in (row, column)
     color, place = _color(guard), x + 0.5
@@ -107,7 +107,7 @@ def _cell(axes: Any, row: int, column: int) -> None:
 
 
 def _gaps(axes: Any) -> None:
-    """Where lines between the first ones and the last one are left out."""
+    """Mark the omitted lines before the last."""
     for index in range(SIZE + 1):
         for x, y, turn in ((_x(SIZE - 1) - 0.4, _y(index), 0), (_x(index), _y(SIZE - 1) + 1.2, 90)):
             gap = {"boxstyle": "square,pad=0.05", "fc": style.CARD, "ec": "none"}
@@ -137,7 +137,7 @@ def _dot(axes: Any, x: float, y: float, color: str = style.INK) -> None:
 
 
 def _resistor(axes: Any, x: float, y: float, upright: bool, ls: Any = "solid") -> None:
-    """A box of 0.6 from (x, y) upward or to the right."""
+    """Draw a box of 0.6 from (x, y) upward or to the right."""
     from matplotlib.patches import Rectangle
 
     corner, size = ((x - 0.11, y), (0.22, 0.6)) if upright else ((x, y - 0.11), (0.6, 0.22))

@@ -17,11 +17,11 @@ DIODES = {"Schottky (BAT54's kind)": SCHOTTKY, "silicon (1N4148's kind)": SILICO
 PULLS_OHM = (1000.0, 2200.0, 4700.0, 10_000.0, 22_000.0, 47_000.0, 100_000.0)
 SERIES_OHM = (0.0, 33.0, 100.0, 220.0, 470.0)
 PIN_OHM = 2 * Circuit().pin_ohm
-"""Of the two pins that a short joins."""
+"""Resistance of the two pins that a short joins."""
 
 
 def diodes_table() -> str:
-    """What either kind of diode leaves of the levels."""
+    """Levels with either kind of diode."""
     rows = [["diode", "pressed column", "left to VIL", "touched row (reversal)", "left to VIH", "`settle_us`"]]
     rows[0].append("`release_us` without precharge")
     for name, diode in DIODES.items():
@@ -33,7 +33,7 @@ def diodes_table() -> str:
 
 
 def pulls_table() -> str:
-    """Which times and currents each pull-up of the columns comes to."""
+    """Times and currents of each column pull-up."""
     rows = [
         ["pull-up", "`release_us` without precharge", "`settle_us`", "row's pin, all columns pressed", "left to VIL"]
     ]
@@ -48,7 +48,7 @@ def pulls_table() -> str:
 
 
 def series_table() -> str:
-    """What a resistor at each pin does to a short, to pulses and to times."""
+    """Effect of a resistor at each pin on a short, pulses and times."""
     rows = [["resistor at each pin", "two pins shorted to each other", "pulses while lines charge", "`settle_us`"]]
     rows[0].append("left to VIL")
     for ohm in SERIES_OHM:

@@ -1,4 +1,4 @@
-"""A robot in MuJoCo that wears sheets: its contacts press switches, and the device's bytes come to the driver."""
+"""A robot in MuJoCo that wears sheets: contacts press switches, and the driver receives the device's bytes."""
 
 from contactfpga_sim.lab.mujoco.sheets import Sheets
 from contactfpga_sim.lab.mujoco.touch import SheetTouch

@@ -1,4 +1,4 @@
-"""The arms of docs/mujoco.md side by side: their peak forces, and a clip of them in a browser without a window."""
+"""The arms of docs/mujoco.md side by side: their peak forces, and a clip from a headless browser."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ ROBOT, SCENE, REFLEXES = (str(ARM / name) for name in ("pushed.toml", "scene.xml
 REFLEX = "BackOff"
 MEETINGS = 12
 NEAR_RAD, SPREAD_RAD = 0.4, 0.01
-"""They begin between these angles, 0.14 rad before the bar, so that the touch comes anywhere in a scan and a step."""
+"""Range of start angles, 0.14 rad before the bar, so that the touch is at a random phase of scan and step."""
 STEP_S, ENDS_S = 1e-3, 0.25
-"""MuJoCo's step, and when all have touched the bar and all but one have let go."""
+"""MuJoCo's step, and a time at which all have touched the bar and all but one have let go."""
 COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
-"""Of the clip: the arms come, and the touch in slow motion."""
+"""Times of the clip: the approach, and the touch in slow motion."""
 COMING, TOUCHING, STANDING = 10, 28, 15
-"""Frames of each, and of the end, which stands."""
+"""Frames of approach, touch and still end."""
 FRAME_MS, SETTLE_MS, QUALITY = 100, 900, 55
 WIDTH, HEIGHT, TALL = 1120, 400, 700
-"""In pixels; tall while one chooses, so that the panel does not scroll."""
+"""Pixels; tall while choosing, so that the panel does not scroll."""
 
 
 class Asked(SimulatedPace):
-    """Lets the robots go on up to a moment, and no further."""
+    """A pace that lets the robots go on up to a given moment."""
 
     until_s = 0.0
 
@@ -44,7 +44,7 @@ class Asked(SimulatedPace):
 
 
 def paced(found: SimulatedSource) -> Asked:
-    """All skins side by side, from their start on, at the pace that is asked for."""
+    """All skins side by side from their start, at the requested pace."""
     found.skin = ALL
     found.restart()
     pace = found.pace = Asked(0.0)
@@ -53,15 +53,15 @@ def paced(found: SimulatedSource) -> Asked:
 
 @dataclasses.dataclass(frozen=True)
 class Met:
-    """What came of one arm's way into the bar."""
+    """Result of one arm's motion into the bar."""
 
     late_s: float
-    """From the touch to the reflex's next command; nan: there was none."""
+    """From the touch to the reflex's next command; nan: none."""
     peak_n: float
 
 
 def meet(angle: float) -> list[Met]:
-    """The example's arm by :data:`contactfpga.tools.view.simulated.SKINS`, from this angle on, where it goes back."""
+    """The example's arm by :data:`contactfpga.tools.view.simulated.SKINS`, from this angle, with reflex."""
     robots = SimulatedSource(ROBOT, SCENE, REFLEXES)
     robots.reflex, pace = REFLEX, paced(robots)
     robots.advance()
@@ -82,7 +82,7 @@ def meet(angle: float) -> list[Met]:
 
 
 def peaks_table() -> str:
-    """For docs/mujoco.md."""
+    """Peak forces for docs/mujoco.md."""
     rng = np.random.default_rng(0)
     found = [meet(NEAR_RAD + rng.uniform(0, SPREAD_RAD)) for _ in range(MEETINGS)]
     late_ms, peak_n = (
@@ -102,7 +102,7 @@ def _ranged(values: np.ndarray) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """A clip of the view."""
+    """Make a clip of the view."""
     named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
     clip = folder / "arms.webp"
     with opening.opened(named, http_port=0) as shown, browser.visit(shown, WIDTH, TALL, dark=True) as visitor:
@@ -111,7 +111,7 @@ def draw(folder: Path) -> Path:
 
 
 def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
-    """Play it frame by frame."""
+    """Play the view frame by frame."""
     from PIL import Image
 
     robots = shown.source
@@ -138,6 +138,6 @@ def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
 
 
 def moments() -> list[float]:
-    """Seconds since the start, of each frame."""
+    """Time of each frame since the start."""
     spans = ((*COMES_S, COMING), (*TOUCHES_S, TOUCHING))
     return [begin + (end - begin) * step / count for begin, end, count in spans for step in range(1, count + 1)]

@@ -1,4 +1,4 @@
-"""Random collisions of a forearm that wears a sheet: what the sheet says of them, and what a momentum observer does."""
+"""Random collisions of a forearm that wears a sheet: reports of the sheet against a momentum observer's."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ from contactfpga_sim.lab.writer import table_of
 
 ROD_M = 0.02
 SHEET_M = (0.06, 0.20)
-"""Where the sheet begins on the forearm, and its length."""
+"""Start and length of the sheet on the forearm."""
 RADIUS_M = 0.038
 LEAD_S, AFTER_S = 0.15, 0.2
-"""Before the touch, as it would be if nothing bent, and after it."""
+"""Times before the touch (if nothing bent) and after it."""
 SERVO = (30.0, 10.0)
-"""Nm s/rad of the joints' speed controllers."""
+"""Gain of the joints' speed controllers, Nm s/rad."""
 LIMIT_NM = (40.0, 20.0)
 GAINS = (20.0, 50.0, 100.0, 200.0)
-"""1/s, of which the observer may choose."""
+"""Observer gains to choose from, 1/s."""
 SPRING = "0.1 0.1"
-"""MuJoCo's ``solref``: a spring of some 10 N/mm on this arm with little damping: a push grows over some 10 ms."""
+"""MuJoCo's ``solref``: about 10 N/mm on this arm, lightly damped; a push grows over some 10 ms."""
 FREE_S = 3.0
-"""Of one free motion."""
+"""Duration of a free motion."""
 
 SCENE = f"""<mujoco><option timestep="5e-4" gravity="0 0 0" integrator="implicitfast"/>
 <default><geom contype="0" conaffinity="0" solref="{SPRING}"/></default><worldbody>
@@ -81,19 +81,19 @@ rpy_rad = [0.0, {np.pi / 2}, 0.0]
 
 @dataclasses.dataclass(frozen=True)
 class Collision:
-    """A forearm in motion and a rod in its way."""
+    """A moving forearm and a rod in its way."""
 
     angles: tuple[float, float]
-    """At the touch."""
+    """Joint angles at the touch."""
     speeds: tuple[float, float]
     place_m: float
-    """Along the forearm."""
+    """Position along the forearm."""
     wrong: Wrong
     seed: int
 
     @classmethod
     def drawn(cls, seed: int) -> Collision:
-        """Anywhere on the sheet but its last 20 mm, at 0.1 to 0.5 m/s across the forearm."""
+        """Anywhere on the sheet except its last 20 mm, at 0.1 to 0.5 m/s across the forearm."""
         rng = np.random.default_rng(seed)
         angles = rng.uniform(-1.0, 1.0, 2)
         place = rng.uniform(SHEET_M[0] + 0.02, sum(SHEET_M) - 0.02)
@@ -106,19 +106,19 @@ class Collision:
 
 @dataclasses.dataclass(frozen=True)
 class Heard:
-    """What came of one collision."""
+    """Result of one collision."""
 
     late_s: float | None
-    """From the first contact of MuJoCo to the program's knowledge; None: not within :data:`AFTER_S`."""
+    """From MuJoCo's first contact to the program's knowledge; None: not within :data:`AFTER_S`."""
     early: bool
-    """It said so before anything touched."""
+    """Whether it was reported before any contact."""
     off_m: float | None
-    """Along the forearm, of the place that it says when its knowledge is best, from MuJoCo's."""
+    """Error of the reported place along the forearm, at its most certain, against MuJoCo's."""
     peak_n: float
 
 
 class Arm:
-    """The arm under its speed controllers, sampled each ms."""
+    """The arm under its speed controllers, sampled every ms."""
 
     def __init__(self, folder: Path):
         (folder / "skin.toml").write_text(SKIN)
@@ -136,7 +136,7 @@ class Arm:
         self.model: Any = spec.compile()
 
     def meets(self, case: Collision) -> Any:
-        """MuJoCo's data at the beginning of a collision."""
+        """MuJoCo's data at the start of a collision."""
         data = mujoco.MjData(self.model)
         angles, speeds = np.array(case.angles), np.array(case.speeds)
         whole = angles.sum()
@@ -149,13 +149,13 @@ class Arm:
         return data
 
     def drive(self, data: Any, wanted: np.ndarray) -> None:
-        """Torques by the speeds that are wanted, (2,) in rad/s."""
+        """Apply torques for the wanted (2,) speeds in rad/s."""
         forward = np.array(DAMPING) * wanted + np.array(FRICTION_NM) * np.sign(wanted)
         torque = forward + np.array(SERVO) * (wanted - data.qvel)
         data.ctrl[:] = np.clip(torque, -np.array(LIMIT_NM), LIMIT_NM)
 
     def force_n(self, data: Any) -> float:
-        """Of all contacts."""
+        """Total force of all contacts."""
         total, wrench = 0.0, np.zeros(6)
         for number in range(data.ncon):
             mujoco.mj_contactForce(self.model, data, number, wrench)
@@ -163,19 +163,19 @@ class Arm:
         return total
 
     def touched_m(self, data: Any) -> float:
-        """How far along the forearm the contact is."""
+        """Contact position along the forearm."""
         body = data.body("forearm")
         return float((body.xmat.reshape(3, 3).T @ (data.contact[0].pos - body.xpos))[0])
 
 
 Detector = Callable[[Any], tuple[bool, float | None, float]]
-"""From MuJoCo's data: whether it says that something touches, where along the forearm, and how sure it is of that."""
+"""From MuJoCo's data: whether a contact is detected, its place along the forearm, and its certainty."""
 
 
 def collide(
     arm: Arm, case: Collision, data: Any, step: Callable[[], None], says: Detector, reacts: bool = True
 ) -> Heard:
-    """Run a collision; the arm goes back the way it came 1 ms after ``says`` does, where it reacts."""
+    """Run a collision; if ``reacts``, the arm reverses 1 ms after ``says`` reports it."""
     ahead = np.array(case.speeds)
     wanted, touched_s, known_s, off_m, best, peak, place = ahead, None, None, None, -1.0, 0.0, 0.0
     while data.time < LEAD_S + AFTER_S:
@@ -199,7 +199,7 @@ def collide(
 
 
 def by_sheet(arm: Arm, case: Collision) -> Heard:
-    """The program knows of it with the snapshot that has a contact, through USB and driver."""
+    """Detection by the sheet: the first snapshot with a contact, through USB and driver."""
     data = arm.meets(case)
     with Sheets(arm.model, data, arm.robot, golden=True, radius_m=ROD_M, seed=case.seed) as sheets:
 
@@ -213,7 +213,7 @@ def by_sheet(arm: Arm, case: Collision) -> Heard:
 
 
 def by_observer(arm: Arm, case: Collision, gain: float, limits_nm: np.ndarray, reacts: bool = True) -> Heard:
-    """The program knows of it when a residual is beyond its limit; the place is told at the largest residual."""
+    """Detection by the observer: a residual beyond its limit; the place is from the largest residual."""
     data = arm.meets(case)
     observer = Observer(gain, case.wrong, np.random.default_rng(case.seed))
 
@@ -225,8 +225,7 @@ def by_observer(arm: Arm, case: Collision, gain: float, limits_nm: np.ndarray, r
 
 
 def free(arm: Arm, seed: int) -> np.ndarray:
-    """(gains, n, 2) absolute residuals in Nm, by :data:`GAINS`, of a motion in which nothing touches, without its first
-    0.1 s."""
+    """(gains, n, 2) absolute residuals in Nm, by :data:`GAINS`, of a contact-free motion without its first 0.1 s."""
     rng = np.random.default_rng(seed)
     wrong = Wrong.drawn(rng)
     observers = [Observer(gain, wrong, np.random.default_rng(seed)) for gain in GAINS]
@@ -243,8 +242,8 @@ def free(arm: Arm, seed: int) -> np.ndarray:
 
 
 def tuned(arm: Arm, free_runs: int, cases: Sequence[Collision]) -> tuple[float, np.ndarray]:
-    """Gain and limits: for each gain the lowest limits that give no false alarm in these free motions, and the gain
-    with the least mean delay on these collisions, a missed or early one counted as :data:`AFTER_S`."""
+    """Gain and limits: per gain the lowest limits without a false alarm in these free motions; of these the gain with
+    the least mean delay, missed or early ones counting as :data:`AFTER_S`."""
     limits = np.max([free(arm, seed).max(1) for seed in range(free_runs)], 0)
 
     def delay_s(number: int) -> float:
@@ -257,21 +256,21 @@ def tuned(arm: Arm, free_runs: int, cases: Sequence[Collision]) -> tuple[float, 
 
 @dataclasses.dataclass(frozen=True)
 class Compared:
-    """All of a campaign."""
+    """Results of a campaign."""
 
     gain: float
     limits_nm: np.ndarray
     alarms: int
-    """Free motions with a false alarm of the observer, of :attr:`free_runs` that it was not tuned on."""
+    """Of :attr:`free_runs` not used in tuning, those with a false alarm of the observer."""
     free_runs: int
     sheet: list[Heard]
     observer: list[Heard]
     none: list[Heard]
-    """Of an arm that does not react; the observer's place is told here, where no reaction bends its residuals."""
+    """Collisions of an arm that does not react, so that no reaction bends the residuals of the observer's place."""
 
 
 def compare(collisions: int = 200, free_runs: int = 100) -> Compared:
-    """Tune on one half of the seeds, judge on the other."""
+    """Tune on half of the seeds, judge on the other half."""
     with tempfile.TemporaryDirectory() as folder:
         arm = Arm(Path(folder))
         gain, limits = tuned(arm, free_runs, [Collision.drawn(10_000 + seed) for seed in range(collisions // 4)])
@@ -289,7 +288,7 @@ def compare(collisions: int = 200, free_runs: int = 100) -> Compared:
 
 
 def observer_table() -> str:
-    """For docs/collisions.md."""
+    """Observer table for docs/collisions.md."""
     found = compare()
     count = len(found.sheet)
     head = ["", "sheet", "observer", "neither"]
@@ -331,7 +330,7 @@ def _share(flags: Sequence[bool]) -> str:
 
 
 def _median(values: Sequence[float]) -> str:
-    """With its interval of 95 % by order statistics."""
+    """Median with its 95 % interval by order statistics."""
     ordered, count = sorted(values), len(values)
     reach = 0.98 * np.sqrt(count)
     low, high = max(0, int(count / 2 - reach)), min(count - 1, int(np.ceil(count / 2 + reach)))

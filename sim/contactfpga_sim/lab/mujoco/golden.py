@@ -1,4 +1,4 @@
-"""A board whose frames the golden model makes, one a step at most, where the gateware would take too long."""
+"""A board with frames by the golden model, at most one a step, for speed."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from contactfpga_sim.model.golden.zones import Departure
 
 
 class GoldenBoard:
-    """What a lockstep needs of :class:`contactfpga_sim.model.board.compiled.CompiledBoard`.
+    """The part of :class:`contactfpga_sim.model.board.compiled.CompiledBoard` that a lockstep needs.
 
-    A frame has the cells as they are when a run of the clock ends. So its zones are those of the gateware where the
-    cells rest for a scan; its times are off by up to a scan and a run. Its line is the gateware's, byte by byte.
+    A frame has the cells at the end of a clock run. Zones equal the gateware's if the cells rest for a scan; times
+    differ by up to a scan and a run. The line is the gateware's, byte by byte.
     """
 
     def __init__(self, skin: Skin):
@@ -44,13 +44,13 @@ class GoldenBoard:
         self._line.want_hello(0)
 
     def press(self, cells: np.ndarray) -> None:
-        """From now on these (rows, columns) bool cells are pressed."""
+        """Press these (rows, columns) bool cells from now on."""
         before, self._cells = self._cells, cells & ~self._facts.mask
         if before.any() != self._cells.any():
             self._levels.append((self.cycle, int(self._cells.any()), 0))
 
     def load(self, readings: object) -> None:
-        """It has no units."""
+        """Ignored: there are no units."""
 
     def send(self, data: bytes) -> None:
         """Bytes from the host to the board."""
@@ -66,7 +66,7 @@ class GoldenBoard:
         self._heard.requests[:], self._heard.numbers[:] = now.requests, now.numbers
 
     def run(self, cycles: int) -> None:
-        """Run clock cycles; a scan that is over becomes a frame."""
+        """Run clock cycles; a finished scan becomes a frame."""
         self.cycle += cycles
         begun = self.cycle - self._facts.skin.derived.frame_clocks
         if begun >= self._began:
@@ -102,7 +102,7 @@ class GoldenBoard:
         return join((*fields, *([(zone.turned, known.area_bits)] if known.skin.closed else [])))[0]
 
     def take(self, boundary: str) -> np.ndarray:
-        """Events of ``contact`` or ``received`` since they were taken last."""
+        """Events of ``contact`` or ``received`` since the last call."""
         if boundary == "contact":
             found, self._levels = self._levels, []
             return np.array(found, EVENT)
@@ -110,17 +110,17 @@ class GoldenBoard:
         return np.array([(cycle + stop, value, 0) for cycle, value in self._line.until(self.cycle - stop)], EVENT)
 
     def close(self) -> None:
-        """Nothing is to be freed."""
+        """Nothing to free."""
 
 
 class _Line(Link):
-    """A link whose bytes are taken while it goes on."""
+    """A link whose bytes are read while it runs."""
 
     def __init__(self, known: Facts, state: State):
         super().__init__(known, state)
 
     def until(self, cycle: int) -> list[tuple[int, int]]:
-        """The bytes up to this cycle that were not taken yet."""
+        """The unread bytes up to this cycle."""
         self.finish(max(0, cycle))
         count = sum(at <= cycle for at, _ in self.bytes)
         found, self.bytes = self.bytes[:count], self.bytes[count:]

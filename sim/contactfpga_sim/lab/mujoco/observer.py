@@ -1,6 +1,7 @@
-"""A momentum observer (De Luca and Mattone 2005; Haddadin, De Luca and Albu-Schaeffer 2017) of an arm of two joints.
+"""A momentum observer (De Luca and Mattone 2005; Haddadin, De Luca and Albu-Schaeffer 2017) of a two-joint arm.
 
-It knows torques and joint speeds and no skin. What it is told is wrong as on a robot: see :class:`Wrong`."""
+Its inputs are torques and joint speeds, with realistic errors: see :class:`Wrong`.
+"""
 
 from __future__ import annotations
 
@@ -12,24 +13,24 @@ FIRST_M = SECOND_M = 0.3
 """Lengths of upper arm and forearm."""
 MASS_KG = (1.5, 1.0)
 DAMPING = (0.4, 0.2)
-"""In Nm s/rad."""
+"""Joint damping in Nm s/rad."""
 FRICTION_NM = (0.3, 0.15)
-"""Coulomb's, in the joints; the observer knows of it as it knows the damping."""
+"""Coulomb friction in the joints; the observer knows it as well as the damping."""
 ROTOR = (0.03, 0.015)
-"""In kg m2: of motors and gears, about the joints."""
+"""Inertia of motors and gears about the joints, in kg m2."""
 CONTROL_S = 1e-3
 SLOW = 0.02
-"""In rad/s: below it Coulomb's friction is taken in proportion to the speed."""
+"""Speed in rad/s below which Coulomb friction is proportional to speed."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Wrong:
-    """What the observer believes, as shares of the truth, and noise of what it measures."""
+    """Errors of the observer's model, as shares of the truth, and measurement noise."""
 
     masses: tuple[float, float]
     friction: tuple[float, float]
     torque_nm: float = 0.05
-    """Root mean square of a sample."""
+    """RMS noise of a torque sample."""
     speed_rad_s: float = 0.002
 
     @classmethod
@@ -52,7 +53,8 @@ class Observer:
         self.residual_nm = np.zeros(2)
 
     def take(self, angles: np.ndarray, speeds: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """The joints' (2,) angles in rad, speeds and torques since the last sample; returns (2,) residuals in Nm."""
+        """Update with the joints' (2,) angles in rad, speeds and torques since the last sample; returns (2,) residuals
+        in Nm."""
         speeds = speeds + self._noise.normal(0, self._wrong.speed_rad_s, 2)
         torques = torques + self._noise.normal(0, self._wrong.torque_nm, 2)
         cross, link = self._coupled * np.cos(angles[1]), self._outer - ROTOR[1]
@@ -72,8 +74,8 @@ class Observer:
         return self.residual_nm
 
     def place_m(self, angle: float) -> float:
-        """How far along the forearm a push across it lies; ``angle`` of the elbow in rad. Kept on the forearm: a torque
-        about the shoulder and one about the elbow are all that is known of it."""
+        """Position of a push across the forearm; ``angle`` of the elbow in rad. Clipped to the forearm, as only
+        shoulder and elbow torques are known."""
         first, second = self.residual_nm
         push_n = (first - second) / (FIRST_M * np.cos(angle))
         return float(np.clip(second / push_n, 0.0, SECOND_M)) if push_n else SECOND_M / 2

@@ -24,30 +24,30 @@ from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
 from contactfpga_sim.lab.usb import BridgeSettings
 
 LEAD_S = 0.01
-"""From the boards' power-up to MuJoCo's first step; in it they are opened."""
+"""Time from the boards' power-up to MuJoCo's first step, for opening them."""
 LOOK_S = 2.5e-4
-"""Step in s by which the boards advance before MuJoCo's first step."""
+"""Boards' step in s before MuJoCo's first step."""
 
 COVER = Cover(model="hertz")
-"""The cover of a link whose Skin file has no table ``[cover]``."""
+"""Default cover of a Skin file without a table ``[cover]``."""
 
 
 class Sheets(Mapping[str, WornSheet]):
     """The sheets of ``robot.toml`` on the bodies of a MuJoCo model, by the links' names.
 
-    A link's ``frame`` names the body that wears it. The geom named like the link is what wears the sheet
-    (:func:`wear` makes one), or else every geom of that body. :meth:`step` takes the place of ``mj_step``. While one
-    waits for a board, as in ``sheets["arm"].board.next()``, the robot goes on as well.
+    A link's ``frame`` names the body that wears it. The sheet is on the geom with the link's name (:func:`wear` makes
+    one), else on every geom of that body. :meth:`step` replaces ``mj_step``. While a program waits for a board, as in
+    ``sheets["arm"].board.next()``, the robot goes on as well.
 
     Args:
-        model, data: of MuJoCo; ``data`` is stepped here alone.
-        robot: the file, whose ports play no part.
-        radius_m: R* in m of what touches, by which a contact's patch grows with its force (Hertz).
-        foam: the foam of the cover is the spring between the bodies, F = 4/3 E* sqrt(R*) d^1.5. MuJoCo's own contact
-            should begin below it, with ``margin`` = -thickness and ``gap`` = thickness on the geoms.
-        golden: zones by the golden model in the place of the gateware.
-        bridge: the board's USB chip and its settings; by default that of the iCEBreaker as the driver sets it.
-        seed: of the switches' closing forces and the units' noise.
+      model, data: of MuJoCo; ``data`` is stepped here alone.
+      robot: the file, whose ports play no part.
+      radius_m: R* in m of what touches, by which a contact's patch grows with its force (Hertz).
+      foam: the foam of the cover is the spring between the bodies, F = 4/3 E* sqrt(R*) d^1.5. MuJoCo's own contact
+        should begin below it, with ``margin`` = -thickness and ``gap`` = thickness on the geoms.
+      golden: zones by the golden model in the place of the gateware.
+      bridge: the board's USB chip and its settings; by default that of the iCEBreaker as the driver sets it.
+      seed: of the switches' closing forces and the units' noise.
 
     Raises BodyError for a link that the model lacks, and OSError.
     """
@@ -99,7 +99,7 @@ class Sheets(Mapping[str, WornSheet]):
         return LEAD_S + self._steps * float(self.model.opt.timestep)
 
     def step(self) -> None:
-        """MuJoCo's next step: its contacts press the sheets while it lasts."""
+        """MuJoCo's next step, whose contacts press the sheets."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         self._note_joints()
@@ -115,13 +115,13 @@ class Sheets(Mapping[str, WornSheet]):
             worn.run(self.clock())
 
     def reset(self) -> None:
-        """Put MuJoCo's state back to its start. The boards go on, as those of a robot that is carried back."""
+        """Put MuJoCo's state back to its start. The boards go on, as if the robot were carried back."""
         mujoco.mj_resetData(self.model, self.data)
         self._pushed[:] = 0.0
 
     def _press(self, foam: Mapping[tuple[int, int], Floats], touches: list[list[SheetTouch]]) -> None:
-        """Let what touches in this step press, and ``touches``, the fingers of each link; ``foam``: by contact and link
-        its force in N on the link."""
+        """Press this step's contacts and ``touches``, the fingers of each link; ``foam``: force in N on the link by
+        contact and link."""
         data, plans = self.data, list(self.body.links.values())
         for number, second, owner in self._contacts():
             one = of_solver(self.model, data, number, second)
@@ -133,14 +133,14 @@ class Sheets(Mapping[str, WornSheet]):
             worn.press(mine)
 
     def _contacts(self) -> Iterator[tuple[int, bool, int]]:
-        """(number of the contact, whether the link's geom is its second one, number of the link)."""
+        """(contact number, whether the link's geom is its second one, link number)."""
         if self.data.ncon:
             owners = self._owner[self.data.contact.geom]
             for number, side in np.argwhere(owners >= 0).tolist():
                 yield number, side == 1, int(owners[number, side])
 
     def _point(self, owner: int, pushed: Floats) -> list[SheetTouch]:
-        """Have the fingers on a link push its body; adds to (nv,) ``pushed``."""
+        """Let the fingers on a link push its body; adds to (nv,) ``pushed``."""
         worn, number, found = list(self._worn.values())[owner], self._bodies[owner], []
         position, rotation = self.data.xpos[number], self.data.xmat[number].reshape(3, 3)
         for one in worn.fingers:
@@ -151,7 +151,7 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _push(self, pushed: Floats) -> dict[tuple[int, int], Floats]:
-        """Have the foam push bodies apart; adds to (nv,) ``pushed``. Its force in N by contact and link."""
+        """Let the foam push bodies apart; adds to (nv,) ``pushed``. Returns its force in N by contact and link."""
         model, data = self.model, self.data
         found: dict[tuple[int, int], Floats] = {}
         for number, second, owner in self._contacts():
@@ -167,7 +167,7 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _note_joints(self) -> None:
-        """Remember where the joints are, each ms."""
+        """Store the joint positions, each ms."""
         if self._joints and self._steps % self._every == 0:
             angles = {name: float(self.data.qpos[address]) for name, address in self._joints.items()}
             self._history.add(self.clock(), angles)
@@ -175,8 +175,8 @@ class Sheets(Mapping[str, WornSheet]):
     # ---- what the host knows
 
     def snapshot(self) -> Snapshot:
-        """All links as a program knows them now, as from :meth:`contactfpga.body.OpenBody.latest`: what was touched
-        when the newest frames were scanned that have come."""
+        """All links as a program knows them now, like :meth:`contactfpga.body.OpenBody.latest`: the touches when the
+        newest received frames were scanned."""
         observed = {name: worn.observe() for name, worn in self._worn.items()}
         states = States(self.body.links, observed, self.clock())
         return Snapshot(self.body, self.clock(), states, self._history if self._joints else None)
@@ -207,7 +207,7 @@ class Sheets(Mapping[str, WornSheet]):
 
 
 def _covers(path: Path) -> dict[str, Cover]:
-    """By link the cover in its Skin's file."""
+    """Covers from the Skin files, by link."""
     links = tomlfile.load(path, BodyError)["links"]
     return {one["name"]: load_cover(path.parent / one["skin"]) or COVER for one in links}
 
@@ -220,7 +220,8 @@ def _body(model: Any, plan: Plan) -> int:
 
 
 def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
-    """By geom the number of the link whose sheet it wears, -1 for none; the last one is for contacts without a geom."""
+    """By geom the number of the link whose sheet it wears, -1 for none; the last entry is for contacts without a
+    geom."""
     owner = np.full(model.ngeom + 1, -1)
     for number, (name, of) in enumerate(zip(body.links, bodies)):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
@@ -232,7 +233,7 @@ def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
 
 
 def _joints(model: Any, body: Body) -> dict[str, int]:
-    """By joint of the URDF its place in ``qpos``; empty without a URDF."""
+    """Index in ``qpos`` by URDF joint; empty without a URDF."""
     found: dict[str, int] = {}
     for name in body.kinematics.joint_names if body.kinematics else ():
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)

@@ -1,4 +1,4 @@
-"""A link's sheet: switches under the cover, the board that scans them, and the USB chip behind it."""
+"""A link's sheet: switches under the cover, their board, and its USB chip."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from contactfpga_sim.model.scenes.felt import LoadedUnits
 from contactfpga_sim.model.scenes.scene import around_m
 
 HOST_S = Usb().host_s
-"""From the host's USB controller to the program, as ``contactfpga study arm`` takes it."""
+"""From the host's USB controller to the program, as in ``contactfpga study arm``."""
 
 POLL_S = 1e-6
-"""A read that waits no longer only looks: the board goes on by this, the robot does not."""
+"""Time by which the board, but not the robot, advances in a read without waiting."""
 
 
 class WornSheet:
-    """A sheet on its link, in simulated time; :attr:`board` reads it as it would read a real one."""
+    """A sheet on its link, in simulated time; :attr:`board` reads it like a real one."""
 
     board: Board
     """The open board."""
@@ -42,22 +42,22 @@ class WornSheet:
         self.plan = plan
         self.ball = Ball(radius_m, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson))
         self.touches: list[SheetTouch] = []
-        """What touches it now."""
+        """The current touches."""
         self.fingers: tuple[Finger, ...] = ()
-        """What pushes it and its link from outside MuJoCo."""
+        """Pushes on the sheet and its link from outside MuJoCo."""
         self.contact = False
         """The level of the board's ``contact`` pin."""
         self.dead = False
-        """Set it, and the board stands still from then on: its pins stay, it sends nothing."""
+        """Set it to stop the board: its pins are frozen, it sends nothing."""
         self.line: Callable[[bytes], bytes] = bytes
-        """What becomes of each packet that the USB chip delivers; one that raises :class:`~contactfpga.PortLost` is a
-        plug that was pulled."""
+        """Transforms each packet that the USB chip delivers; one that raises :class:`~contactfpga.PortLost` is a pulled
+        plug."""
         pitches = (1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
         self._cells = cells_of(cover, skin.rows, skin.columns, *pitches, seed)
         self.forces_n: Floats = np.zeros((skin.rows, skin.columns))
         """(rows, columns) force in N on each switch."""
         self.closed = np.zeros((skin.rows, skin.columns), bool)
-        """(rows, columns) switches that are closed."""
+        """(rows, columns) closed switches."""
         self._units = LoadedUnits(plan.units, skin, seed) if plan.units is not None else None
         self._device = GoldenBoard(skin) if golden else CompiledBoard(skin, capture=("contact",))
         self._hz = skin.clock_hz
@@ -70,8 +70,8 @@ class WornSheet:
         self._load()
 
     def cut(self, rows: Mapping[int, int] | None = None, columns: Mapping[int, int] | None = None) -> None:
-        """From now on these lines of the sheet are cut, as by
-        :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises ContactFPGAError for golden zones."""
+        """Cut these lines of the sheet, like :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises
+        ContactFPGAError for golden zones."""
         if isinstance(self._device, GoldenBoard):
             raise ContactFPGAError("golden zones come from cells and know no lines: take the gateware")
         self._device.cut(rows or {}, columns or {})
@@ -81,18 +81,18 @@ class WornSheet:
     by_force = True
 
     def touch(self, fingers: Sequence[Finger]) -> None:
-        """From MuJoCo's next step on these push the link, each with its force along the normal; from any thread."""
+        """From MuJoCo's next step on, push the link with these fingers, each along the normal; from any thread."""
         self.fingers = tuple(fingers)
 
     @property
     def pressed(self) -> np.ndarray:
-        """As :attr:`closed`."""
+        """Same as :attr:`closed`."""
         return self.closed
 
     # ---- what MuJoCo does to it
 
     def press(self, touches: list[SheetTouch]) -> None:
-        """From now on these touch it."""
+        """Apply these touches from now on."""
         if touches or self.touches:
             self.touches = touches
             loads = self._loads()
@@ -116,12 +116,12 @@ class WornSheet:
         return found
 
     def _load(self) -> None:
-        """What the units feel changes with every step."""
+        """Apply the forces to the units, which change with every step."""
         if self._units is not None:
             self._device.load(self._units.under(self.wrench()))
 
     def wrench(self) -> Floats:
-        """(6,): force in N and moment in Nm of all contacts on the link, in its frame and about its origin."""
+        """(6,): force in N and moment in Nm of all contacts on the link, in its frame about its origin."""
         total = np.zeros(6)
         for touch in self.touches:
             total += np.concatenate([touch.force_n, np.cross(touch.point_m, touch.force_n)])
@@ -130,7 +130,7 @@ class WornSheet:
     # ---- its time
 
     def run(self, until_s: float) -> None:
-        """Have the board run up to this time since its power-up."""
+        """Run the board up to this time since its power-up."""
         self._clock_s = max(self._clock_s, until_s)
         if not self.dead:
             self._device.run(max(0, round(until_s * self._hz) - self._device.cycle))
@@ -150,7 +150,7 @@ class WornSheet:
         return self._clock_s
 
     def arrived(self) -> bytes:
-        """The bytes that came to the program since it was asked last."""
+        """The bytes that reached the program since the last call."""
         found = b""
         while self._coming and self._coming[0][0] <= self._clock_s + 1e-12:
             found += self.line(self._coming.popleft()[1])
@@ -164,7 +164,7 @@ class WornSheet:
     # ---- what the host knows of it
 
     def observe(self) -> tuple[LinkMemory, float]:
-        """Take every frame that has come; what is then known of the link, and the board's clock."""
+        """Read all received frames; returns the knowledge of the link, and the board's clock."""
         try:
             while True:
                 self._take()
@@ -185,13 +185,14 @@ class WornSheet:
 
 
 class SteppedPort:
-    """A :class:`contactfpga.driver.transport.SimulatedPort`: the whole robot goes on while one waits for a board."""
+    """A :class:`contactfpga.driver.transport.SimulatedPort`: the whole robot goes on while a program waits for a
+    board."""
 
     def __init__(self, worn: WornSheet, step: Callable[[], None], seed: int):
         self._worn, self._step = worn, step
         self.rng = random.Random(seed)
         self.still = True
-        """The robot stands still, and the board alone goes on."""
+        """Set it to let the board go on without the robot."""
 
     def read(self, seconds: float) -> bytes:
         worn, until_s = self._worn, self._worn.clock() + seconds

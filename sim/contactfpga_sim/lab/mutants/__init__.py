@@ -1,1 +1,1 @@
-"""Mutants of the netlist that the comparison with the golden model tells."""
+"""Mutants of the netlist that the comparison with the golden model detects."""

@@ -1,4 +1,4 @@
-"""``make mutants``: mutants of the Skins that are named, or of all, and what is alive in the end."""
+"""``make mutants``: mutants of the named Skins, or of all, and the survivors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 
 
 def main() -> int:
-    """The command; its status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.lab.mutants", description=(__doc__ or ""))
     count, seconds = numbers.whole(1, 1_000_000, "mutants"), numbers.whole(1, 3600, "seconds")
     parser.add_argument("--each", type=count, default=EACH, help="mutants of each Skin (default %(default)s)")

@@ -1,4 +1,4 @@
-"""What became of the mutants of each group of Skins."""
+"""Fate of the mutants of each group of Skins."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from contactfpga_sim.verify.mutants.netlist import STAGES, Mutant
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 
 GROUPS: dict[str, Mapping[str, object]] = {"mutants": SKINS, "options": OPTIONS, "several": SEVERAL}
-"""Skins, or several sheets, by the section of the page that they fill."""
+"""Skins, or several sheets, by their section of the page."""
 EACH = 40
-"""Mutants of each Skin."""
+"""Mutants per Skin."""
 JOBS = 2
-"""Skins at once."""
+"""Skins at a time."""
 CACHE = "CONTACTFPGA_CACHE"
 
 
@@ -37,12 +37,12 @@ def mutants_table(found: Mapping[str, Sequence[Result]]) -> str:
 
 
 def options_table(found: Mapping[str, Sequence[Result]]) -> str:
-    """Mutants in what options change."""
+    """Mutants in the logic of options."""
     return table(_all(found, OPTIONS))
 
 
 def several_table(found: Mapping[str, Sequence[Result]]) -> str:
-    """Mutants in what several sheets share."""
+    """Mutants in logic shared by several sheets."""
     return table(_all(found, SEVERAL))
 
 
@@ -51,7 +51,7 @@ def _all(found: Mapping[str, Sequence[Result]], names: Iterable[str]) -> list[Re
 
 
 def table(results: Sequence[Result]) -> str:
-    """Counts by stage, as Markdown; the share is that of the mutants not proved equivalent."""
+    """Counts by stage as Markdown; shares are of mutants not proved equivalent."""
     rows = [["stage", "mutants", "killed", "equivalent, proved", "alive", "killed of the rest"]]
     drawn = {result.mutant.stage for result in results}
     for stage in [*(stage for stage in STAGES if stage in drawn), "all"]:
@@ -63,13 +63,13 @@ def table(results: Sequence[Result]) -> str:
 
 
 def listed(results: Iterable[Result]) -> str:
-    """What is alive, one per line: stage, source place, change, Skin."""
+    """Survivors, one per line: stage, source place, change, Skin."""
     alive = sorted((str(result.mutant), result.skin) for result in results if result.fate == "alive")
     return "\n".join(f"{mutant}  ({skin})" for mutant, skin in alive)
 
 
 def run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> dict[str, list[Result]]:
-    """Results by Skin, with a bar of progress for each, or where stderr is no terminal with a line for each step."""
+    """Results by Skin, with a progress bar each, or lines if stderr is no terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -97,7 +97,7 @@ def run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> d
 
 @contextlib.contextmanager
 def _own_cache() -> Iterator[None]:
-    """Libraries of mutants are of no use to anything else, so they stay out of the user's cache."""
+    """Keep the libraries of mutants out of the user's cache, as nothing else needs them."""
     named = os.environ.get(CACHE)
     os.environ[CACHE] = named or "build/mutants"
     try:
@@ -108,7 +108,7 @@ def _own_cache() -> Iterator[None]:
 
 
 def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], None]) -> list[Result]:
-    """As :func:`examine`, or what it found before with the same code."""
+    """The results of :func:`examine`, cached by code."""
     design = chosen(name)[0]
     skins = design.skins if isinstance(design, Several) else (design,)
     code = kept.made_by(campaign.__name__, *skins)

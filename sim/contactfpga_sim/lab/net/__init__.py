@@ -1,1 +1,1 @@
-"""Many boards through one Zenoh router: frames, losses, processor time and latency, beside a bare pair of Zenoh."""
+"""Many boards through one Zenoh router: frames, losses, CPU time and latency, against a bare Zenoh pair."""

@@ -1,6 +1,6 @@
-"""Links through a router, in four processes: boards with their publishers, the router, and two readers of half each.
+"""Links through a router, in four processes: boards with publishers, the router, and two readers of half each.
 
-The boards run at full speed and cost next to nothing: their frames are made beforehand, and handed over when due.
+The boards run at full speed almost for free: their frames are made beforehand, and delivered when due.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from contactfpga_sim.model.golden.request import heard
 
 HELLO_S = 0.5
 GREETED_HZ = 20.0
-"""Frames per second until it is told to go."""
+"""Frames per second before :meth:`Steady.go`."""
 
 
 @functools.cache
 def frames(low: int) -> list[bytes]:
-    """All frames of a board that last heard a number with these lowest bits."""
+    """All frames of a board whose last request number has these lowest bits."""
     return [frame(number, low) for number in range(FRAMES)]
 
 
 def said(sent: int, number: int) -> bytes:
-    """The hello of a board that has sent so many frames and heard this request."""
+    """The hello of a board that has sent this many frames and received this request."""
     counters = ((sent, SENT_DIGITS), (sent * STEP_US >> EPOCH_BITS, EPOCH_DIGITS), (number, HEARD_DIGITS), (0, 2))
     return hello(facts(SKIN), [value >> 7 * place & 127 for value, count in counters for place in range(count)])
 
@@ -59,13 +59,13 @@ class Steady:
         self._begun_s, self._rate_hz = time.monotonic(), GREETED_HZ
 
     def go(self, begun_s: float, rate_hz: float) -> int:
-        """From that moment on, so many per second; returns the number of the first of these frames."""
+        """From that moment send at this rate; returns the number of the first of these frames."""
         with self._lock:
             self._begun_s, self._rate_hz, self._first = begun_s, rate_hz, self._sent
             return self._sent
 
     def read(self, timeout_s: float) -> bytes:
-        """The frames that are due, waiting for the first one."""
+        """The due frames, after waiting for the first."""
         until = time.monotonic() + timeout_s
         while True:
             with self._lock:
@@ -90,7 +90,7 @@ class Steady:
         return data
 
     def write(self, data: bytes) -> None:
-        """Hear requests."""
+        """Receive requests."""
         with self._lock:
             self._asked += data
             for one in heard([(0, self._asked)], facts(SKIN).bit_clocks).requests[self._taken :]:
@@ -100,46 +100,46 @@ class Steady:
                     self._answers += said(self._sent, one.number)
 
     def clock(self) -> float:
-        """Of this machine."""
+        """The machine's clock."""
         return time.monotonic()
 
 
 def number_of(time_us: int) -> int:
-    """Of the frame with this time since power-up."""
+    """Number of the frame with this time since power-up."""
     return time_us // STEP_US
 
 
 SECONDS = 5.0
 FULL_HZ = 10_000.0
-"""The rate of one link beside the others."""
+"""Rate of the one fast link."""
 RATE_HZ = 1000.0
 BARE_BYTES = 100
-"""Of a message of the bare pair."""
+"""Size of a message of the bare pair."""
 LONG_S = 120.0
 
 
 class NetworkRun(NamedTuple):
-    """What a run showed; times in s."""
+    """Result of a run; times in s."""
 
     links: int
     share: float
-    """Of the frames that were sent, those received by the end; the others are on their way, or lost."""
+    """Share of the sent frames received by the end; the others are in transit, or lost."""
     frames: float
-    """Received, per second."""
+    """Received frames per second."""
     lost: int
-    """Frames and messages that did not come."""
+    """Frames and messages that did not arrive."""
     messages: float
-    """Per second."""
+    """Messages per second."""
     cpu: dict[str, float]
-    """Share of a core that publishers, router and readers took."""
+    """Share of a core used by publishers, router and readers."""
     latency: tuple[float, float]
-    """p50 and p99 from a frame being due at the port to its reader, of one link."""
+    """p50 and p99 from a frame being due at the port to its reader, for one link."""
     bare: tuple[float, float]
-    """The same of the bare pair of Zenoh, from put to callback."""
+    """p50 and p99 of the bare Zenoh pair, from put to callback."""
 
 
 def measure(links: int, batch_s: float, full: bool = False, seconds: float = SECONDS) -> NetworkRun:
-    """Links of 1 kHz; ``full``: and one of 10 kHz."""
+    """Run links of 1 kHz; ``full``: and one of 10 kHz."""
     context: Any = multiprocessing.get_context("spawn")
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
@@ -218,7 +218,7 @@ def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full
 
 
 def _beat(bare: Any, until_s: float) -> None:
-    """The bare pair: a message with its time, 1,000 times per second."""
+    """Run the bare pair: a message with its time, 1,000 times per second."""
     while (now_s := time.monotonic()) < until_s:
         bare.put(np.float64(now_s).tobytes() + bytes(BARE_BYTES - 8))
         time.sleep(1 / RATE_HZ)
@@ -251,7 +251,7 @@ def _read(pipe: Connection, endpoint: str, links: range, batch_s: float, full: b
 
 
 def _probed(board: contactfpga.Board, first: int, begun_s: float, until_s: float) -> list[float]:
-    """How late each frame of one link is."""
+    """Delay of each frame of one link."""
     found = []
     with board.subscribe(maxsize=1 << 16) as frames:
         while time.monotonic() < until_s:

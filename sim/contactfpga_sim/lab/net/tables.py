@@ -14,13 +14,14 @@ BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)
 GROWTH_MS = 10.0
 LINE_BYTES = 54 + 12
-"""Of a message below Zenoh: Ethernet, IP and TCP; and Zenoh's own head, roughly."""
+"""Approximate overhead of a message: Ethernet, IP, TCP and Zenoh's header."""
 GIGABIT = 1e9 / 8
 
 
 @functools.cache
 def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
-    """Once per run of this program. ``full`` has no default: the cache takes a call that leaves it out for another."""
+    """One measurement per run of this program. ``full`` has no default, since the cache distinguishes calls without
+    it."""
     return load.measure(links, batch_ms / 1000, full)
 
 
@@ -54,7 +55,7 @@ def _ends(found: load.NetworkRun) -> tuple[float, float, float]:
 
 
 def thousand_table() -> str:
-    """What a thousand links would take, from what was measured and computed."""
+    """Estimate for a thousand links, measured and computed."""
     found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
     frame = len(load.frames(1)[0])
@@ -91,7 +92,7 @@ def _ms(latency: tuple[float, float]) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """Processor time and latency by the number of links."""
+    """CPU time and latency by number of links."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):

@@ -1,4 +1,4 @@
-"""What the boards' pages state of the way from the wire to the host, by the model of the USB bridge."""
+"""The boards pages' times from the wire to the host, by the model of the USB bridge."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from contactfpga_sim.lab.usb import DEFAULT_TIMER_MS, BridgeSettings
 TOUCHES = 24
 
 BRIDGES = {"high speed": BOARDS["icebreaker"].bridge, "full speed": BOARDS["ulx3s-12f"].bridge}
-"""Each stands for all that have its speed."""
+"""Bridges, each for all of its speed."""
 
 SET = {"set by the rule": {}, "as new": {"timer_ms": DEFAULT_TIMER_MS, "event": None}}
-"""The rule of ``contactfpga doctor``, and the settings after power-up."""
+"""The settings of ``contactfpga doctor``, and those after power-up."""
 
 
 class BridgeRow(NamedTuple):
@@ -31,7 +31,7 @@ class BridgeRow(NamedTuple):
 
 
 def rows() -> list[BridgeRow]:
-    """Each bridge in each setting, for a sheet that sends each scan and one that sends what changes."""
+    """Each bridge in each setting, for a sheet that sends each scan and one that sends changes."""
     fast = Skin.load(examples() / "fast.toml")
     found = []
     for speed, chip in BRIDGES.items():

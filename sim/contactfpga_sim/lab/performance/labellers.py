@@ -1,6 +1,5 @@
-"""How late the labeller's last record is, in clocks from a frame's last row: over touches at every place, over
-recordings, and over the shapes that break labellers.
-"""
+"""Latency of the labeller's last record, in clocks from a frame's last row: over touches at every place, recordings,
+and shapes that break labellers."""
 
 from __future__ import annotations
 
@@ -22,13 +21,13 @@ from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
 
 TOUCHES = 400
-"""Scenes of each family; each has its own place within a cell, angle and size."""
+"""Scenes of each family, each with a place within a cell, angle and size of its own."""
 
 SEED = 20
 
 
 def labeller_table() -> str:
-    """Over touches, over the shapes that break labellers, and the bound."""
+    """Latency over touches, over shapes that break labellers, and the bound."""
     place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
     lines = []
     for size in (16, 32, 64):
@@ -51,12 +50,12 @@ def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
 
 
 def recordings_table() -> str:
-    """:func:`recorded_table` of the recordings that lie beside the project."""
+    """:func:`recorded_table` of the recordings in the project's folder."""
     return recorded_table(scans.recordings())
 
 
 def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
-    """Over all (n, R, C) bool frames of each recording, as if the sheet ended after any of its rows."""
+    """Latency over all (n, R, C) bool frames of each recording, as if the sheet ended after any row."""
     lines = []
     for name, frames in recordings.items():
         _, rows, columns = frames.shape
@@ -72,13 +71,13 @@ def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
 
 
 def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
-    """Clocks from a frame's last row to its last record that no frame exceeds: the end mark comes a clock later."""
+    """Bound on the clocks from a frame's last row to its last record: the end mark is a clock later."""
     skin = Skin(rows=16, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=15.0)
     return skin.derived.label_clocks - 1
 
 
 def worst_last_record_clocks(skin: Skin) -> int:
-    """At most, over the shapes that break labellers, in the compiled gateware."""
+    """Worst latency in clocks over the shapes that break labellers, in the compiled gateware."""
     with LabelBench(skin) as bench:
         frames = np.stack([cells for _, cells in variants(skin.rows, skin.columns)])
         return int(bench.run(frames).last_record_clocks.max())
@@ -93,18 +92,17 @@ def touches(skin: Skin) -> np.ndarray:
 
 
 def last_rows(frames: np.ndarray) -> np.ndarray:
-    """(m, 2) uint64 words: what the last two rows hold if the sheet ends after any row of (n, R, C) bool frames, or one
-    row later; only where a cell is pressed in them. Every zone with a cell there leaves with the last row, so that no
-    other row decides how late the last record is.
-    """
+    """(m, 2) uint64 words: the last two rows if the sheet ends after any row of (n, R, C) bool frames, or one row
+    later, if a cell is pressed in them. Every zone there leaves with the last row, so no other row decides the
+    latency."""
     words = np.pad(to_words(frames), ((0, 0), (1, 1)))
     pairs = np.stack([words[:, :-1], words[:, 1:]], axis=-1).reshape(-1, 2)
     return pairs[pairs.any(axis=1)]
 
 
 def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The last two rows at every whole-cell offset of these frames, a part may lie off the sheet: (k, 2, C) bool, and
-    how often each comes."""
+    """The last two rows at every whole-cell offset of these frames, partly off the sheet too: (k, 2, C) bool, and their
+    counts."""
     columns = frames.shape[2]
     sheet = np.uint64((1 << columns) - 1)
     pairs = last_rows(frames)
@@ -114,7 +112,7 @@ def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Each of these words once as (k, 2, C) bool, without those that are empty, and how often it comes."""
+    """The distinct nonempty words as (k, 2, C) bool, and their counts."""
     # One number a pair: unique() by number is many times faster than by rows.
     pairs = np.ascontiguousarray(pairs[pairs.any(axis=1)])
     different, count = np.unique(pairs.view([("before", "<u8"), ("last", "<u8")]), return_counts=True)
@@ -123,9 +121,9 @@ def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: LabellerName | Labeller) -> str:
-    """Median, 99 % and worst of the clocks to the last record, each of the (k, 2, C) rows being there ``count`` times.
+    """Median, 99 % and worst of the clocks to the last record, over (k, 2, C) rows with these counts.
 
-    The clocks are the golden model's, which the gateware keeps.
+    The clocks are the golden model's, equal to the gateware's.
     """
     clocks = volume.last_record_clocks(rows, connectivity, labeller)
     order = np.argsort(clocks, kind="stable")

@@ -1,4 +1,4 @@
-"""What the pages state of scans, measured in clock cycles of the gateware."""
+"""The pages' figures of scans, measured in clock cycles of the gateware."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ INSTANTS = 96
 """Touch instants, spread evenly over a scan."""
 
 RECORDINGS = Path("../shared/data")
-"""Where recordings lie that are no part of the project."""
+"""Folder of recordings outside the project."""
 
 RECORDED = 100
-"""Frames of a recording that are looked at."""
+"""Frames used of a recording."""
 
 HELD_SCANS = 4
-"""Scan periods for which a frame is held; a sheet that is recorded a hundred times per second holds it for more."""
+"""Scan periods for which a frame is held; a sheet recorded a hundred times per second holds it longer."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -43,11 +43,11 @@ SETTINGS = {
 
 
 REPORTS = ("moments", "barycenter")
-"""Those that report zones."""
+"""Reports with zones."""
 
 
 class EventTimes(NamedTuple):
-    """Median and worst time in us from a switch closing to an event, over the touch instants."""
+    """Median and worst time in us from a switch closing to an event, over the touch phases."""
 
     median: float
     worst: float
@@ -69,16 +69,15 @@ def one_switch(skin: Skin, row: int) -> np.ndarray:
 
 
 def dots_in_last_row(skin: Skin) -> np.ndarray:
-    """(R, C) bool: every other switch of the last row, as many zones as can end in one row with 8-connectivity."""
+    """(R, C) bool: every other switch of the last row, the most zones that can end in one row with 8-connectivity."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[-1, ::2] = True
     return cells
 
 
 def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, EventTimes]:
-    """From switches of one row closing to the pin, and to the first and last byte of their frame; by default that of a
-    single one in the first row, which is the worst place: the rest of the scan follows it.
-    """
+    """From switches of one row closing to the pin, and to the first and last byte of their frame. Default: one switch
+    in the first row, the worst, as the rest of the scan follows it."""
     frame = skin.derived.frame_clocks
     touched = one_switch(skin, 0) if touched is None else touched
     untouched = np.zeros_like(touched)
@@ -96,7 +95,7 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
 
 
 def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:
-    """Cycles in which the start bit of a frame's first byte begins and the stop bit of its last one ends."""
+    """Cycles of the start bit of a frame's first byte, and of the end of its last stop bit."""
     received = board.take("received")
     for got in frames_in(skin, zip(received["cycle"].tolist(), received["data"].tolist())):
         if got.frame.cells:
@@ -105,7 +104,7 @@ def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]
 
 
 def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
-    """Frames per second that reach the host with one zone on the sheet, and the bytes of such a frame."""
+    """Frames per second that reach the host with one zone, and bytes of such a frame."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[1:3, 1:3] = True
     with CompiledBoard(skin) as board:
@@ -115,7 +114,7 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
 
 
 def reference_table() -> str:
-    """Latency, rate and size on the wire over some settings."""
+    """Latency, rate and bytes for some settings."""
     head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames per second", "bytes, one zone")
     return writer.table(head, [reference_row(name, skin) for name, skin in SETTINGS.items()])
 
@@ -130,7 +129,7 @@ def reference_row(name: str, skin: Skin) -> str:
 
 
 def report_table() -> str:
-    """What dividing on the board saves on the wire, and what it costs, over some sheets."""
+    """Bytes saved by on-board division, and its cost, for some sheets."""
     head = ("sheet", "report", "bytes per zone", "first row", "last row", "every other switch of the last row")
     names = ("reference", "32x32", "64x64")
     return writer.table(
@@ -146,18 +145,18 @@ def report_row(name: str, skin: Skin) -> str:
 
 
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
-    """How long a frame of an adaptive scan takes, and how many times shorter that is than a raster scan.
+    """Frame time of an adaptive scan, and its speedup over a raster scan.
 
-    ``scenes``: (n, R, C) bool frames by name. Times are the golden model's, which the gateware keeps in every clock.
+    ``scenes``: (n, R, C) bool frames by name. Times are the golden model's, equal to the gateware's in every clock.
     """
     head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
     return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
 
 
 def gain_row(name: str, frames: np.ndarray) -> str:
-    """One line of :func:`gain_table`. Each frame is held for some scan periods: most of them see a sheet at rest.
+    """One line of :func:`gain_table`. Each frame is held for some scan periods: most scans see a sheet at rest.
 
-    The mean is that of the frame which is under way at an instant picked at random.
+    The mean is of the frame under way at a random instant.
     """
     _, rows, columns = frames.shape
     known = facts(adaptive_skin(rows, columns))
@@ -178,7 +177,7 @@ def gain_row(name: str, frames: np.ndarray) -> str:
 
 
 def built_in_scenes() -> dict[str, np.ndarray]:
-    """(n, 16, 16) frames of every contact scene: one of those at rest, 50 of the moving one, over half a second."""
+    """(n, 16, 16) frames of every contact scene: one of those at rest, 50 over half a second of the moving one."""
     skin = adaptive_skin(16, 16)
     times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
     return {
@@ -213,7 +212,7 @@ def reference_sample() -> str:
 
 
 def report_sample() -> str:
-    """Its first row of :func:`report_table`."""
+    """The first row of :func:`report_table`."""
     return report_row("reference", Skin(report="moments"))
 
 
@@ -225,13 +224,13 @@ FAST_SKINS = {
     "64x64, palm": (FAST_64, (10, 10)),
     "64x64, any pattern": (FAST_64.replace(settle_us=2.9, project_us=8.2), (3, 3)),
 }
-"""The last one has the times that docs/settle.md gives for a sheet of which any switches may be pressed."""
+"""Fast Skins; the last has the times of docs/settle.md for any pressed switches."""
 
 TOUCHES = 196
-"""Places of a contact, spread over the sheet; on 16x16 that is every place of 3x3 cells."""
+"""Places of a contact, spread over the sheet; on 16x16 every place of 3x3 cells."""
 
 SCENES = 400
-"""Of each family."""
+"""Scenes of each family."""
 
 
 def latency_table() -> str:
@@ -263,7 +262,7 @@ def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
 
 
 def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
-    """The projection, a row time per touched row, and the frame's bits; and how far the worst touch is above it."""
+    """The projection, a row time per touched row, and the frame's bits; and the worst touch's excess over it."""
     if not skin.reads_rows:
         return ""
     derived = skin.derived
@@ -279,8 +278,8 @@ def sides_table() -> str:
 
 
 def sides_row(name: str) -> str:
-    """One line of :func:`sides_table`, on 16x16: a projection and a slot per row, or two projections and a slot per row
-    or per column, whichever are fewer, where that is less."""
+    """One line of :func:`sides_table`, on 16x16: a projection and a slot per row, or, if less, two projections and a
+    slot per row or per column, whichever are fewer."""
     frames = np.stack([scene.pressed(0.0, Skin()) for scene in placements(name, SCENES, 0, Skin())])
     rows, columns = frames.any(axis=2).sum(axis=1), frames.any(axis=1).sum(axis=1)
     one = 1 + rows

@@ -1,1 +1,1 @@
-"""How soon frames reach user code, with either reader, beside a C program on the same line."""
+"""Delay of frames to user code with either reader, against a C program on the same line."""

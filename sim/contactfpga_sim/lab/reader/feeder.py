@@ -1,4 +1,4 @@
-"""Boards on pseudo-terminals, in a process of their own: each frame's moment is noted before it is written."""
+"""Boards on pseudo-terminals in a process of their own, which notes the time before writing each frame."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import heard
 
 ALIVE_S = 0.25
-"""How often a board that was not told to go sends a frame."""
+"""Interval of frames before a board is started."""
 
 
 class Pace(NamedTuple):
-    """How frames are written."""
+    """Timing of the written frames."""
 
     per_second: int
     at_once: int
-    """In one write, as a port of USB hands them over."""
+    """Frames per write, as a USB port delivers them."""
     seconds: float
-    """Of a stream."""
+    """Duration of a stream."""
 
     @property
     def step_us(self) -> int:
-        """From frame to frame, on the board's clock."""
+        """Frame period on the board's clock."""
         return round(1e6 / self.per_second)
 
     @property
@@ -37,12 +37,11 @@ class Pace(NamedTuple):
 
 
 PACES = Pace(1_000, 1, 1.5), Pace(10_000, 1, 1.0), Pace(72_000, 18, 0.5)
-"""The reference sheet with a slow and a fast scan, and what 12 Mbaud carry."""
+"""The reference sheet with a slow and a fast scan, and the capacity of 12 Mbaud."""
 
 
 class Feeder:
-    """Boards that answer requests until they are told to go, and then write frames for
-    as long as their pace says."""
+    """Boards that answer requests until started, then write frames at their pace."""
 
     def __init__(self, boards: int, pace: Pace, touched: bool = True):
         count = int(pace.per_second * pace.seconds)
@@ -56,13 +55,13 @@ class Feeder:
         self.ports = [os.ttyname(slave) for slave in self._slaves]
         self.go = context.Event()
         self.first = context.RawArray("q", boards)
-        """Number of the first frame of each board after it was told to go."""
+        """Number of each board's first frame after the start."""
         self.written_s = context.RawArray("d", count)
-        """When each frame was about to be written, to the first board, on ``time.monotonic``."""
+        """Time on ``time.monotonic`` just before each frame was written to the first board."""
         self.end = context.RawValue("q", -1)
-        """Frames of each board that were written; -1: not all of them are."""
+        """Frames written by each board; -1: still writing."""
         self.greeted = context.RawValue("q", 0)
-        """Requests that were answered."""
+        """Number of answered requests."""
         self.process = context.Process(target=self._run, daemon=True)
         self.process.start()
 
@@ -120,7 +119,7 @@ class Feeder:
         return frame(number, low, int(self._touched), self._pace.step_us)
 
     def begin(self) -> None:
-        """Have them write, once each has been asked."""
+        """Start writing once each board was asked."""
         while self.greeted.value < len(self.ports):
             time.sleep(0.01)
         time.sleep(0.1)

@@ -20,23 +20,23 @@ from contactfpga_sim.lab.reader.feeder import Feeder, Pace
 from contactfpga_sim.lab.speed.driver import SKIN
 
 LEFT_OUT = 0.15
-"""The share of a stream's beginning that does not count."""
+"""Ignored share of a stream's beginning."""
 OPEN_S = 60.0
-"""How long a board may take to answer, on a machine that is busy."""
+"""Time for a board to answer on a busy machine."""
 ENDED_S = 0.8
-"""A stream has ended when no frame came for so long."""
+"""Silence that ends a stream."""
 BEGUN = 20
 """Frames after which a stream has begun; a few come while the board makes the others."""
 READERS = ("native", "thread")
 
 
 class Found(NamedTuple):
-    """What one stream gave."""
+    """Result of one stream."""
 
     us: np.ndarray
-    """From the last byte's write to user code, of each call that returned."""
+    """From the last byte's write to user code, for each returned call."""
     calls: float
-    """Calls that returned per second."""
+    """Returned calls per second."""
 
 
 @contextlib.contextmanager
@@ -53,7 +53,7 @@ def bare_program() -> Iterator[Path]:
 
 
 def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
-    """Of frames with these numbers at these moments."""
+    """Delays of frames with these numbers and receive times."""
     places = numbers - feeder.first[0]
     counted = (places > feeder.end.value * LEFT_OUT) & (places < feeder.end.value)
     places, seconds = places[counted], seconds[counted]
@@ -64,7 +64,7 @@ def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
 
 
 def bare(program: Path, pace: Pace) -> Found:
-    """The C program's."""
+    """Result of the C program."""
     with contextlib.closing(Feeder(1, pace)) as feeder, tempfile.NamedTemporaryFile() as file:
         command = [str(program), feeder.ports[0], str(pace.step_us), file.name]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
@@ -75,7 +75,7 @@ def bare(program: Path, pace: Pace) -> Found:
 
 
 def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
-    """The driver's; ``busy``: while another Python thread computes."""
+    """Result of the driver; ``busy``: while another Python thread computes."""
     numbers: list[int] = []
     seconds: list[float] = []
     with contextlib.closing(Feeder(1, pace)) as feeder:
@@ -93,7 +93,7 @@ def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
 
 @contextlib.contextmanager
 def computing(busy: bool) -> Iterator[None]:
-    """A thread that does nothing but compute, if ``busy``."""
+    """If ``busy``, a thread that only computes."""
     done: list[bool] = []
 
     def compute() -> None:

@@ -1,4 +1,4 @@
-"""What many links of 1 kHz take of the process that uses them, with either reader."""
+"""Load of many links of 1 kHz on the process that uses them, with either reader."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Share(NamedTuple):
     used: float
     """Of a core, by the process that uses the links, with all its threads."""
     came: float
-    """The share of the frames that came in the time in which they were sent."""
+    """Share of the frames that arrived while they were sent."""
     age_ms: float
-    """Of the newest frame of a link when it was taken, median."""
+    """Median age of a link's newest frame when taken."""
 
 
 def measured(reader: str, links: int, call: str) -> Share:
@@ -59,7 +59,7 @@ def _opened(port: str, reader: str) -> contactfpga.Board:
 
 
 def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str, feeder: Feeder) -> float:
-    """Of the newest frame that a link gives."""
+    """Age of a link's newest frame."""
     if call == "latest":
         zones = board.latest(10.0)
         time_us, arrived_s = zones.time_us, zones.arrived_s

@@ -1,5 +1,4 @@
-"""The control loop of ``examples/reflex.py`` beside a Python thread that computes: deadlines missed, and frames that
-were taken for silence."""
+"""The control loop of ``examples/reflex.py`` beside a computing Python thread: missed deadlines, and false silences."""
 
 from __future__ import annotations
 
@@ -18,17 +17,17 @@ PACE = Pace(1_000, 1, 2.0)
 
 
 class Missed(NamedTuple):
-    """What came of the loop's deadlines."""
+    """Missed deadlines of the loop."""
 
     deadlines: int
     missed: int
-    """Those in whose period no step began."""
+    """Periods without a step."""
     silent: int
-    """How often it stopped because it had no frame that was new enough, though the board sent one every ms."""
+    """Stops for lack of a recent frame, though the board sent one every ms."""
 
 
 def measured(reader: str, busy: bool, switch_s: float) -> Missed:
-    """``switch_s``: Python's switch interval."""
+    """Run the loop; ``switch_s``: Python's switch interval."""
     loop, usual = example(), sys.getswitchinterval()
     begun: list[float] = []
     silent = 0

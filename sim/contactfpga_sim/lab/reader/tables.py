@@ -1,7 +1,7 @@
-"""Tables of how soon frames reach user code with either reader.
+"""Tables of the delay of frames to user code with either reader.
 
-Methods take turns, so that what else the machine does is spread over all of them. Times are this machine's, and no
-figure that a test could hold; on one that is busy compare within a row.
+Methods alternate, so that other load affects all equally. Times are this machine's; no test holds them. On a busy
+machine compare within a row.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ LINKS = (16, "latest"), (16, "batch"), (64, "latest"), (64, "batch")
 
 
 def times(streams: list[Found]) -> tuple[float, float]:
-    """Median and 99 % in ms, over all rounds."""
+    """Median and 99 % in ms over all rounds."""
     us = np.concatenate([one.us for one in streams])
     return float(np.percentile(us, 50)) / 1e3, float(np.percentile(us, 99)) / 1e3
 
 
 def shown(streams: list[Found]) -> str:
-    """Both for a table."""
+    """Median and 99 % as table cells."""
     return " / ".join(f"{value:.3g}" for value in times(streams)) + " ms"
 
 
 def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
-    """From the last byte to user code while nothing else computes in the process."""
+    """From the last byte to user code in an otherwise idle process."""
     rows = [
         [
             "frames per second",
@@ -55,7 +55,7 @@ def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
 
 
 def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
-    """The same beside a thread that computes."""
+    """From the last byte to user code beside a computing thread."""
     rows = [["frames per second", "call", *(f'`reader="{reader}"`' for reader in READERS), "calls per second"]]
     for pace in paces:
         for call in ("latest", "next") if pace is paces[0] else ("latest",):
@@ -69,7 +69,7 @@ def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
 
 
 def loop_table() -> str:
-    """Deadlines of a loop of 1 kHz."""
+    """Deadlines of a 1 kHz loop."""
     rows = [["beside it", "switch interval", "reader", "deadlines missed", "stops on silence that was none"]]
     for busy, switch_s in ((False, 0.005), (True, 0.005), (True, 0.0005)):
         for reader in READERS:
@@ -92,6 +92,6 @@ def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
 
 
 def conditions() -> str:
-    """What else the machine did."""
+    """Other load on the machine."""
     load = os.getloadavg()[0]
     return f"Measured with {os.cpu_count()} cores and a load of {load:.1f} at the end of this table."

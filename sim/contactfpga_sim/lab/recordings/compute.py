@@ -1,4 +1,4 @@
-"""What recordings cost, and what is left of one after kill -9: the figures of docs/recordings.md."""
+"""Cost of recordings, and loss after kill -9: the figures of docs/recordings.md."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from contactfpga.tools.recordings.session import Session
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
-"""Boards by about how many frames they send per second."""
+"""Boards by their approximate frame rate."""
 
 _PIECE = struct.Struct("<dQ")
-"""When bytes came, and how many by then."""
+"""Arrival times of bytes, and their number by then."""
 
 
 def finger(seconds: float) -> np.ndarray:
-    """A fingertip that goes around, once per second."""
+    """A fingertip that circles once per second."""
     rows, columns = np.mgrid[:16, :16]
     row, column = 7.5 + 5 * np.sin(6.28 * seconds), 7.5 + 5 * np.cos(6.28 * seconds)
     return (rows - row) ** 2 + (columns - column) ** 2 <= 2.5
@@ -40,13 +40,13 @@ def finger(seconds: float) -> np.ndarray:
 
 @contextlib.contextmanager
 def folder() -> Iterator[Path]:
-    """A folder that goes away."""
+    """A temporary folder."""
     with tempfile.TemporaryDirectory() as name:
         yield Path(name)
 
 
 def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
-    """Write what a board says while a finger goes around; returns the number of frames."""
+    """Write a board's bytes under a circling finger; returns the number of frames."""
     with contactfpga.open(VirtualBoard(skin, finger), record=path) as board:
         count = 1
         while board.clock() < seconds:
@@ -57,21 +57,21 @@ def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class Cost:
-    """Of one rate and one way to record."""
+    """Cost of one rate and one way to record."""
 
     frames_per_s: float
     bytes_per_frame: float
     frames_per_cpu_s: float
-    """Taken and written, with all that the driver does."""
+    """Frames received and written per CPU second, with all of the driver's work."""
 
     @property
     def mb_an_hour(self) -> float:
-        """At that rate."""
+        """Megabytes per hour at that rate."""
         return self.frames_per_s * self.bytes_per_frame * 3600 / 1e6
 
 
 def cost(source: Path, seconds: float, into: Path, bytes_only: bool) -> Cost:
-    """Record bytes once more, as fast as they are read."""
+    """Record bytes again, as fast as they are read."""
     before = time.process_time()
     with Session(into, bytes_only=bytes_only) as session:
         session.add(f"replay://{source}", name="skin")
@@ -84,13 +84,13 @@ def cost(source: Path, seconds: float, into: Path, bytes_only: bool) -> Cost:
 
 @dataclasses.dataclass(frozen=True)
 class Reading:
-    """Frames per second of the processor."""
+    """Frames per CPU second."""
 
     frames: float
     rows: float
-    """Of a table, with tracks."""
+    """Rows of a table, with tracks."""
     parquet_bytes: float
-    """Per frame."""
+    """Bytes per frame."""
 
 
 def reading(path: Path, into: Path) -> Reading:
@@ -105,18 +105,18 @@ def reading(path: Path, into: Path) -> Reading:
 
 @dataclasses.dataclass(frozen=True)
 class Loss:
-    """After one kill -9."""
+    """Loss after one kill -9."""
 
     came: int
-    """Bytes that had come over the port."""
+    """Bytes that had arrived."""
     lost: int
-    """Of which so many are not in the recovered file."""
+    """Arrived bytes missing in the recovered file."""
     lost_s: float
-    """From the last byte that is there to the last one that came."""
+    """Time from the last recovered byte to the last one that arrived."""
 
 
 def loss(source: Path, seconds: float, place: Path) -> Loss:
-    """Record a board in its own time, kill the program after so long, and recover what it left."""
+    """Record a board in real time, kill the program after this time, and recover its file."""
     place.mkdir()
     file, log = place / "killed.mcap", place / "log"
     child = subprocess.Popen([sys.executable, "-m", __name__, f"replay://{source}?pace=1", str(file), str(log)])
@@ -135,7 +135,7 @@ def loss(source: Path, seconds: float, place: Path) -> Loss:
 
 
 def _record(port: str, file: str, log: str) -> None:
-    """What is killed: it writes a log of its own of what came."""
+    """The process to kill; it logs arrivals itself."""
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT)
     count = 0
 

@@ -14,13 +14,13 @@ from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.recordings import compute
 
 SECONDS = {10_000: 3.0, 1_000: 5.0}
-"""Of device time, by frames per second."""
+"""Device time by frames per second."""
 KILLS = 8
 
 
 @functools.cache
 def stream(rate: int) -> Path:
-    """What a board of about this rate says."""
+    """Bytes of a board of about this rate."""
     path = Path(tempfile.mkdtemp(prefix="contactfpga-page-")) / "stream.bin"
     atexit.register(shutil.rmtree, path.parent)
     compute.bytes_of(compute.SKINS[rate], SECONDS[rate], path)
@@ -28,7 +28,7 @@ def stream(rate: int) -> Path:
 
 
 def sizes_table() -> str:
-    """Sizes are the same on each machine, but for how often a chunk ends; speeds are this one's."""
+    """Sizes (machine-independent, but for chunk ends) and speeds (of this machine)."""
     head = ("frames/s", "messages", "bytes per frame", "MB an hour", "frames per CPU second")
     rows = [head]
     with compute.folder() as place:
@@ -48,7 +48,7 @@ def sizes_table() -> str:
 
 
 def reading_table() -> str:
-    """On the machine that runs this."""
+    """Reading speed on this machine."""
     with compute.folder() as place:
         compute.cost(stream(10_000), SECONDS[10_000], place / "x.mcap", False)
         found = compute.reading(place / "x.mcap", place / "x.parquet")
@@ -64,7 +64,7 @@ def reading_table() -> str:
 
 
 def loss_table() -> str:
-    """Killed at several moments."""
+    """Loss when killed at several moments."""
     with compute.folder() as place:
         found = [compute.loss(stream(10_000), 0.5 + 0.237 * kill, place / str(kill)) for kill in range(KILLS)]
     rows = [

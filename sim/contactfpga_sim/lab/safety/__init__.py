@@ -1,1 +1,1 @@
-"""Electrical faults of a sheet and its board: which of them are told, by what, and how fast."""
+"""Electrical faults of a sheet and its board: which are reported, by what means, and how fast."""

@@ -1,6 +1,6 @@
-"""The electrical faults of docs/safety.md: what a fault is to the simulated sheet, at which places, and what it does.
+"""The electrical faults of docs/safety.md: each fault on the simulated sheet, its places and effects.
 
-A new one is an entry in :data:`FAULTS`; study and page take it from there.
+To add one, add an entry to :data:`FAULTS`; study and page follow.
 """
 
 from __future__ import annotations
@@ -22,40 +22,40 @@ Cell = tuple[int, int]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SheetFault:
-    """What is wrong. Rows and columns are those of the sheet; cells are (row, column)."""
+    """A fault. Rows and columns are those of the sheet; cells are (row, column)."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut rows: the column from which on their switches no longer reach the pin; 0 is also a driver that never
-    selects."""
+    """Cut rows: first column whose switches no longer reach the pin; 0 also stands for a driver that never selects."""
     columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut columns, likewise; 0 is also an input that always reads released."""
+    """Cut columns: first row whose switches no longer reach the pin; 0 also stands for an input that always reads
+    released."""
     selected: tuple[int, ...] = ()
-    """Rows that are at the selecting level all the time."""
+    """Rows constantly at the selecting level."""
     stuck: tuple[int, ...] = ()
-    """Columns that read pressed all the time."""
+    """Columns that always read pressed."""
     closed: tuple[Cell, ...] = ()
     """Switches that always conduct."""
     dead: tuple[Cell, ...] = ()
-    """Switches that never do."""
+    """Switches that never conduct."""
     bare: tuple[Cell, ...] = ()
     """Switches whose diode is shorted."""
     joined_rows: tuple[Cell, ...] = ()
-    """Pairs of rows that are shorted to each other."""
+    """Pairs of shorted rows."""
     joined_columns: tuple[Cell, ...] = ()
-    """Pairs of columns."""
+    """Pairs of shorted columns."""
     pulls_win: bool = False
-    """How undefined levels read, where two pins drive against each other: as released."""
+    """Whether undefined levels, with two pins driving against each other, read as released."""
     line: ColumnLine | None = None
-    """The columns' time; None: none."""
+    """Settling of the columns; None: instant."""
     running: bool = True
-    """The board has its supply, its clock and its configuration."""
+    """Whether the board has supply, clock and configuration."""
     connected: bool = True
-    """Its bytes reach the host."""
+    """Whether its bytes reach the host."""
     contact_connected: bool = True
-    """Its pin `contact` reaches the robot."""
+    """Whether its pin `contact` reaches the robot."""
 
     def middle(self, rows: int, columns: int) -> Cell:
-        """A cell that it is at, of a sheet of this size."""
+        """A cell of the fault, for a sheet of this size."""
         for row, column in (*self.closed, *self.dead, *self.bare, *self.rows.items()):
             return row, min(column, columns - 1)
         for column, row in self.columns.items():
@@ -67,7 +67,7 @@ class SheetFault:
         return rows // 2, columns // 2
 
     def press(self, board: CompiledBoard, touched: np.ndarray) -> None:
-        """The sheet of a running board from the next cycle on, touched so."""
+        """Give a running board's sheet these touches, from the next cycle on."""
         read = self._read(wiring.extended(touched))
         cuts = wiring.missed(read)
         board.cut(cuts.rows | dict(self.rows), cuts.columns | dict(self.columns))
@@ -81,7 +81,7 @@ class SheetFault:
         board.press(read[:-1, :-1])
 
     def _read(self, closed: np.ndarray) -> np.ndarray:
-        """The switches that read pressed, each in its row's time, of those of an extended sheet that are closed."""
+        """The switches that read pressed, each in its row's time, given the closed ones of an extended sheet."""
         cells = closed.copy()
         for cell in self.closed:
             cells[cell] = True
@@ -108,17 +108,17 @@ class Fault:
 
     title: str
     effect: str
-    """What goes wrong where nobody notices."""
+    """The error if nobody notices."""
     places: Places
-    """By the name of the place."""
+    """Places by name."""
     left: str
-    """What a user can still do; where nothing tells it, why not."""
+    """The user's remedy, and for an unreported fault the reason."""
     host: str = ""
-    """What is meant for it: ``self_test``, which is run at power-up, or the host's ``Watch``, which is not run here."""
+    """Means for this fault: ``self_test`` at power-up, or the host's ``Watch``, which is not run here."""
 
 
 def _ends(length: int) -> tuple[int, ...]:
-    """Where a line is cut: at its pin, in the middle, before its last switch."""
+    """Cuts of a line: at its pin, in the middle, before its last switch."""
     return 0, length // 2, length - 1
 
 
@@ -135,7 +135,7 @@ def _cut_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _row_chips(skin: Skin) -> Mapping[str, SheetFault]:
-    """Of a connector or a 74HC595: its rows, or all rows after it in the chain too."""
+    """A failed connector or 74HC595: its rows alone, or also all later rows in the chain."""
     firsts = range(0, skin.rows, 8)
     alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
     return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
@@ -164,7 +164,7 @@ def _stuck_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _cells(skin: Skin) -> list[tuple[int, int]]:
-    """Corners and a diagonal."""
+    """Corner and diagonal cells."""
     rows, columns = skin.rows - 1, skin.columns - 1
     corners = [(0, 0), (0, columns), (rows, 0), (rows, columns)]
     return corners + [(rows * step // 4, columns * step // 4) for step in (1, 2, 3)]
@@ -179,7 +179,7 @@ def _dead(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _bare(skin: Skin) -> Mapping[str, SheetFault]:
-    """Undefined levels are tried both ways."""
+    """Shorted diodes, with both values of undefined levels."""
     return {
         f"switch {cell}, {'released' if released else 'pressed'} wins": SheetFault(bare=(cell,), pulls_win=released)
         for cell in _cells(skin)
@@ -188,7 +188,7 @@ def _bare(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _joined_rows(skin: Skin) -> Mapping[str, SheetFault]:
-    """Two pins drive against each other: which level a column comes to is tried both ways."""
+    """Two pins that drive against each other, with both resulting column levels."""
     return {
         f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": SheetFault(
             joined_rows=((row, row + 1),), pulls_win=released
@@ -206,7 +206,7 @@ def _joined_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _slow(skin: Skin) -> Mapping[str, SheetFault]:
-    """Lines of ever more capacitance, with pulls that lift them late and with a resistance that lowers them late."""
+    """Lines of increasing capacitance, with weak pulls that raise them late and a resistance that lowers them late."""
     found = {}
     for picofarad in (464, 1000, 2154, 4642):
         for name, circuit in (

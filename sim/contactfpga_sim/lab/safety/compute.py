@@ -1,6 +1,5 @@
-"""Every fault at every place, in every scene: what tells it, how fast, and what was wrong before; and those that a
-self-test is meant for, with which the compiled board is powered up while the pin `contact` is watched.
-"""
+"""Every fault at every place, in every scene: what reports it, how fast, and earlier errors. For faults meant for a
+self-test, the compiled board is powered up and the pin `contact` is watched."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ from contactfpga_sim.model.sheet.matrix import Shorts
 SKINS = {"plain": REFERENCE, "guarded": GUARDED}
 
 PHASES = (0.03, 0.37, 0.71)
-"""Shares of a scan after whose beginning faults come, one after the other: the longest time counts."""
+"""Shares of a scan at which faults begin; the longest time counts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,11 +33,11 @@ class Place:
 
     @property
     def harmful(self) -> bool:
-        """It makes something wrong that is looked at here."""
+        """Whether it causes an error that this study detects."""
         return any(told.harmful for told in self.scenes.values())
 
     def us(self, by: str) -> int | None:
-        """How long this takes to tell it: untouched where it can, else in every scene in which something is wrong."""
+        """Time for this means to report it: untouched if possible, else in every scene with an error."""
         rest = self.scenes["rest"].by.get(by)
         if rest is not None:
             return rest
@@ -47,12 +46,12 @@ class Place:
 
     @property
     def wrong(self) -> int:
-        """Frames at most that were wrong and said nothing."""
+        """Largest number of wrong frames without a flag."""
         return max(told.wrong for told in self.scenes.values())
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What the first flagged frames say, of all scenes."""
+        """Content of the first flagged frames over all scenes."""
         return tuple(dict.fromkeys(word for told in self.scenes.values() for word in told.words))
 
 
@@ -62,7 +61,7 @@ def places(skin: Skin, fault: str) -> Iterator[tuple[str, SheetFault]]:
 
 
 def at(skin: Skin, hurt: SheetFault, name: str = "", phase: float = PHASES[0]) -> Place:
-    """What becomes of a fault at a place."""
+    """Results of a fault at a place."""
     return Place(
         name, {scene: trial.run(skin, hurt, touched, phase) for scene, touched in trial.scenes(skin, hurt).items()}
     )
@@ -70,13 +69,13 @@ def at(skin: Skin, hurt: SheetFault, name: str = "", phase: float = PHASES[0]) -
 
 @functools.cache
 def found(skin: str, fault: str) -> tuple[Place, ...]:
-    """All places of a fault, with the Skin of this name."""
+    """All places of a fault on the Skin of this name."""
     hurts = list(places(SKINS[skin], fault))
     return tuple(at(SKINS[skin], hurt, name, PHASES[number % len(PHASES)]) for number, (name, hurt) in enumerate(hurts))
 
 
 def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
-    """At how many of the places at which it does harm a fault is told by one of these, and how many these are."""
+    """Number of harmful places at which one of these channels reports the fault, and number of harmful places."""
     harmful = [place for place in found(skin, fault) if place.harmful]
     return sum(any(place.us(channel) is not None for channel in channels) for place in harmful), len(harmful)
 
@@ -84,19 +83,18 @@ def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
 TESTED = Skin.load(examples() / "fast.toml").replace(guard=True, self_test=True, fail_safe=True, alive=True)
 
 HOST = "self_test"
-"""What :attr:`~contactfpga_sim.lab.safety.catalogue.Fault.host` says of these faults."""
+"""Faults by :attr:`~contactfpga_sim.lab.safety.catalogue.Fault.host`."""
 
 
 def clocks(skin: Skin) -> int:
-    """That the self-test takes at power-up, and the pin after it; no row is driven by the scan until then."""
+    """Clocks of the self-test at power-up, and the pin after it; the scan drives no row until then."""
     derived = skin.derived
     slot = 2 * derived.project_clocks + derived.settle_clocks + 8
     return (1 + skin.rows + skin.columns) * slot + 2
 
 
 def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
-    """When the pin says so, in us from power-up, with the switches pressed whose diodes are shorted; None: it does
-    not."""
+    """Time of the pin's report in us from power-up, with the switches of shorted diodes pressed; None: none."""
     cells = np.zeros((1, skin.rows, skin.columns), bool)
     for cell in hurt.bare:
         cells[0][cell] = True
@@ -109,7 +107,7 @@ def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
 
 @functools.cache
 def times_at_start(fault: str) -> dict[str, float | None]:
-    """By place when the self-test tells this fault; of a fault that it is not meant for nothing."""
+    """Time of the self-test's report by place; empty for other faults."""
     if FAULTS[fault].host != HOST:
         return {}
     return {name: told_us(hurt) for name, hurt in places(TESTED, fault)}

@@ -16,21 +16,21 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
     "these and `self_test`": ("guarded", ("flags", "deadline", "alive", compute.HOST)),
 }
-"""Options with the Skin and with what reports a fault."""
+"""Options with their Skin and their reporting channels."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
 
 
 def faults_table() -> str:
-    """Each fault with what reports it, how fast, and what was wrong before."""
+    """Each fault with what reports it, how fast, and earlier errors."""
     head = [
         "fault",
-        "what it does unnoticed",
+        "effect if undetected",
         "reported by",
-        "after, at most",
-        "`contact` after",
-        "frames wrong before",
+        "worst detection time",
+        "time until `contact` rises",
+        "wrong frames before detection",
     ]
-    rows = [[*head, "without options", "what is left to do"]]
+    rows = [[*head, "without options", "what you must do"]]
     for name, fault in FAULTS.items():
         guarded, plain = _harmful("guarded", name), _harmful("plain", name)
         rows.append(
@@ -49,8 +49,8 @@ def faults_table() -> str:
 
 
 def coverage_table() -> str:
-    """Reported faults of the listed ones, with and without each option."""
-    rows = [["options", "faults reported at every place", "diagnostic coverage", "places reported"]]
+    """Listed faults that are reported, with and without each option."""
+    rows = [["options", "faults reported at every place", "share of faults", "places reported"]]
     for name, (skin, channels) in OPTIONS.items():
         counts = [_told(skin, fault, channels) for fault in FAULTS]
         whole = sum(told == of for told, of in counts)
@@ -61,7 +61,7 @@ def coverage_table() -> str:
 
 
 def _told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
-    """As :func:`compute.told`; the self-test is asked as well where it is one of the channels."""
+    """:func:`compute.told`, with the self-test if it is among the channels."""
     tested = compute.times_at_start(fault) if compute.HOST in channels else {}
     if not tested:
         return compute.told(skin, fault, channels)
@@ -86,7 +86,7 @@ def _is_told(places: list[Place]) -> bool:
 
 
 def _told_by(places: list[Place], host: str) -> str:
-    """What reports it, at all places or at some."""
+    """The channels that report it, at all or some places."""
     if not any(_channels(place) for place in places):
         return f"**not reported** by a scan; meant for `{host}`" if host else "**not reported**"
     words = dict.fromkeys(_general(word) for place in places for word in place.words)
@@ -97,7 +97,7 @@ def _told_by(places: list[Place], host: str) -> str:
 
 
 def _tested(fault: str) -> str:
-    """What the self-test at power-up reports of it."""
+    """The self-test's report at power-up."""
     times = [us for us in compute.times_at_start(fault).values() if us is not None]
     of = len(compute.times_at_start(fault))
     share = "" if len(times) == of else f" at {len(times)} of {of} places"
@@ -124,7 +124,7 @@ def _after(places: list[Place], channels: tuple[str, ...]) -> str:
 
 
 def times_table() -> str:
-    """What the study waits for."""
+    """Timeouts of the study."""
     rows = [["wait", "for"]]
     rows.append([f"{trial.LONGEST_US:,} µs", "a fault that is not reported until then counts as not reported"])
     rows.append([f"{trial.QUIET_US:,} µs", "the watchdog's time without an edge of `alive`"])

@@ -1,4 +1,4 @@
-"""One fault at one place: the compiled board scans a sheet that gets it, and what it says of it is noted."""
+"""One fault at one place: the compiled board scans a sheet that gets the fault, and its reports are noted."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments,
 from contactfpga_sim.lab.safety.catalogue import SheetFault
 
 LONGEST_US = 5000
-"""A fault that is not told until then is not told."""
+"""Time after which a fault counts as unreported."""
 STEP_US = 8
-"""How exactly times are told."""
+"""Resolution of the times."""
 QUIET_US = 2500
-"""Without an edge of `alive` for this long a watchdog acts: two and a half of its half periods."""
+"""Time without an edge of `alive` at which a watchdog acts: two and a half of its half periods."""
 DEADLINE_US = 1000
-"""Without a frame for this long the host's deadline passes; a user sets it, ten frames is a short one."""
+"""The host's deadline for frames, set by the user; ten frames is a short one."""
 
 WARM_UP_US = 3000
-"""The board has run for this long after its hello: frames come and `alive` toggles."""
+"""Run time after the hello, by which frames arrive and `alive` toggles."""
 SEEN_SCANS = 6
-"""A fault that is told is watched for so many scans, to see what it does."""
+"""Scans for which a reported fault is watched further."""
 
 PINS = ("contact", "alive")
 
 
 @dataclasses.dataclass(frozen=True)
 class Told:
-    """What came of a fault in one scene. Times are in us from the fault."""
+    """Result of a fault in one scene. Times are in us from the fault."""
 
     by: Mapping[str, int]
-    """When it was told: by the frames' ``flags``, the ``deadline`` of a host, the pins ``contact`` and ``alive``."""
+    """Report times: by the frames' ``flags``, a host's ``deadline``, the pins ``contact`` and ``alive``."""
     words: tuple[str, ...]
-    """What the first frame with a flag says."""
+    """Content of the first flagged frame."""
     wrong: int
-    """Frames that are not what is touched and say nothing, until the fault is told by flags or for good."""
+    """Wrong frames without a fault flag, until the fault is flagged or the run ends."""
     harmful: bool
-    """Something is wrong at some time: a frame, or nothing where something should come."""
+    """Whether a frame was wrong or missing at any time."""
 
 
 def scenes(skin: Skin, hurt: SheetFault) -> dict[str, np.ndarray]:
-    """What is touched meanwhile: nothing, a finger at the fault, everything."""
+    """Touches during the fault: nothing, a finger at the fault, everything."""
     finger = np.zeros((skin.rows, skin.columns), bool)
     row, column = hurt.middle(*finger.shape)
     finger[max(row - 2, 0) : row + 1, max(column - 2, 0) : column + 1] = True  # of two shorted lines on the first
@@ -52,7 +52,7 @@ def scenes(skin: Skin, hurt: SheetFault) -> dict[str, np.ndarray]:
 
 
 def run(skin: Skin, hurt: SheetFault, touched: np.ndarray, phase: float = 0.0) -> Told:
-    """A sheet that is touched so gets the fault this share of a scan after its beginning."""
+    """A sheet with this touch gets the fault after this share of a scan."""
     with Rig(skin, capture=PINS) as rig:
         board = rig.board
         board.hold(touched[None], hello_clocks(skin) + skin.derived.clocks(WARM_UP_US) + int(phase * rig.scan))
@@ -85,7 +85,7 @@ def _watch(rig: Rig, hurt: SheetFault, watched: _Watched) -> Told:
 
 
 class _Watched:
-    """What the host and a watchdog see from the fault on."""
+    """Observations of the host and a watchdog since the fault."""
 
     def __init__(self, skin: Skin, touched: np.ndarray, contact: bool):
         self._skin = skin
@@ -99,13 +99,13 @@ class _Watched:
 
     @property
     def done(self) -> bool:
-        """Nothing more is to be learned."""
+        """Whether the result is final."""
         pins = {"contact"} if self._skin.fail_safe else set()
         pins |= {"alive"} if self._skin.alive else set()
         return self._now_us > SEEN_SCANS * self._scan_us and {"flags", *pins} <= set(self._by)
 
     def step(self, now_us: int, frames: list[Zones], edges: Mapping[str, int], hurt: SheetFault) -> None:
-        """What came since the last step."""
+        """Add the events since the last step."""
         self._now_us = now_us
         for zones in frames:
             self._last_frame = now_us
@@ -131,5 +131,5 @@ class _Watched:
         return -(-self._skin.derived.frame_clocks // self._skin.derived.clocks_per_us)
 
     def told(self) -> Told:
-        """All of it."""
+        """The result."""
         return Told(self._by, self._words, self._wrong, self._harmful)

@@ -1,6 +1,6 @@
 """The picture in docs/scenes.md.
 
-Written by hand rather than by a plotting library, so that the same scenes always make the same file.
+Hand-written, so that the same scenes always make the same file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from contactfpga_sim.model.scenes.scene import Scene, sheet
 
 ACROSS = 4
 PANEL, MARGIN, LINE, FOOT = 160, 16, 16, 24
-"""Size of a panel, space around it, height of a line of its title and room for its scale, in pixels."""
+"""Panel size, margin, title line height and room for the scale, in pixels."""
 
 HEAD = 4 * LINE
 OUTLINE = style.VERMILLION
@@ -42,7 +42,7 @@ class Panel:
 
 
 def panels() -> list[Panel]:
-    """A scene of some families where what is covered is pressed; and two fingers under every kind of cover."""
+    """A scene of some families, where covered switches are pressed; and two fingers under every kind of cover."""
     hand, foot = (_square(size, pitch) for size, pitch in ((32, 5.0), (64, 5.0)))
     drawn = [
         Panel(name, f"pitch {skin.pitch_x_mm:g} mm", placements(name, 1, seed, skin)[0], skin, Cover())
@@ -113,7 +113,7 @@ def _panel(panel: Panel) -> list[str]:
 
 
 def _scale(sheet_mm: float, scale: float) -> list[str]:
-    """A bar below the sheet, at most 0.4 of it long."""
+    """A scale bar below the sheet, at most 0.4 of its width."""
     long_mm = max((one for one in SCALES_MM if one <= 0.4 * sheet_mm), default=SCALES_MM[0])
     wide = long_mm * scale
     return [
@@ -135,6 +135,6 @@ def _outline(part: Part, left_mm: float, top_mm: float, scale: float) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """All of them, in ``scenes.svg``."""
+    """All panels, in ``scenes.svg``."""
     write_text(folder / "scenes.svg", svg(panels()))
     return folder / "scenes.svg"

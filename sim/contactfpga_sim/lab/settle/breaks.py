@@ -16,18 +16,18 @@ SETTLE_US, PRECHARGE_US = 0.5, 0.25
 """Times of a fast scan."""
 SIZE = 16
 HIGH_V = Circuit().high_v
-"""Below it a column no longer reads as unpressed."""
+"""Level below which a column no longer reads as unpressed."""
 US = 1e6
 
 
 @functools.cache
 def sweeps(name: str) -> dict[str, Sweep]:
-    """The outcomes of every run of a knob."""
+    """Outcomes of every run of a knob."""
     return KNOBS[name].sweep()
 
 
 def _settled(circuit: Circuit, names: Sequence[str], size: int = SIZE) -> Outcome:
-    """In time under each of these patterns?"""
+    """Whether the circuit settles in time under each of these patterns."""
     found = []
     for name in names:
         phase = phases.settle(Network(circuit, patterns.named(size, size)[name]), Levels.of(circuit))

@@ -26,7 +26,7 @@ def draw(folder: Path) -> list[Path]:
 
 
 def _steps(axes: Any, found: RowTime) -> None:
-    """Marks where each step of a row's time begins."""
+    """Mark the beginning of each step of a row time."""
     for start, end, name in zip(found.starts_us, found.starts_us[1:], NAMES):
         axes.axvline(start, color=style.GRID, lw=1)
         if end - start > 0.1:

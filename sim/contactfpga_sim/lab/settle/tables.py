@@ -1,4 +1,4 @@
-"""Currents through switches whose diode is shorted, and the tables and pictures of docs/settle.md."""
+"""Currents through switches with shorted diodes, and the tables and pictures of docs/settle.md."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from contactfpga_sim.model.sheet import agreement
 from contactfpga_sim.model.sheet.agreement import SpiceComparison
 
 GAP_US = 1 / 24
-"""A clock of 24 MHz."""
+"""One clock at 24 MHz."""
 NAMES = ("precharge", "gap", "select", "gap")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RowTime:
-    """A row's time: what all lines do from the precharge on."""
+    """All lines during a row time, from the precharge on."""
 
     network: Network
     seconds: np.ndarray
     volts: np.ndarray
     amperes: np.ndarray
-    """(n, lines) out of the pins that drive."""
+    """(n, lines) currents out of the driving pins."""
     starts_us: tuple[float, ...]
-    """Of the steps in :data:`NAMES`, and the end."""
+    """Starts of the steps in :data:`NAMES`, and the end."""
 
     @property
     def column(self) -> np.ndarray:
-        """Volts of the column with the faulty switches."""
+        """Volts of the column with faulty switches."""
         return self.volts[:, patterns.middle(self.network.columns)]
 
     def pin_ma(self, row: int) -> np.ndarray:
-        """Out of the pin of a row."""
+        """Current out of the pin of a row."""
         return np.asarray(1e3 * self.amperes[:, self.network.columns + row])
 
 
 def sheet(shorted: int, circuit: Circuit | None = None) -> Network:
-    """A sheet with a pressed switch in the selected row, and this many more in its column whose diodes are shorted."""
+    """A sheet with a pressed switch in the selected row, and ``shorted`` more in its column with shorted diodes."""
     row, column = patterns.middle(SIZE), patterns.middle(SIZE)
     pressed, bare = np.zeros((2, SIZE, SIZE), bool)
     others = [other for other in range(SIZE) if other != row][:shorted]
@@ -54,7 +54,7 @@ def sheet(shorted: int, circuit: Circuit | None = None) -> Network:
 
 
 def row_time(network: Network) -> RowTime:
-    """One row of the scan, after one with the same pressed switches and a gap."""
+    """One row time, after a row with the same pressed switches and a gap."""
     supply = network.circuit.supply_v
     selected = np.full(network.rows, supply)
     selected[patterns.middle(network.rows)] = 0.0
@@ -79,7 +79,7 @@ def row_time(network: Network) -> RowTime:
 
 
 def flowing_us(found: RowTime, row: int, above_ma: float = 1.0) -> float:
-    """For how long the pin of a row carries more than this."""
+    """Time for which the pin of a row carries more than this."""
     flows = np.abs(found.pin_ma(row)) > above_ma
     steps = np.diff(found.seconds)
     return float(US * steps[flows[1:] & flows[:-1]].sum())
@@ -175,7 +175,7 @@ def breaks_table() -> str:
 
 
 def shorted_table() -> str:
-    """What flows through shorted diodes."""
+    """Currents through shorted diodes."""
     head = ["shorted diodes in the column", "level of the column", "out of each of their rows' pins"]
     rows = [[*head, "into the selected row's pin", "for, per scan of 16 rows"]]
     row = patterns.middle(breaks.SIZE)

@@ -1,1 +1,1 @@
-"""Cost of several sheets at one FPGA."""
+"""Cost of several sheets on one FPGA."""

@@ -1,4 +1,4 @@
-"""Measures what several sheets at one FPGA cost and how they share the line, and writes it into the page on them."""
+"""Measures the cost of several sheets on one FPGA and their shares of the line, for docs/several.md."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SKIN = Skin(row_drive="74hc595", column_read="74hc165")
 COUNTS = (1, 2, 3, 4, 8)
 BAUDS = (3_000_000, 12_000_000)
 SECONDS = 0.05
-"""Of the board that is looked at, less its hellos."""
+"""Observed board time, without hellos."""
 
 
 def size_table() -> str:
@@ -36,7 +36,7 @@ def size_table() -> str:
 
 
 def line_table() -> str:
-    """How often frames come, and how old they are, of as many sheets as there are, each touched by two fingertips."""
+    """Rate and age of frames by number of sheets, each touched by two fingertips."""
     rows = [_row(count, baud) for baud in BAUDS for count in COUNTS]
     return writer.table_of([("baud", "sheets", "frames/s per sheet", "replaced", "longest wait for the line"), *rows])
 
@@ -53,9 +53,9 @@ def _row(count: int, baud: int) -> tuple[str, ...]:
     frames = [_frames(trace, after) for trace in traces]
     per_second = np.mean([len(of_one) for of_one in frames]) / (cycles - after) * skin.clock_hz
     waits = [_longest_wait(trace, of_one) for trace, of_one in zip(traces, frames, strict=True)]
-    replaced = max(0.0, 1 - np.mean([len(of_one) for of_one in frames]) / packed)
+    replaced = max(0.0, 1 - float(np.mean([len(of_one) for of_one in frames])) / packed)
     longest = max(waits) / skin.clock_hz * 1e6
-    return f"{baud:,}", str(count), f"{per_second:,.0f}", f"{replaced:.0%}", f"{longest:.0f} µs"
+    return f"{baud:,}", str(count), f"{per_second:,.0f}", f"{100 * replaced:.0f} %", f"{longest:.0f} µs"
 
 
 def _frames(trace: Trace, after: int) -> list[int]:
@@ -66,7 +66,7 @@ def _frames(trace: Trace, after: int) -> list[int]:
 
 
 def _longest_wait(trace: Trace, begins: list[int]) -> int:
-    """Clocks from the last row of the frame that is sent, at most."""
+    """Largest number of clocks from the last row of a sent frame."""
     rows = np.array([cycle for cycle, _, last in trace.rows if last])
     newest = np.searchsorted(rows, np.array(begins)) - 1
     return int(max(np.array(begins) - rows[newest]))

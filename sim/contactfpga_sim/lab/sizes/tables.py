@@ -1,4 +1,4 @@
-"""Measures by place and route what the performance and boards pages state of size and clock, and writes it there."""
+"""Measures size and clock by place and route for the performance and boards pages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size, writer
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
-"""Sheets that the boards page shows beside the default ones."""
+"""Sheets on the boards page besides the default ones."""
 FAST = Path("examples/fast.toml")
 
 
@@ -27,13 +27,13 @@ FAULTS: dict[str, dict[str, Any]] = {
     "`guard`, `fail_safe` and `alive`": {"guard": True, "fail_safe": True, "alive": True},
     "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
 }
-"""Options that tell of faults, by their titles."""
+"""Fault-reporting options by title."""
 FAST_FAULTS: dict[str, dict[str, Any]] = {
     "`guard`": {"guard": True},
     "`self_test`": {"self_test": True},
     "`guard` and `self_test`": {"guard": True, "self_test": True},
 }
-"""The same of a scan by line reversal."""
+"""Fault-reporting options of a scan by line reversal, by title."""
 
 WEIGHTS = (
     (1, 2, 3, -4, 5, 6, 7, 8),
@@ -41,7 +41,7 @@ WEIGHTS = (
     (100, -50, 20, 10, 5, -7, 9, 11),
     (1, 1, 1, 1, 1, 1, 1, 1),
 )
-"""Of sums, which are cut to the units there are."""
+"""Weights of sums, cut to the number of units."""
 
 
 def gateware_table() -> str:
@@ -56,14 +56,14 @@ def gateware_table() -> str:
 
 
 def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
-    """LUT4, flip-flops, block RAMs and clock of a design."""
+    """LUT4s, flip-flops, block RAMs and clock of a design."""
     print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
     found = size.measure(lambda: size.DESIGNS[name](size.square(lines)), device)
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
 
 
 def faults_table() -> str:
-    """The reference Skin and the fast one with the options that tell of faults."""
+    """The reference Skin and the fast one with fault-reporting options."""
     rows = [*_fault_rows(Skin(), "none", FAULTS), *_fault_rows(Skin.load(FAST), f"`{FAST}`", FAST_FAULTS)]
     return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
 
@@ -100,7 +100,7 @@ def boards_table() -> str:
 
 
 def board_row(board: BoardSpec, skin: Skin) -> str:
-    """What the bitstream of a Skin takes of the board's FPGA."""
+    """FPGA resources of a Skin's bitstream on the board."""
     print(f"{board.title}, {skin.rows}x{skin.columns}: bitstream", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as folder:  # these tools do not see /tmp
         found = build.build(skin, board, Path(folder))

@@ -1,1 +1,1 @@
-"""How fast board and driver run on this machine, and whether they run for an hour."""
+"""Speed of board and driver on this machine, and an hour's run."""

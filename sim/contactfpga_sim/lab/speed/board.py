@@ -1,6 +1,6 @@
-"""How fast the virtual board runs on this machine, over some Skins: `python -m contactfpga_sim.lab.speed.board`.
+"""Speed of the virtual board on this machine, over some Skins: `python -m contactfpga_sim.lab.speed.board`.
 
-A core of its own is assumed: processor time is counted, of the best of some runs. No figure that a test could hold.
+It counts CPU time, as if on a core of its own, of the best of some runs. No test holds the figures.
 """
 
 from __future__ import annotations

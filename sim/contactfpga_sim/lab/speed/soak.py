@@ -1,9 +1,9 @@
-"""A board in real time and the driver beside it for an hour: `make soak`. Nothing may grow, and nothing be lost unsaid.
+"""A board in real time and its driver for an hour: `make soak`. Nothing may grow, or be lost unreported.
 
-The virtual board runs behind a pseudo-terminal; three threads read it, one asks, and a new subscription comes and goes.
-Now and then the port is closed and opened again. Each line is a minute: frames, losses, memory and open descriptors of
-this process. The status is 1 if a frame came twice or out of order, if a count does not add up, if memory or
-descriptors grew, or if no frame came. The first period with a wrong frame or count is the last one.
+The virtual board runs on a pseudo-terminal; three threads read it, one requests, subscriptions come and go, and the
+port is reopened now and then. Each line is a minute: frames, losses, memory and open descriptors of this process. The
+status is 1 if a frame was repeated or out of order, a count does not add up, memory or descriptors grew, or no frame
+arrived. The first period with a wrong frame or count is the last.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from contactfpga.tools.console import interrupt, numbers
 from contactfpga_sim.model.board.pty_board import PtyBoard
 
 SKIN = contactfpga.Skin(clock_hz=3_000_000, baud=750_000, settle_us=25.0)
-"""A clock that a busy machine holds."""
+"""A Skin with a clock that a busy machine holds."""
 
 REOPENED_S = 60.0
 GROWTH_MB = 30.0
-"""Allowed after the first tenth of the time: what Python keeps for itself."""
+"""Allowed growth after the first tenth of the time, for Python itself."""
 
 
 class Soak:
-    """What is read, and what was wrong about it."""
+    """Readings, and errors found."""
 
     def __init__(self, port: str):
         self.faults: list[str] = []
@@ -38,7 +38,7 @@ class Soak:
         self._port = port
 
     def run(self, seconds: float) -> None:
-        """Read for this long, then give the port back."""
+        """Read for this long, then release the port."""
         self.opened += 1
         with contactfpga.open(self._port, timeout=10.0) as board:
             until = time.monotonic() + seconds
@@ -125,7 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _megabytes() -> float:
-    """Resident memory; 0 where the system does not tell."""
+    """Resident memory; 0 if the system does not report it."""
     status = Path("/proc/self/statm")
     return int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6 if status.exists() else 0.0
 

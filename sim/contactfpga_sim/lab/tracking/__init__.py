@@ -1,1 +1,1 @@
-"""How well contacts are followed: moving scenes with a known truth, recordings, a baseline, and where it breaks."""
+"""Quality of tracking: moving scenes with a known truth, recordings, a baseline, and where it breaks."""

@@ -1,6 +1,6 @@
 """Where ids are lost: one knob at a time, moved until fewer than 95 % of random placements keep them.
 
-A placement is the scene moved by up to a pitch along both axes, and its frames by up to one frame.
+A placement shifts the scene by up to a pitch along both axes, and its frames by up to one frame.
 """
 
 from __future__ import annotations
@@ -20,48 +20,47 @@ from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_o
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)
-"""For slides that a smaller sheet has no room for."""
+"""A wide sheet for long slides."""
 
 Y_MM = 73.0
 HZ = 1000.0
 
 MOST = 480
-"""Placements of a value at most: one that is not decided by then counts as broken."""
+"""Most placements per value; undecided ones count as broken."""
 
 Ids = list[list[int]]
-"""From left to right, frame by frame; a frame without a zone is left out."""
+"""Ids from left to right, frame by frame, without frames that lack a zone."""
 
 Made = tuple[Zones, ...]
 
 Rates = list[tuple[float, rated.Rate]]
-"""Value by value, how many placements were right."""
+"""Number of correct placements per value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One quantity that is moved until ids are lost."""
+    """One parameter, moved until ids are lost."""
 
     name: str
     title: str
     axis: str
-    """What is moved, with its unit."""
+    """The moved quantity, with its unit."""
     values: tuple[float, ...]
-    """In the order in which the knob is moved."""
+    """Values in the order of the sweep."""
     scene: Callable[[float, Random], Made]
-    """The frames at a value, at a random placement."""
+    """The frames for a value, at a random placement."""
     right: Callable[[Ids, float], bool]
-    """Whether these ids are those of the contacts."""
+    """Whether the ids are those of the contacts."""
     methods: Mapping[str, Callable[[], Update]]
     closed: Mapping[str, str]
-    """Where fewer than 95 % are right by a formula, for the methods for which there is one."""
+    """Break points by formula, for the methods that have one."""
     helps: str
-    """What to do about it."""
+    """The remedy."""
 
     def rates(
         self, value: float, methods: Iterable[str], seed: int = 0, looks: Sequence[int] = rated.LOOKS
     ) -> dict[str, rated.Rate]:
-        """How many placements are right at a value, for each method: as many are tried as it takes to say whether
-        enough are, the same ones for every method."""
+        """Correct placements at a value, for each method, on the same placements; as many as the decision needs."""
         hits = dict.fromkeys(methods, 0)
         found: dict[str, rated.Rate] = {}
         for number in range(MOST):
@@ -76,7 +75,7 @@ class Knob:
         return found
 
     def sweep(self, seed: int = 0) -> dict[str, Rates]:
-        """For each method, value by value up to the first one at which too few are right."""
+        """Rates for each method, value by value until too few are correct."""
         found: dict[str, Rates] = {method: [] for method in self.methods}
         for value in self.values:
             whole = [method for method, rates in found.items() if not rates or holds(rates[-1][1])]
@@ -86,19 +85,19 @@ class Knob:
 
 
 def holds(rate: rated.Rate) -> bool:
-    """Enough are right."""
+    """Whether enough are correct."""
     return bool(rate.reaches(rated.LEVEL))
 
 
 def held_until(rates: Rates) -> float | None:
-    """The last value up to which enough are right; None if there is none."""
+    """The last value up to which enough are correct; None if there is none."""
     held = [value for value, rate in rates if holds(rate)]
     return held[-1] if held else None
 
 
 @functools.cache
 def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
-    """:meth:`Knob.sweep` of the knob of this name. What was found before is kept."""
+    """:meth:`Knob.sweep` of the knob of this name, cached."""
     key = repr((kept.made_by(__name__), name, seed))
 
     def new() -> dict[str, list[tuple[float, int, int]]]:
@@ -110,7 +109,7 @@ def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
 
 
 def sweeps() -> dict[str, dict[str, Rates]]:
-    """Of every knob."""
+    """Sweeps of every knob."""
     with pool.executor() as workers, pool.progress() as step:
         for one in [workers.submit(sweep, name) for name in KNOBS]:
             one.result()
@@ -119,13 +118,13 @@ def sweeps() -> dict[str, dict[str, Rates]]:
 
 
 def _moved(rng: Random) -> tuple[float, float]:
-    """How far a scene is moved, in mm."""
+    """Random shift of a scene, in mm."""
     x, y = rng.uniform(0, SKIN.pitch_x_mm), rng.uniform(0, SKIN.pitch_y_mm)
     return float(x), float(y)
 
 
 def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
-    """(n, rows, columns) bool: the switches that a finger closes at n places, as without a cover: those under it."""
+    """(n, rows, columns) bool: the switches under a finger at n places, without a cover."""
     columns, rows = WIDE.pitch_x_mm * np.arange(WIDE.columns), WIDE.pitch_y_mm * np.arange(WIDE.rows)
     across, along = columns - xs_mm[:, None, None], rows[:, None] - y_mm
     closed: np.ndarray = across**2 + along**2 <= FINGER_MM**2
@@ -159,7 +158,7 @@ def _one_id(ids: Ids, _value: float) -> bool:
 
 
 def _slide(step_mm: float, rng: Random, from_rest: bool) -> Made:
-    """Ten frames at this speed, after ten in which it speeds up to it, or none."""
+    """Ten frames at this speed, optionally after ten of acceleration."""
     steps = [step_mm * (number + 1) / 10 for number in range(10 if from_rest else 0)] + [step_mm] * 9
     xs = [10.0]
     for step in steps:
@@ -197,7 +196,7 @@ SPEEDING, AT_ONCE = (
 
 
 def _pair(distance_mm: float, rng: Random) -> Made:
-    """They come from 60 mm apart, stay 0.1 s at this distance, and go back, at 400 mm/s toward each other."""
+    """Two fingers that start 60 mm apart, stay 0.1 s at this distance, and go back, at 400 mm/s relative speed."""
     travel = (60 - distance_mm) / 400
     x_mm, y_mm = _moved(rng)
     now = _times(2 * travel + 0.19, rng, 250.0)
@@ -279,7 +278,7 @@ BOUNCE = Knob(
 
 
 def _stuck(count: float, rng: Random) -> Made:
-    """A finger slides along a row with stuck switches 40 mm apart, at 300 mm/s, and 20 mm past the fourth."""
+    """A finger that slides along a row with stuck switches 40 mm apart, at 300 mm/s, to 20 mm past the fourth."""
     x_mm, y_mm = _moved(rng)
     now = _times(0.69, rng, 125.0)
     cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)
@@ -305,7 +304,7 @@ STUCK = Knob(
 
 
 def _gap(ms: float, rng: Random) -> Made:
-    """A finger slides for 0.1 s, for this long from a frame to the next, and for 0.1 s more."""
+    """A finger that slides for 0.1 s, then without frames for this long, then for 0.1 s more."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.2, rng, 500.0))
     half = len(now) // 2

@@ -1,8 +1,7 @@
-"""How soon the control loop of ``examples/reflex.py`` stops on this machine: `python -m
+"""Reaction time of the control loop of ``examples/reflex.py`` on this machine: `python -m
 contactfpga_sim.lab.tracking.reflex`.
 
-A process of its own plays a board on a pseudo-terminal, with a touch every 5 ms. Times are this machine's, with
-whatever else it does.
+A process of its own plays a board on a pseudo-terminal, with a touch every 5 ms. Times depend on this machine's load.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab.speed.driver import FRAMES, STEP_US, stream
 
 PACED = 3
-"""Frames written at once: 12,000 per second, some more than the reference Skin's."""
+"""Frames per write: 12,000 per second, slightly more than the reference Skin's."""
 
 PERIOD, TOUCHED = 64, 16
-"""Frames from touch to touch, and how many of them it lasts; FRAMES is a multiple of the first."""
+"""Frames from touch to touch, and frames of a touch; FRAMES is a multiple of the first."""
 
 ROUNDS = 4
 
@@ -32,13 +31,13 @@ class ReactionTimes(NamedTuple):
     """From the last byte of the first frame with a touch to the loop's decision, in us."""
 
     found_us: list[float]
-    """In order of size."""
+    """Times in increasing order."""
     silent: int
-    """How often the loop stopped because the machine stood still for longer than its deadline."""
+    """Stops of the loop because the machine paused beyond its deadline."""
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """For a table."""
+        """Cells of a table."""
         found = self.found_us
         p99 = found[len(found) * 99 // 100]
         times = (statistics.median(found), p99, found[-1])
@@ -46,7 +45,7 @@ class ReactionTimes(NamedTuple):
 
 
 def example() -> ModuleType:
-    """``examples/reflex.py``."""
+    """The module ``examples/reflex.py``."""
     spec = importlib.util.spec_from_file_location("reflex", contactfpga.examples() / "reflex.py")
     assert spec is not None
     assert spec.loader is not None
@@ -56,7 +55,7 @@ def example() -> ModuleType:
 
 
 def measured(rounds: int = ROUNDS) -> ReactionTimes:
-    """Run the loop again and again, each time from an untouched sheet."""
+    """Run the loop repeatedly, each time from an untouched sheet."""
     loop, found, last, silent = example(), [], (rounds - 1) * FRAMES, 0
 
     def touched(number: int) -> bool:
@@ -80,7 +79,7 @@ def measured(rounds: int = ROUNDS) -> ReactionTimes:
 
 
 def main() -> int:
-    """Print what came out."""
+    """Print the results."""
     started = time.monotonic()
     for name, value in zip(HEAD, measured().cells):
         print(f"{name}: {value}")

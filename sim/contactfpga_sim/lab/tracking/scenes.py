@@ -1,6 +1,5 @@
-"""Fingers that slide, cross, meet, tap, stop, follow and enter: each with a number of its own, which is the truth about
-it; and frames of them at a rate, by the zones of the golden model.
-"""
+"""Fingers that slide, cross, meet, tap, stop, follow and enter, each with a number as its truth; and frames of them at
+a rate, with the golden model's zones."""
 
 from __future__ import annotations
 
@@ -24,10 +23,10 @@ FINGER_MM = 8.0
 SECONDS = 2.0
 """Length of a scene."""
 MIDDLE_MM = 75.0
-"""Of the sheet, along x and y."""
+"""Middle of the sheet, along x and y."""
 
 BOUNCE_S = 0.003
-"""For how long the switches bounce after a touch and before a lift, 1 ms open and 1 ms closed."""
+"""Bounce of the switches after a touch and before a lift, 1 ms open and 1 ms closed."""
 
 Random = np.random.Generator
 Place = tuple[float, float]
@@ -36,7 +35,7 @@ Place = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True)
 class Finger:
-    """A contact and when it is there."""
+    """A contact and its times."""
 
     contact: Contact
     begins_s: float = -math.inf
@@ -48,7 +47,7 @@ class Finger:
         return self.begins_s <= seconds < self.ends_s
 
     def cells(self, seconds: float, skin: Skin) -> np.ndarray:
-        """(rows, columns) bool: the switches that it closes."""
+        """(rows, columns) bool: the closed switches."""
         if not self.there(seconds) or self._open(seconds):
             return np.zeros((skin.rows, skin.columns), bool)
         return Scene((self.contact,)).pressed(seconds, skin)
@@ -66,7 +65,7 @@ def _finger(x_mm: object, y_mm: object, **options: float) -> Finger:
 
 
 def sliding(rng: Random) -> Played:
-    """Three fingers that swing along lanes 50 mm apart, each at up to 50 to 1000 mm/s."""
+    """Three fingers that swing along lanes 50 mm apart, with peak speeds of 50 to 1000 mm/s."""
     found = []
     for lane in (25.0, 75.0, 125.0):
         reach, speed = rng.uniform(20, 55), math.exp(rng.uniform(math.log(50), math.log(1000)))
@@ -76,7 +75,7 @@ def sliding(rng: Random) -> Played:
 
 
 def crossing(rng: Random) -> Played:
-    """Two fingers that swing past each other on lanes 0 to 24 mm apart, at up to 300 to 1500 mm/s each."""
+    """Two fingers that swing past each other on lanes 0 to 24 mm apart, with peak speeds of 300 to 1500 mm/s."""
     speed, gap = rng.uniform(300, 1500), rng.uniform(0, 24)
     hertz = speed / (2 * math.pi * 55)
     phase = rng.uniform(0, 2 * math.pi)
@@ -87,7 +86,7 @@ def crossing(rng: Random) -> Played:
 
 
 def meeting(rng: Random) -> Played:
-    """Two fingers that come together until they touch, stay up to 0.4 s, and part the way they came; three times."""
+    """Two fingers that meet, stay up to 0.4 s, and part the way they came; three times."""
     angle, speed = rng.uniform(0, 2 * math.pi), rng.uniform(100, 400)
     far, near = 40.0, rng.uniform(8, 11)
     travel, rest = (far - near) / speed, rng.uniform(0.02, 0.4)
@@ -102,7 +101,7 @@ def meeting(rng: Random) -> Played:
 
 
 def _along(far: Callable[[float], float], angle: float, x_mm: float = MIDDLE_MM, y_mm: float = MIDDLE_MM) -> Finger:
-    """A finger that goes so far from a place, in this direction."""
+    """A finger this far from a place in this direction."""
 
     def place(seconds: float, middle: float, share: float) -> float:
         return middle + share * far(seconds)
@@ -125,8 +124,8 @@ def tapping(rng: Random) -> Played:
 
 
 def angles(rng: Random) -> Played:
-    """Two fingers that swing through the middle on lines at any angle, at up to 300 to 1500 mm/s each; one comes up to
-    20 mm after the other."""
+    """Two fingers that swing through the middle on lines at any angle, with peak speeds of 300 to 1500 mm/s; one is up
+    to 20 mm behind."""
     turn, between, speed = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(300, 1500)
     hertz, phase = speed / (2 * math.pi * 55), rng.uniform(0, 2 * math.pi)
     late = rng.uniform(-20, 20) / 55
@@ -137,8 +136,7 @@ def angles(rng: Random) -> Played:
 
 
 def stopping(rng: Random) -> Played:
-    """Three fingers that go somewhere at 100 to 1000 mm/s, stop there for 20 to 300 ms, and go on elsewhere; where they
-    meet is left to chance."""
+    """Three fingers that move at 100 to 1000 mm/s, stop for 20 to 300 ms, and move on; meetings are random."""
     return tuple(_finger(*_stop_and_go(rng)) for _ in range(3))
 
 
@@ -156,8 +154,8 @@ def _stop_and_go(rng: Random) -> tuple[Track, Track]:
 
 
 def row(rng: Random) -> Played:
-    """Three fingers in a row, 22 to 30 mm apart, that swing together along a line at any angle to it, at up to 200 to
-    1500 mm/s."""
+    """Three fingers in a row, 22 to 30 mm apart, that swing together along a line at any angle to it, with peak speeds
+    of 200 to 1500 mm/s."""
     turn, way, apart = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(22, 30)
     hertz, phase = rng.uniform(200, 1500) / (2 * math.pi * 35), rng.uniform(0, 2 * math.pi)
     swing = Swing(0.0, 35, hertz, phase)
@@ -168,8 +166,8 @@ def row(rng: Random) -> Played:
 
 
 def entering(rng: Random) -> Played:
-    """Fingers that slide in over any edge and out over any other at 200 to 1500 mm/s, two or three at a time; each
-    that comes is a new contact."""
+    """Fingers that slide in over any edge and out over another at 200 to 1500 mm/s, two or three at a time; each is a
+    new contact."""
     found = []
     for _ in range(3):
         now = rng.uniform(0, 0.2)
@@ -184,7 +182,7 @@ def entering(rng: Random) -> Played:
 
 
 def _outside(edge: int, rng: Random) -> Place:
-    """A place off the sheet from which a finger comes in."""
+    """A place off the sheet where a finger enters."""
     beyond, along = (-FINGER_MM, 2 * MIDDLE_MM + FINGER_MM)[edge % 2], rng.uniform(0, 2 * MIDDLE_MM)
     return (beyond, along) if edge < 2 else (along, beyond)
 
@@ -197,13 +195,13 @@ FAMILIES: dict[str, Callable[[Random], Played]] = {
 
 @dataclasses.dataclass(frozen=True)
 class FrameTruth:
-    """A frame and what was there."""
+    """A frame and the true contacts."""
 
     zones: Zones
     truth: dict[int, Place]
-    """The barycenter of each contact that can be told apart, by its number."""
+    """The barycenter of each distinguishable contact, by number."""
     shared: tuple[Place, ...]
-    """Zones that several contacts have: who is asked for one of these is neither right nor wrong."""
+    """Zones shared by several contacts: an id on one is neither right nor wrong."""
 
 
 def zones_of(cells: np.ndarray, time_us: int, skin: Skin = SKIN) -> tuple[Zones, np.ndarray]:
@@ -233,7 +231,7 @@ def played(fingers: Played, rate_hz: float, skin: Skin = SKIN, seconds: float = 
 
 
 def shown(fingers: Played, now: float, skin: Skin = SKIN) -> FrameTruth:
-    """One frame. A contact that bounces is there all the time; one that lies between switches is not."""
+    """One frame. A bouncing contact counts as present; one between switches does not."""
     each = {number: finger.cells(now, skin) for number, finger in enumerate(fingers) if finger.there(now)}
     cells = np.any([np.zeros((skin.rows, skin.columns), bool), *each.values()], axis=0)
     zones, labels = zones_of(cells, round(now * 1e6), skin)

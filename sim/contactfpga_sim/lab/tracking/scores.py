@@ -1,7 +1,6 @@
-"""Scores of the tracker, two baselines and a published tracker on random scenes and on recordings, at several frame
-rates.
+"""Scores of the tracker, two baselines and a published tracker on random scenes and recordings, at several frame rates.
 
-Ids are judged as trackers are judged, by py-motmetrics: MOTA, IDF1, id switches.
+Ids are judged by py-motmetrics: MOTA, IDF1, id switches.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from contactfpga_sim.model.scenes.recordings import Recording
 
 
 class Nearest:
-    """Neither speed nor memory: an id ends with the first frame that does not show it."""
+    """Baseline without speed or memory: an id ends with the first frame without it."""
 
     def __init__(self, gate_mm: float = 20.0):
         self._gate_mm = gate_mm
@@ -58,12 +57,12 @@ class Nearest:
 
 
 class ConstantVelocity:
-    """Goes on where its last speed puts it, for 0.1 s, and takes the zones with the least total distance from there."""
+    """Baseline that extrapolates with the last speed for 0.1 s, and matches zones by least total distance."""
 
     def __init__(self, gate_mm: float = 20.0, coast_s: float = 0.1, smooth_s: float = 0.02):
         self._gate_mm, self._coast_s, self._smooth_s = gate_mm, coast_s, smooth_s
         self._seen: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
-        """When each id was seen, where, and how fast it was."""
+        """Time, place and speed of each id when last seen."""
         self._next_id = 1
 
     def update(self, zones: Zones) -> dict[int, Place]:
@@ -100,17 +99,17 @@ def places_of(ahead: np.ndarray, places: np.ndarray, gate_mm: float) -> list[int
 
 
 NEAR_MM = 15.0
-"""How far from a contact an id may lie to be its own."""
+"""Largest distance between an id and its contact."""
 
 JUDGED_HZ = 200.0
-"""Frames per second that are judged at most; all of them are tracked."""
+"""Most judged frames per second; all are tracked."""
 
 Update = Callable[[Zones], dict[int, Place]]
 """The place of each id after a frame."""
 
 
 def ours() -> Update:
-    """The tracker with its default settings; as of the others, the ids of the zones that the frame shows."""
+    """The tracker with default settings; ids of the zones in the frame, as for the others."""
     tracker = Tracker()
 
     def update(zones: Zones) -> dict[int, Place]:
@@ -121,19 +120,19 @@ def ours() -> Update:
 
 
 def constant_velocity() -> Update:
-    """The second baseline."""
+    """The constant-velocity baseline."""
     return ConstantVelocity().update
 
 
 NORFAIR_HOLD = 2
-"""For how many frames Norfair keeps what no frame shows: the best of 2 frames, 0.1 and 0.3 s on the scenes that the
-tracker was tuned on, at 100 frames per second."""
+"""Frames for which Norfair keeps an unseen id: the best of 2 frames, 0.1 and 0.3 s on the tuning scenes at 100 frames
+per second."""
 
 
 def norfair() -> Update:
-    """A published tracker: Kalman filters of constant velocity and a gate of 20 mm. Raises ImportError.
+    """Norfair, a published tracker: Kalman filters of constant velocity and a gate of 20 mm. Raises ImportError.
 
-    It asks for a numpy below 2 but needs none, so no extra has it (docs/tracking.md says how to install it).
+    It requires numpy below 2 without need, so no extra has it (docs/tracking.md tells how to install it).
     """
     published: Any = importlib.import_module("norfair")
     tracker = published.Tracker("euclidean", 20.0, hit_counter_max=NORFAIR_HOLD, initialization_delay=0)
@@ -153,21 +152,21 @@ TRACKERS: dict[str, Callable[[], Update]] = {
     "constant velocity": constant_velocity,
     "Norfair": norfair,
 }
-"""What is compared."""
+"""The compared trackers."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """What came out."""
+    """Scores of a tracker."""
 
     frames: int
     mota: float
     idf1: float
     switches: int
     idf1_each: tuple[float, ...] = ()
-    """Of each scene; nan where nothing could be told apart."""
+    """IDF1 of each scene; nan if nothing could be distinguished."""
     counted: tuple[float, ...] = ()
-    """What each scene counts for: its judged places, of contacts and of ids."""
+    """Weight of each scene: its judged places, of contacts and ids."""
 
     @property
     def switches_per_1000(self) -> float:
@@ -176,23 +175,23 @@ class Score:
 
     @property
     def half(self) -> float:
-        """Half of the 95 % interval of IDF1, over the scenes."""
+        """Half of the 95 % interval of IDF1 over the scenes."""
         return half(self.pulls)
 
     @property
     def pulls(self) -> np.ndarray:
-        """By how much each scene moves IDF1; they add up to 0."""
+        """Effect of each scene on IDF1; the sum is 0."""
         share = np.array(self.counted) / np.sum(self.counted)
         return np.where(share > 0, share * (np.nan_to_num(self.idf1_each) - self.idf1), np.nan)
 
     @property
     def cells(self) -> tuple[str, str, str]:
-        """For a table: MOTA and IDF1 in percent, switches per thousand frames."""
+        """Table cells: MOTA and IDF1 in percent, switches per thousand frames."""
         return f"{100 * self.mota:.1f}", f"{100 * self.idf1:.1f}", f"{self.switches_per_1000:.1f}"
 
 
 def half(pulls: np.ndarray) -> float:
-    """Half of the 95 % interval of a mean of scenes, weighted by what they count for, by Student's t; nan: nothing."""
+    """Half of the 95 % interval of a weighted mean of scenes, by Student's t; nan without any."""
     from scipy.stats import t
 
     pulls = pulls[~np.isnan(pulls)]
@@ -201,11 +200,11 @@ def half(pulls: np.ndarray) -> float:
 
 
 Judged = tuple[dict[int, Place], dict[int, Place]]
-"""Truth, and what a tracker said."""
+"""Truth and a tracker's output."""
 
 
 def followed(update: Update, frames: Iterable[FrameTruth], rate_hz: float) -> list[Judged]:
-    """What a tracker says of these frames, where it is judged."""
+    """A tracker's output on the judged frames."""
     every = max(1, round(rate_hz / JUDGED_HZ))
     found = []
     for number, shown in enumerate(frames):
@@ -217,7 +216,7 @@ def followed(update: Update, frames: Iterable[FrameTruth], rate_hz: float) -> li
 
 
 def score(histories: Sequence[Sequence[Judged]], near_mm: float = NEAR_MM) -> Score:
-    """Of several scenes together. Raises :class:`MissingExtra` without py-motmetrics."""
+    """The score of several scenes together. Raises :class:`MissingExtra` without py-motmetrics."""
     try:
         import motmetrics
     except ModuleNotFoundError as error:
@@ -243,19 +242,18 @@ def _near(distance: float, limit: float) -> float:
 
 
 MOST = 1500
-"""Frames of a recording that are taken."""
+"""Most frames used of a recording."""
 
 
 def skin_of(recording: Recording) -> Skin:
-    """A Skin of its size."""
+    """A Skin of the recording's size."""
     pitch = recording.pitch_mm or Skin().pitch_x_mm
     _, rows, columns = recording.pressed.shape
     return Skin(rows=rows, columns=columns, pitch_x_mm=pitch, pitch_y_mm=pitch, settle_us=100.0)
 
 
 def histories(path: Path, every: int) -> list[list[FrameTruth]]:
-    """The frames of each stretch of a recording between which the scene jumps, one of ``every`` frames, with the truth
-    of all of them."""
+    """The stretches of a recording between jumps of the scene, one of ``every`` frames, with the truth from all."""
     recording = Recording.load(path)
     skin = skin_of(recording)
     pressed = recording.pressed[:MOST]
@@ -267,7 +265,7 @@ def histories(path: Path, every: int) -> list[list[FrameTruth]]:
 
 
 def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[FrameTruth]:
-    """The frames, with a name for each zone."""
+    """The frames with a name per zone."""
     linker = _Linker(frames.shape[1:])
     for number, cells in enumerate(frames):
         zones, labels = zones_of(cells, round(number * step_us), skin)
@@ -279,18 +277,18 @@ def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[FrameTru
 
 
 class _Linker:
-    """Names zones by the cells they share."""
+    """Names zones by shared cells."""
 
     def __init__(self, size: tuple[int, ...]):
         self._before = np.zeros(size, int)
         self._names: dict[int, int] = {}
         self._inside: dict[int, dict[int, np.ndarray]] = {}
-        """By a name: the zones that went into its own, with their last cells."""
+        """By name: the zones merged into this one, with their last cells."""
         self._fresh = 0
 
     def take(self, labels: np.ndarray) -> dict[int, int]:
-        """The name of each label: that of the zone of the frame before that it shares most cells with, the largest
-        share first; of a zone that went into another one, when it comes out again where it was; or a new one."""
+        """The name of each label: the previous zone with most shared cells, the largest share first; a merged zone's
+        name when it reappears in place; else a new one."""
         before, both = self._before, (self._before > 0) & (labels > 0)
         shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
         ranked = shares.T[np.argsort(-counts, kind="stable")].tolist()
@@ -327,24 +325,24 @@ RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
 """Frames per second of a scene."""
 
 JUDGED_RATES = RATES_HZ[1:]
-"""At which the tracker must not be behind another one."""
+"""Rates at which the tracker must not be worse than another."""
 
 MOST_FRAMES = 6_000
-"""Of a scene."""
+"""Most frames of a scene."""
 
 SCENES = 12
-"""Of each family. The tracker was tuned on others, with numbers from 1000 on."""
+"""Scenes per family. The tracker was tuned on others, numbered from 1000."""
 
 EVERY = (1, 4)
-"""Of a recording one frame of so many is taken."""
+"""One of this many frames of a recording is used."""
 
 Scores = dict[str, Score]
-"""By the tracker's name."""
+"""Scores by tracker name."""
 
 
 @functools.cache
 def of_family(family: str, rate_hz: float, count: int = SCENES, names: tuple[str, ...] = tuple(TRACKERS)) -> Scores:
-    """On random scenes; the same ones at every rate. What was scored before is kept."""
+    """Scores on random scenes, the same at every rate; cached."""
     key = repr((kept.made_by(__name__), family, rate_hz, count, names))
     found = kept.kept("tracking", key, lambda: _scored(family, rate_hz, count, names))
     return {name: Score(**one) for name, one in found.items()}
@@ -362,13 +360,13 @@ def _scored(family: str, rate_hz: float, count: int, names: Iterable[str]) -> di
 
 
 def ahead(ours: Score, other: Score) -> tuple[float, float]:
-    """By how much the first one's IDF1 is above the other's on the same scenes, and half of its 95 % interval."""
+    """Excess of the first IDF1 over the other's on the same scenes, and half of its 95 % interval."""
     return ours.idf1 - other.idf1, half(ours.pulls - other.pulls)
 
 
 @functools.cache
 def of_recording(path: Path, every: int) -> Scores:
-    """On the stretches of a recording between which the scene jumps."""
+    """Scores on the stretches of a recording between jumps of the scene."""
     stretches = histories(path, every)
     return {
         tracker: score([followed(make(), stretch, JUDGED_HZ) for stretch in stretches])
@@ -377,7 +375,7 @@ def of_recording(path: Path, every: int) -> Scores:
 
 
 def all_scenes() -> dict[tuple[str, float], Scores]:
-    """Every family at every rate."""
+    """Scores of every family at every rate."""
     keys = list(itertools.product(scenes.FAMILIES, RATES_HZ))
     with pool.executor() as workers, pool.progress() as step:
         for one in [workers.submit(of_family, *key) for key in keys]:

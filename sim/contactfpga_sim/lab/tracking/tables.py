@@ -1,4 +1,4 @@
-"""How many frames a tracker takes on this machine; the tables and the picture of docs/tracking.md."""
+"""Speed of a tracker on this machine; the tables and the picture of docs/tracking.md."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ class FrameRates(NamedTuple):
     """Frames per second of processor time."""
 
     decoded: float
-    """From bytes to zones with their places, frame by frame."""
+    """Frames from bytes to zones with places, one by one."""
     tracked: float
-    """From zones to tracks."""
+    """Frames from zones to tracks."""
 
     @property
     def ratio(self) -> float:
-        """Time that tracking takes, in times of decoding."""
+        """Tracking time over decoding time."""
         return self.decoded / self.tracked
 
 
 def measure(contacts: int, frames: int = FRAMES) -> FrameRates:
-    """With this many contacts that move; the best of some rounds."""
+    """Rates with this many moving contacts, the best of some rounds."""
     chunks = [frame(number, 1, contacts) for number in range(frames)]
     rounds = [_round(chunks) for _ in range(4)]
     return FrameRates(*(max(found) for found in zip(*rounds)))
@@ -75,7 +75,7 @@ LOOKS = {
 
 
 def scores_table() -> str:
-    """Random scenes."""
+    """Scores on random scenes."""
     found = scores.all_scenes()
     heads = tuple(f"{name}: IDF1, %" for name in scores.TRACKERS)
     rows = [("scenes", "frames per second", *heads, "`Tracker`: MOTA, %", "id switches per 1,000 frames")]
@@ -94,7 +94,7 @@ def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
 
 
 def ahead_table() -> str:
-    """By how much the tracker is ahead of each other one, where it may be behind."""
+    """The tracker's lead over each other one, if it may be behind."""
     names = [name for name in scores.TRACKERS if name != "`Tracker`"]
     rows = [("scenes", "frames per second", *(f"ahead of {name}, %" for name in names))]
     for (family, rate), found in scores.all_scenes().items():
@@ -105,7 +105,7 @@ def ahead_table() -> str:
 
 
 def recorded_table() -> str:
-    """Recordings."""
+    """Scores on recordings."""
     rows = [("recording", "frames taken", *HEAD)]
     for path in sorted(RECORDINGS.glob("*.npz")):
         for every in scores.EVERY:
@@ -126,7 +126,7 @@ def breaks_table() -> str:
 
 
 def break_rows(knob: breaks.Knob, found: Mapping[str, breaks.Rates]) -> Iterator[tuple[str, ...]]:
-    """A knob's lines; what they have in common is said in the first one."""
+    """A knob's lines; common cells are only in the first."""
     for number, (method, rates) in enumerate(found.items()):
         held = [(value, rate) for value, rate in rates if breaks.holds(rate)]
         until, there = (f"**{held[-1][0]:g}**", str(held[-1][1])) if held else ("nowhere", "")
@@ -138,7 +138,7 @@ def break_rows(knob: breaks.Knob, found: Mapping[str, breaks.Rates]) -> Iterator
 
 
 def speed_table() -> str:
-    """On the machine that runs this."""
+    """Speed on this machine."""
     rows = [("contacts", "tracked per second", "decoded per second", "tracking takes, in times of decoding")]
     for contacts in (1, 2):
         found = measure(contacts)
@@ -147,12 +147,12 @@ def speed_table() -> str:
 
 
 def reflex_table() -> str:
-    """On the machine that runs this."""
+    """Reaction times on this machine."""
     return writer.table_of([reflex.HEAD, reflex.measured().cells])
 
 
 def draw(folder: Path) -> Path:
-    """How often ids are right, by family, rate and tracker."""
+    """Share of correct ids by family, rate and tracker."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):

@@ -1,4 +1,4 @@
-"""The table of the page on pressure units: times of a sweep, and what its packets take of the line."""
+"""The table of the page on pressure units: times of a sweep, and its share of the line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COUNTS = 1, 3, 6, 8
 
 
 def units_table() -> str:
-    """By supply and units."""
+    """Sweep times by supply and units."""
     head = (
         "converter",
         "units",

@@ -1,4 +1,4 @@
-"""The view in a browser without a window: what a user sees of it, and when."""
+"""The view in a headless browser: what a user sees, and when."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ WATCH = """
     };
 }
 """
-"""``watch(x, y)``: from then on each drawn frame is looked at until a zone's barycenter is at that share of the canvas,
-to whose color nothing else that is drawn comes near."""
+"""``watch(x, y)``: check each drawn frame until a zone's barycenter, by its unique color, is at that share of the
+canvas."""
 
 
 def program() -> str | None:
-    """The browser that is installed; None: there is none."""
+    """The installed browser, or None."""
     return next((found for name in NAMES if (found := shutil.which(name))), None)
 
 
@@ -77,32 +77,32 @@ class Visitor:
         page.wait_for_timeout(500)
 
     def place(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
-        """Where a place of the sheet is on the canvas, as shares of its width and height; ``link``: of a robot."""
+        """A place of the sheet as shares of the canvas' width and height; ``link``: of a robot."""
         view = self._shown.view
         stage = view.stage if isinstance(view, View) else view.stage.stages[link]
         point, _ = stage.tiles.surface.place(x_mm, y_mm)
         return self._seen(stage.rotation @ np.array(point) * MM + stage.point_m)
 
     def _seen(self, point_m: np.ndarray) -> tuple[float, float]:
-        """The same of a place in the scene."""
+        """A place in the scene as shares of the canvas' width and height."""
         camera = next(iter(self._shown.web.get_clients().values())).camera
         x, y, z = turned(camera.wxyz, point_m - camera.position)
         scale = 0.5 / np.tan(camera.fov / 2) / z
         return 0.5 + x * scale / camera.aspect, 0.5 + y * scale
 
     def click(self, x_mm: float, y_mm: float, link: str = "") -> None:
-        """With the mouse, as a user does."""
+        """Click with the mouse."""
         self.page.mouse.move(*self._pixel(self.place(x_mm, y_mm, link)))
         self.page.wait_for_timeout(100)
         self.page.mouse.down()
         self.page.mouse.up()
 
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
-        """From the first to the last, which is held for a while; the button stays down."""
+        """Drag from the first to the last place, which is held for a while; the button stays down."""
         self._drag([self.place(*place) for place in places], hold_ms)
 
     def drag_in_space(self, *points_m: np.ndarray, hold_ms: int = 300) -> None:
-        """The same along places in the scene."""
+        """Drag along places in the scene."""
         self._drag([self._seen(point) for point in points_m], hold_ms)
 
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
@@ -114,18 +114,18 @@ class Visitor:
             self.page.wait_for_timeout(hold_ms)
 
     def choose(self, before: str, now: str) -> None:
-        """In the list of the panel that shows ``before``."""
+        """Choose in the panel's list that shows ``before``."""
         lists = self.page.locator("input[aria-haspopup=listbox]")
         number = [lists.nth(one).input_value() for one in range(lists.count())].index(before)
         lists.nth(number).click()
         self.page.get_by_role("option", name=now, exact=True).click()
 
     def watch(self, x_mm: float, y_mm: float) -> None:
-        """Wait from now on, in the page, until a barycenter is drawn there."""
+        """Start waiting, in the page, until a barycenter is drawn there."""
         self.page.evaluate("([x, y]) => window.watch(x, y)", list(self.place(x_mm, y_mm)))
 
     def drawn_s(self, seconds: float = PATIENCE_S) -> tuple[float, float]:
-        """When the mouse was released and when the barycenter was drawn, as in ``time.time()``."""
+        """Times of the mouse release and of the drawn barycenter, on ``time.time()``."""
         self.page.wait_for_function("() => window.drawn_ms", timeout=seconds * 1e3)
         clicked, drawn = self.page.evaluate("[window.clicked_ms, window.drawn_ms]")
         return clicked / 1e3, drawn / 1e3
@@ -136,7 +136,7 @@ class Visitor:
 
 
 def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """A vector of the world as the camera sees it: x to the right, y down, z ahead."""
+    """A world vector in the camera's view: x to the right, y down, z ahead."""
     w, axis = wxyz[0], -np.asarray(wxyz[1:])
     found: np.ndarray = vector + 2 * np.cross(axis, np.cross(axis, vector) + w * vector)
     return found
@@ -144,7 +144,7 @@ def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 @contextlib.contextmanager
 def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = False) -> Iterator[Visitor]:
-    """Open a view in a browser while a thread keeps it going; ``dark``: whether its user likes dark pages."""
+    """Open a view in a browser while a thread runs it; ``dark``: whether its user prefers dark pages."""
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError as error:
@@ -164,7 +164,7 @@ def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = 
 
 @contextlib.contextmanager
 def running(shown: ServedView) -> Iterator[None]:
-    """Draw moments in a thread."""
+    """Draw frames in a thread."""
     ending = threading.Event()
     failed: list[BaseException] = []
 
@@ -187,7 +187,7 @@ def running(shown: ServedView) -> Iterator[None]:
 
 
 def tidy(visitor: Visitor) -> None:
-    """Close the notice that the page is drawn by the processor."""
+    """Close the notice on rendering by the processor."""
     if visitor.page.locator("text=Software WebGL rendering detected").count():
         visitor.page.locator("button.mantine-Notification-closeButton").first.click()
         visitor.page.wait_for_timeout(500)

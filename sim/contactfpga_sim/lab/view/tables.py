@@ -1,4 +1,4 @@
-"""The figures of docs/view.md and the picture of the view, from a browser without a window."""
+"""The figures of docs/view.md and the picture of the view, from a headless browser."""
 
 from __future__ import annotations
 
@@ -29,37 +29,37 @@ from contactfpga_sim.lab.view import browser
 CLICKS = 20
 PACED_S = 4.0
 WAIT_S = 0.7
-"""Between two clicks: two of them at once would be a drag."""
+"""Time between two clicks, long enough that they are no drag."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Click:
-    """Moments of one click, in s of ``time.time()``, and what the board and the driver took of it."""
+    """Times of one click, in s of ``time.time()``, and those spent in board and driver."""
 
     released: float
-    """In the browser."""
+    """Mouse release in the browser."""
     touched: float
     """The finger is on the virtual board."""
     gateware_s: float
-    """Board time from there to the last byte of the first frame with the zone."""
+    """Board time from the touch to the last byte of the first frame with the zone."""
     driver_s: float
-    """From bytes to zones."""
+    """Driver time from bytes to zones."""
     read: float
     """The view has the zones."""
     queued: float
-    """They are on their way to the browser."""
+    """The zones are on their way to the browser."""
     drawn: float
-    """In the browser."""
+    """The zones are drawn in the browser."""
 
     @property
     def parts_s(self) -> dict[str, float]:
-        """What the time was spent on."""
+        """The click's time by part."""
         board = self.read - self.touched
         return {
             "browser and viser: from the mouse to the view": self.touched - self.released,
             "gateware and wire, board time": self.gateware_s,
             "driver: bytes to zones": self.driver_s,
-            "view: the rest of its moment, and of simulating it": board - self.gateware_s - self.driver_s,
+            "view: waiting for its next update, and simulating up to it": board - self.gateware_s - self.driver_s,
             "view: what to draw": self.queued - self.read,
             "viser and browser: until it is drawn": self.drawn - self.queued,
             "all": self.drawn - self.released,
@@ -67,7 +67,7 @@ class Click:
 
 
 class Stopwatch:
-    """Notes when a click passes through the view, in :attr:`times`."""
+    """Notes a click's passage through the view, in :attr:`times`."""
 
     def __init__(self, shown: ServedView):
         assert shown.hand is not None
@@ -80,7 +80,7 @@ class Stopwatch:
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
-        """While it does, what the click passes through is wrapped."""
+        """In this block the steps of a click are wrapped."""
         source = self._shown.source
         wrapped: list[tuple[Any, str, Callable[..., Any]]] = [
             (self._virtual, "touch", self._touch),
@@ -131,13 +131,13 @@ def _method(noted: Any, kept: Any) -> Any:
 
 
 def sheet_of(shown: ServedView) -> Sheet:
-    """What is shown."""
+    """The shown sheet."""
     assert isinstance(shown.view, View)
     return shown.view.stage.tiles.sheet
 
 
 def clicks(shown: ServedView, visitor: browser.Visitor, count: int = CLICKS) -> list[Click]:
-    """Click cells one after the other, and lift the finger in between."""
+    """Click cells in turn, and lift the finger in between."""
     watch, sheet, found = Stopwatch(shown), sheet_of(shown), []
     assert shown.hand is not None
     with watch.running():
@@ -168,7 +168,7 @@ def click_table(found: list[Click]) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class ProcessorLoad:
-    """Processor time per second of board time, all in s."""
+    """CPU time per second of board time, in s."""
 
     board: float
     """Simulating the board."""
@@ -177,7 +177,7 @@ class ProcessorLoad:
 
 
 def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
-    """While these fingers press. Processor time does not depend on what else the computer does."""
+    """Load under these fingers, in CPU time, which other load does not affect."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
     spent, read = [0.0], virtual.read
@@ -201,7 +201,7 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
 
 
 def load_table(shown: ServedView) -> str:
-    """Untouched and touched."""
+    """Load untouched and touched."""
     rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
     for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
         load = load_of(shown, fingers)
@@ -211,36 +211,36 @@ def load_table(shown: ServedView) -> str:
 
 
 FRAMES, FRAME_MS = 32, 120
-"""Of the clip, which ends as it begins."""
+"""Frames of the looping clip, and their duration."""
 SWING_RAD = 0.22
-"""The camera turns so far to both sides."""
+"""Swing of the camera to either side."""
 STEP_MS = 350
-"""Between two frames, so that board and browser have drawn what moved."""
+"""Time between two frames for board and browser to follow."""
 QUALITY = 50
-"""Of a frame, of 100."""
+"""Quality of a frame, of 100."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Shot:
-    """What a frame of the clip shows."""
+    """Content of a frame of the clip."""
 
     strokes: tuple[float, float]
-    """Place of the finger that moves, in columns and rows."""
+    """Place of the moving finger, in columns and rows."""
     presses: bool
     """Whether the other one presses."""
     turn_rad: float
-    """How far the camera is turned from its first place."""
+    """Angle of the camera from its first place."""
 
 
 def shot(share: float) -> Shot:
-    """Of a moment of the clip, 0 to 1: the finger goes around once while the camera swings once."""
+    """A moment of the clip, 0 to 1: the finger circles once while the camera swings once."""
     turn = 2 * math.pi * share
     place = 2.2 - 1.5 * math.cos(turn), 6.5 - 3.8 * math.sin(turn)
     return Shot(place, 0.3 < share < 0.75, SWING_RAD * math.sin(turn))
 
 
 def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
-    """Put fingers and camera there, and wait until it is drawn."""
+    """Move fingers and camera, and wait until it is drawn."""
     hand, view, sheet = shown.hand, shown.view, sheet_of(shown)
     assert hand is not None
     assert isinstance(view, View)
@@ -260,7 +260,7 @@ def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
 
 
 PRESSED = 0.4, 11.6
-"""Where the other finger presses, in columns and rows."""
+"""Place of the other finger, in columns and rows."""
 
 
 def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path) -> None:
@@ -294,7 +294,7 @@ PLOTTED_S = 2.0
 
 
 class ViewTimes(NamedTuple):
-    """What the tables share."""
+    """Measurements shared by the tables."""
 
     loads: str
     found: list[Click]
@@ -310,12 +310,12 @@ def compute() -> ViewTimes:
 
 
 def loads_table(times: ViewTimes) -> str:
-    """What was measured without a browser."""
+    """Measurements without a browser."""
     return times.loads
 
 
 def clicks_table(times: ViewTimes) -> str:
-    """What was measured with one."""
+    """Measurements with a browser."""
     return click_table(times.found)
 
 
@@ -329,4 +329,4 @@ def draw(folder: Path) -> list[Path]:
 
 
 SIZE = 1120, 660
-"""Of the picture and of the clip, in pixels."""
+"""Size of picture and clip, in pixels."""

@@ -1,4 +1,4 @@
-"""The picture of docs/wave.md: what `contactfpga wave` writes of the reference Skin, drawn."""
+"""The picture of docs/wave.md: the output of `contactfpga wave` for the reference Skin."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _ticks(lane: int) -> dict[str, Any]:
 
 
 def _level(axes: Any, lane: int, changes: Sequence[tuple[float, int]], end: float) -> None:
-    """A level that changes; it is drawn from the last change before 0 on."""
+    """A changing level, from the last change before 0 on."""
     before = [level for at, level in changes if at <= 0]
     shown = [(0.0, before[-1]), *((at, level) for at, level in changes if at > 0)]
     times, levels = [at for at, _ in shown], [lane + 0.3 - 0.6 * level for _, level in shown]

@@ -1,5 +1,5 @@
-"""The folder of compiled gateware and kept results. What is loaded from it runs: only what this user alone, or root,
-can write is used."""
+"""The folder of compiled gateware and cached results. Its content is executed: only files that this user alone, or
+root, can write are used."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ FOLDER_MODE, FILE_MODE = 0o700, 0o600
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOCK, _TAKEN = "lock", "taken"
 _FRESH_S = 60.0
-"""A folder may be so old before its lock is there."""
+"""Grace period for a folder without a lock."""
 
 
 class CacheError(ContactFPGAError):
-    """The cache cannot be used, or somebody else could have put something into it."""
+    """The cache cannot be used, or somebody else could have written into it."""
 
 
 def cache_folder() -> Path:
-    """Where it is: ``CONTACTFPGA_CACHE``, or in the user's cache folder."""
+    """The cache folder: ``CONTACTFPGA_CACHE``, or in the user's cache folder."""
     if chosen := os.environ.get("CONTACTFPGA_CACHE"):
         return Path(chosen).absolute()
     try:
@@ -44,7 +44,7 @@ def cache_folder() -> Path:
 
 
 def ready(folder: Path) -> Path:
-    """The folder, made where there is none, and without links in its path. Raises :class:`CacheError`."""
+    """The folder, created if missing, without links in its path. Raises :class:`CacheError`."""
     try:
         _make(folder)
         folder = folder.resolve(strict=True)
@@ -61,7 +61,7 @@ def ready(folder: Path) -> Path:
 
 
 def trusted(file: Path) -> bool:
-    """Whether the file is there; raises :class:`CacheError` if somebody else could have written it."""
+    """Whether the file exists; raises :class:`CacheError` if somebody else could have written it."""
     try:
         found = file.lstat()
     except FileNotFoundError:
@@ -73,8 +73,8 @@ def trusted(file: Path) -> bool:
 
 
 def whole(file: Path, tell: bool = False) -> bool:
-    """Whether the file is there as it was :func:`put`, of which its sum beside it tells; with ``tell`` one that was
-    damaged since is named on stderr. Raises :class:`CacheError` if somebody else could have written either."""
+    """Whether the file matches the sum beside it, written by :func:`put`; with ``tell`` a damaged one is named on
+    stderr. Raises :class:`CacheError` if somebody else could have written either."""
     if not trusted(file):
         return False
     total = _sum(file)
@@ -86,7 +86,7 @@ def whole(file: Path, tell: bool = False) -> bool:
 
 
 def put(made: Path, file: Path) -> None:
-    """Move a file that was made in a folder of :func:`scratch` to its place, whole or not at all."""
+    """Move a file from a folder of :func:`scratch` to its place, whole or not at all."""
     total = made.with_name(f"{made.name}.sum")
     total.write_bytes(_sum_of(made))
     # The sum goes first: a file without its own is never taken.
@@ -105,7 +105,7 @@ def _sum_of(file: Path) -> bytes:
 
 @contextlib.contextmanager
 def locked(file: Path) -> Iterator[None]:
-    """Let one process at a time go on; the file stays."""
+    """Hold a lock for one process at a time; its file stays."""
     with _opened(file) as descriptor:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
@@ -113,7 +113,7 @@ def locked(file: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def scratch(folder: Path, kind: str) -> Iterator[Path]:
-    """A folder in the cache for work in progress. Those that killed processes left are removed first."""
+    """A temporary folder in the cache. Leftovers of killed processes are removed first."""
     _sweep(folder, kind)
     with tempfile.TemporaryDirectory(dir=folder, prefix=f"{kind}-") as name:
         # Held for as long as the process lives, however it ends.
@@ -152,7 +152,7 @@ def _check(path: Path, found: os.stat_result, advice: str) -> None:
 
 
 def _replaces(above: os.stat_result) -> str:
-    """Who else can replace what lies in a folder, empty for nobody."""
+    """Who else can replace the content of a folder; empty for nobody."""
     if above.st_mode & stat.S_ISVTX:
         return ""
     if above.st_mode & stat.S_IWOTH:
@@ -164,7 +164,7 @@ def _replaces(above: os.stat_result) -> str:
 
 @contextlib.contextmanager
 def _opened(file: Path, mode: int = os.O_RDWR | os.O_CREAT) -> Iterator[int]:
-    """A descriptor of the file, by default made where there is none; a link is not followed."""
+    """A descriptor of the file, created by default if missing; links are not followed."""
     try:
         flags = mode | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         descriptor = os.open(file, flags, FILE_MODE)

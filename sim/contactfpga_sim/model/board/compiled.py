@@ -1,4 +1,4 @@
-"""Compiled boards, of one sheet or of several: gateware as native code in a sheet of switches, stepped by the clock."""
+"""Compiled boards of one or several sheets: gateware as native code with its switches, stepped by the clock."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from contactfpga_sim.model.sheet.line import ColumnLine, RowLine
 from contactfpga_sim.model.sheet.matrix import Contention, Shorts
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
-"""An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte, the level or the driven lines, the 65th of which is the mark; and for a row whether it is the frame's
-last, for a record or an item whether it is the end mark."""
+"""An event: cycle (of a received byte: the first after its stop bit); data: a row's cells, a record as on the wire, a
+byte, a level or driven lines, whose 65th is the mark; and for a row whether it is the frame's last, for a record or
+item whether it is the end mark."""
 
 
 Library = native.Library | webassembly.WebAssemblyLibrary
 
 
 class CompiledModel:
-    """A model, stepped by the clock; cycle 0 is the first after power-up, as in docs/timing.md. Safe for threads.
+    """A model stepped by the clock; cycle 0 is the first after power-up, as in docs/timing.md. Thread-safe.
 
-    ``events``: what the driver can note, in its order.
+    ``events``: those that the driver can record, in its order.
     """
 
     def __init__(self, library: Library, events: tuple[str, ...]):
@@ -46,7 +46,7 @@ class CompiledModel:
         self._board: ctypes.c_void_p | None = ctypes.c_void_p(library.board_new())
 
     def _call(self, name: str, *arguments: Any) -> Any:
-        """The driver's function of this name; raises :class:`BoardClosed` where there is no model any more."""
+        """Call the driver's function of this name; raises :class:`BoardClosed` after :meth:`close`."""
         with self._lock:
             if self._board is None:
                 raise BoardClosed("the virtual board was closed; make another one")
@@ -54,7 +54,7 @@ class CompiledModel:
 
     @property
     def cycle(self) -> int:
-        """The cycle that runs next."""
+        """The next cycle to run."""
         return self._call("cycle")
 
     def run(self, cycles: int) -> None:
@@ -62,11 +62,11 @@ class CompiledModel:
         self._call("run", ctypes.c_uint64(cycles))
 
     def send(self, data: bytes) -> None:
-        """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
+        """Put bytes on the board's receive pin, back to back, from the next cycle on."""
         self._call("send", data, ctypes.c_size_t(len(data)))
 
     def take(self, boundary: str) -> np.ndarray:
-        """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
+        """Events of a boundary since the last call, dtype :data:`EVENT`."""
         index = ctypes.c_uint(self._events.index(boundary))
         with self._lock:  # the address holds until the model runs on
             if not (count := self._call("count", index)):
@@ -76,7 +76,7 @@ class CompiledModel:
         return np.frombuffer(data, EVENT).copy()
 
     def receive(self) -> bytes:
-        """The bytes decoded from the line since they were taken last."""
+        """Bytes decoded from the line since the last call."""
         return self.take("received")["data"].astype(np.uint8).tobytes()
 
     def close(self) -> None:
@@ -98,17 +98,17 @@ class CompiledModel:
 _DRIVER = "board.cpp"
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
-"""What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
-the transmit, the contact and the alive pin, of the rows that are driven to the selecting level and of the columns that
-are driven, and bytes decoded from the line. The order is that of the driver."""
+"""Events that a board can record: transfers of rows, zone records, divided records and bytes; changes of the pins
+transmit, contact and alive, of the rows driven to the selecting level and of the driven columns; bytes decoded from the
+line. The order is the driver's."""
 
 
 class CompiledBoard(CompiledModel):
     """A compiled board of one sheet.
 
-    ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is what native code is built from;
-    by default the board is that of :func:`library_of`. The first native board of a Skin takes some seconds to build
-    (:mod:`contactfpga_sim.model.board.native`, also for what can go wrong).
+    ``capture`` names the :data:`CAPTURABLE` to record, besides ``received``. ``model`` is the source of native code;
+    the default is the board of :func:`library_of`. The first native board of a Skin needs some seconds to build; for
+    errors see :mod:`contactfpga_sim.model.board.native`.
     """
 
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
@@ -121,11 +121,11 @@ class CompiledBoard(CompiledModel):
 
     @property
     def broken(self) -> int:
-        """Bytes on the line that came without a stop bit."""
+        """Bytes on the line without a stop bit."""
         return self._call("broken")
 
     def press(self, cells: np.ndarray) -> None:
-        """From the next cycle on these (rows, columns) bool cells are pressed."""
+        """Press these (rows, columns) bool cells from the next cycle on."""
         self.hold(cells[None], 0)
 
     def restart(self, mutant: int = 0) -> None:
@@ -133,16 +133,16 @@ class CompiledBoard(CompiledModel):
         self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:
-        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven; the guard column
-        may come after them."""
+        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven; a guard column may
+        follow them."""
         stuck = np.zeros(self.skin.column_lines, np.uint8)
         if columns is not None:
             stuck[: len(columns)] = columns
         self._call("stick", stuck.tobytes())
 
     def cut(self, rows: Mapping[int, int], columns: Mapping[int, int]) -> None:
-        """From the next cycle on these lines are cut, and all others whole: of ``rows`` the switches from a column on
-        no longer reach the pin, of ``columns`` those from a row on. Guard lines are the last."""
+        """From the next cycle on cut these lines, and no others: in ``rows`` the switches from a column on, in
+        ``columns`` those from a row on, do not reach the pin. Guard lines are the last."""
         skin = self.skin
         ends = (
             bytes(cut.get(line, whole) for line in range(lines))
@@ -154,7 +154,7 @@ class CompiledBoard(CompiledModel):
         self._call("cut", *ends)
 
     def join(self, shorts: Shorts | None) -> None:
-        """From the next cycle on these lines are joined and these diodes bridged, and all others whole."""
+        """From the next cycle on join these lines and bridge these diodes, and no others."""
         self._call("part")
         shorts = shorts or Shorts()
         supplied, pulled = ((row, 0) for row in shorts.supplied), ((0, column) for column in shorts.pulled)
@@ -164,8 +164,8 @@ class CompiledBoard(CompiledModel):
                 self._call("join", *map(ctypes.c_uint, (kind, one, other)))
 
     def settle(self, line: ColumnLine, rows: RowLine | None = None) -> None:
-        """From the next cycle on columns take the time that such a line takes, and not none; so do ``rows`` that are
-        let go."""
+        """From the next cycle on columns, and released ``rows``, settle like this line; by default they settle at
+        once."""
         self._settle("settle", line.press_s, line.pulled, line.release_s, line.threshold)
         if rows is not None:
             self._settle("settle_rows", rows.rise_s, rows.lifted, rows.fall_s, rows.threshold)
@@ -179,8 +179,8 @@ class CompiledBoard(CompiledModel):
         self._call(name, *arrays, *map(ctypes.c_double, (ColumnLine.share(back_s, clock_s), at)))
 
     def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
-        """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all
-        while one of ``rows`` pulls them, and each of ``columns``. Guard lines are the last."""
+        """From the next cycle on, with :meth:`settle`, columns take longer by these factors: all while one of ``rows``
+        pulls them, and each of ``columns``. Guard lines are the last."""
         skin = self.skin
         factors = (
             np.array([given.get(line, 1.0) for line in range(lines)])
@@ -189,14 +189,14 @@ class CompiledBoard(CompiledModel):
         self._call("slow", *(each.tobytes() for each in factors))
 
     def load(self, readings: Iterable[int]) -> None:
-        """From the next cycle on the converter's inputs would read this, one for each pressure unit; 0 at first."""
+        """Set the converter's inputs from the next cycle on, one value per pressure unit; 0 at first."""
         codes = np.array(list(readings), np.uint32)
         if len(codes) != self.skin.units:
             raise ValueError(f"{len(codes)} readings; the board has {self.skin.units} pressure units")
         self._call("load", codes.tobytes())
 
     def run(self, cycles: int) -> None:
-        """As :meth:`CompiledModel.run`; raises :class:`Contention` where a column was driven against a row."""
+        """:meth:`CompiledModel.run`; raises :class:`Contention` if a column was driven against a row."""
         self._check_pins(self._call("run", ctypes.c_uint64(cycles)))
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
@@ -208,11 +208,11 @@ class CompiledBoard(CompiledModel):
 
     @property
     def fights(self) -> int:
-        """Clocks since the board was made in which a column was driven against a row."""
+        """Clocks so far in which a column was driven against a row."""
         return int(self._call("fights"))
 
     def pull_low(self, cycles: int) -> None:
-        """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
+        """Hold the board's receive pin low for this many cycles from the next one on, like noise or a break."""
         self._call("pull_low", ctypes.c_uint64(cycles))
 
     def _check_pins(self, fights: int) -> None:
@@ -221,24 +221,24 @@ class CompiledBoard(CompiledModel):
 
 
 def library_of(skin: Skin) -> Library:
-    """The board of a Skin: the WebAssembly that the package carries, or native code."""
+    """The board of a Skin: the packaged WebAssembly, or native code."""
     check_simulated(skin)
     return webassembly.load(carried_key(skin)) or native.load(model_of(skin))
 
 
 def carried_key(skin: Skin) -> str:
-    """Of the WebAssembly."""
+    """Key of the WebAssembly board."""
     return webassembly.board_key(webassembly.gateware_of(skin), _DRIVER, _defines(skin))
 
 
 def design_key(skin: Skin) -> str:
-    """The same by what the gateware is elaborated to, whatever its text."""
+    """Key of the elaborated gateware, whatever its text."""
     return webassembly.board_key(native.component_key(model_of(skin).elaborate()), _DRIVER, _defines(skin))
 
 
 def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
-    """What the board of a Skin is built from: its gateware, or a netlist with the gateware's pins and no probes,
-    which notes neither rows nor records nor bytes."""
+    """The source of a Skin's board: its gateware, or a netlist with the gateware's pins and no probes, which records no
+    rows, records or bytes."""
     check_simulated(skin)
 
     def elaborate() -> Any:
@@ -279,13 +279,13 @@ def _defines(skin: Skin, probes: bool = True) -> dict[str, int | str]:
 
 
 SHEETS_CAPTURED = ("line", "contact", "received")
-"""Changes of the transmit and of the contact pin, and bytes decoded from the line, in the order of the driver."""
+"""Changes of the transmit and contact pins, and bytes decoded from the line, in the driver's order."""
 
 
 class CompiledSheets(CompiledModel):
     """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on.
 
-    ``model`` is the gateware, by default what :func:`sheets_model` says.
+    ``model`` is the gateware, by default that of :func:`sheets_model`.
     """
 
     def __init__(self, several: Several, model: native.Model | None = None):
@@ -293,11 +293,11 @@ class CompiledSheets(CompiledModel):
         super().__init__(native.load(model or sheets_model(several)), SHEETS_CAPTURED)
 
     def restart(self, mutant: int = 0) -> None:
-        """As :meth:`CompiledBoard.restart`."""
+        """Power up again, like :meth:`CompiledBoard.restart`."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def press(self, number: int, cells: np.ndarray) -> None:
-        """From the next cycle on these (rows, columns) bool cells of a sheet are pressed."""
+        """Press these (rows, columns) bool cells of a sheet from the next cycle on."""
         skin = self.several.skins[number]
         if cells.shape != (skin.rows, skin.columns):
             raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
@@ -305,7 +305,7 @@ class CompiledSheets(CompiledModel):
 
 
 def sheets_model(several: Several) -> native.Model:
-    """What the board of several sheets is built from."""
+    """The source of a board of several sheets."""
 
     def elaborate() -> Any:
         from contactfpga_hdl.several import SeveralTop
@@ -326,12 +326,12 @@ def sheets_model(several: Several) -> native.Model:
 
 
 def _sheet_entry(number: int, skin: Skin) -> str:
-    """Of a sheet in the driver's list."""
+    """A sheet's entry in the driver's list."""
     sizes = (number, skin.rows, skin.columns, skin.row_chains, skin.column_chains, int(skin.selects_low))
     lines = (f"LINES({initializer(line_of)[1:-1]})" for line_of in (skin.line_of_row, skin.line_of_column))
     return f"SHEET({', '.join((*map(str, sizes), *lines))})"
 
 
 def initializer(numbers: Iterable[int]) -> str:
-    """Of a C++ array."""
+    """Initializer of a C++ array."""
     return "{" + ",".join(map(str, numbers)) + "}"

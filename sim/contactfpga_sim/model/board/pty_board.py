@@ -1,6 +1,5 @@
-"""The virtual board behind a pseudo-terminal: a serial client sees what a board would send, never faster than in real
-time, and slower where this machine cannot keep up, which it reports.
-"""
+"""The virtual board on a pseudo-terminal: a serial client sees a board's bytes, at most in real time; a slower machine
+is reported."""
 
 from __future__ import annotations
 
@@ -26,28 +25,28 @@ from contactfpga_sim.model.board.virtual import VirtualBoard, VirtualSheets
 from contactfpga_sim.model.scenes.scene import Source
 
 CHUNK_S = 0.5e-3
-"""Simulated time between two looks at the port."""
+"""Simulated time between two reads of the port."""
 
 MAX_LAG_S = 0.02
-"""Simulated time may fall this far behind and catch up; beyond, it slips and stays behind."""
+"""Largest lag of simulated time that is caught up; beyond it, time slips for good."""
 
 SLIP_LIMIT = 0.05
-"""Share of real time that may slip in :data:`SLIP_WINDOW_S` before it is reported."""
+"""Share of real time that may slip in :data:`SLIP_WINDOW_S` before a report."""
 
 SLIP_WINDOW_S = 5.0
 
 HEADROOM = 0.9
-"""Share of what the machine was seen to do that a clock may take which is recommended."""
+"""Recommended clock as a share of the measured speed."""
 
 
 class PtyBoard:
     """A virtual board with a port that a serial client can open.
 
-    The port exists, and the gateware is compiled, when the constructor returns; the board runs inside
-    ``with PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`) in a thread, or in :meth:`serve`.
-    skin: of the board's sheet, or of several, which the scene touches alike; scene, cover and circuit: as for
-    :class:`~contactfpga_sim.model.board.virtual.VirtualBoard`; link: path of a symbolic link to the port. What no
-    client reads is dropped, the oldest first, and counted.
+    After the constructor the gateware is compiled and the port exists; the board runs in a thread inside ``with
+    PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`), or in :meth:`serve`. skin: the board's sheet, or
+    several, which the scene touches alike; scene, cover and circuit: as for
+    :class:`~contactfpga_sim.model.board.virtual.VirtualBoard`; link: path of a symbolic link to the port. Unread bytes
+    are dropped, the oldest first, and counted.
     """
 
     def __init__(
@@ -68,11 +67,11 @@ class PtyBoard:
         self.port = os.ttyname(self._slave)
         """Path of the port to open."""
         self.slip = 0.0
-        """Seconds by which simulated time has fallen behind real time for good."""
+        """Seconds lost against real time for good."""
         self.dropped = 0
-        """Times that the port was full and what it held was dropped."""
+        """Number of times that a full port was emptied."""
         self.failure: BaseException | None = None
-        """What ended the thread, if it did not end by :meth:`stop`."""
+        """Exception that ended the thread; None after :meth:`stop`."""
         self._slip_told = False
         self._link = Path(link) if link else None
         try:
@@ -97,7 +96,7 @@ class PtyBoard:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the board and its port; a client that has it open sees a hangup. Harmless when it has ended."""
+        """End the board and its port; an open client sees a hangup. May be called twice."""
         self._stopping.set()
         if self._thread and self._thread is not threading.current_thread():
             self._thread.join()
@@ -171,7 +170,7 @@ class PtyBoard:
             _say(slip_told(self.skins[0], share))
 
     def _listen(self, seconds: float) -> None:
-        """Wait at most ``seconds`` for a client's bytes, and hand them to the board."""
+        """Wait at most ``seconds`` for a client's bytes, and pass them to the board."""
         if select.select([self._master], [], [], seconds)[0]:
             with contextlib.suppress(BlockingIOError):
                 self._board.write(os.read(self._master, 4096))
@@ -195,7 +194,7 @@ class PtyBoard:
             raise ContactFPGAError(f"cannot link {link} to {self.port}: {error.strerror}") from None
 
     def _remove_link(self, link: Path) -> None:
-        """Only while it is the one that was made: by now the path may be another's."""
+        """Remove the link only if it is still ours."""
         with contextlib.suppress(OSError):  # gone, or no link
             if os.readlink(link) == self.port:
                 link.unlink()
@@ -214,7 +213,7 @@ class PtyBoard:
 
 
 def slip_told(skin: Skin, share: float) -> str:
-    """What is said of a board when this share of real time slips."""
+    """The warning when this share of real time slips."""
     held = 1 - share
     clock_hz = clock_that_holds(skin, held * skin.clock_hz)
     advice = (
@@ -229,7 +228,7 @@ def slip_told(skin: Skin, share: float) -> str:
 
 
 def clock_that_holds(skin: Skin, cycles_per_second: float) -> int | None:
-    """The fastest clock in Hz that the Skin can have and a machine of this speed can keep up with."""
+    """The fastest possible clock of the Skin in Hz that a machine of this speed can simulate in real time."""
     for megahertz in range(int(HEADROOM * cycles_per_second / 1e6), 0, -1):
         with contextlib.suppress(SkinError):
             return skin.replace(clock_hz=megahertz * 1_000_000).clock_hz

@@ -1,4 +1,4 @@
-"""The frames in what a board sends, each with when its bytes came."""
+"""The frames in a board's bytes, with arrival times."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from contactfpga.wire.units import KIND_UNITS
 
 
 class ReceivedFrame(NamedTuple):
-    """A frame, and the times at which its bytes came, in the clock of whoever saw them."""
+    """A frame with arrival times, on the receiver's clock."""
 
     frame: Frame
     first: int
-    """Of the first byte."""
+    """Time of the first byte."""
     last: int
-    """Of the delimiter."""
+    """Time of the delimiter."""
     size: int
-    """Bytes, with the delimiter."""
+    """Number of bytes with the delimiter."""
 
 
 class Receiver:
-    """Splits the bytes of a board of this Skin into packets and reads the frames among them; hellos are counted, and
-    reports of faults and readings of units passed over."""
+    """Splits the bytes of this Skin's board into packets and reads the frames; counts hellos, and skips fault reports
+    and unit readings."""
 
     def __init__(self, skin: Skin) -> None:
         self._prefix = protocol.check_prefix(skin)
@@ -37,7 +37,7 @@ class Receiver:
         self.hellos = 0
 
     def take(self, stream: Iterable[tuple[int, int]]) -> Iterator[ReceivedFrame]:
-        """The frames that these (time, byte) pairs complete. Raises :class:`PacketError` for a damaged packet."""
+        """Frames completed by these (time, byte) pairs. Raises :class:`PacketError` for a damaged packet."""
         for time, value in stream:
             if value != framing.DELIMITER:
                 self._first = self._first if self._packet else time
@@ -54,5 +54,5 @@ class Receiver:
 
 
 def frames_in(skin: Skin, stream: Iterable[tuple[int, int]]) -> Iterator[ReceivedFrame]:
-    """All whole frames among the (time, byte) pairs that a board of this Skin sent from its power-up on."""
+    """All whole frames in the (time, byte) pairs of a board of this Skin since power-up."""
     return Receiver(skin).take(stream)

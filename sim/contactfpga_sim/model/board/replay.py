@@ -22,26 +22,26 @@ from contactfpga_sim.model.board.receiver import Receiver
 from contactfpga_sim.model.scenes.recordings import Recording
 
 CHUNK = 256
-"""Frames that are simulated while those before are decoded."""
+"""Frames simulated while earlier ones are decoded."""
 
 BIT_CLOCKS = 2
-"""The fastest UART a Skin admits."""
+"""Clocks per bit of the fastest UART of a Skin."""
 
 
 class ReplayError(ContactFPGAError):
-    """A frame of the input did not come out exactly once."""
+    """An input frame did not come out exactly once."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ReplayedFrame:
-    """What the gateware made of one input frame."""
+    """The gateware's result for one input frame."""
 
     frame: Frame
     first_record: int | None
-    """Clocks from the transfer of the frame's last row to its first record, negative if that came before; None
-    without a zone."""
+    """Clocks from the transfer of the frame's last row to its first record, negative if earlier; None without a
+    zone."""
     last_record: int | None
-    """The same to its last record."""
+    """Clocks from the transfer of the frame's last row to its last record; None without a zone."""
     duration: int
     """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
 
@@ -56,7 +56,7 @@ def load(
 ) -> tuple[np.ndarray, Skin]:
     """The (frames, rows, columns) bool array of a recording, and a Skin for it whose board is compiled.
 
-    ``closed``: the last column is a neighbor of the first, and the sheet a cylinder.
+    ``closed``: a cylinder, whose last column is a neighbor of the first.
     """
     frames = Recording.load(path, threshold).pressed
     _, rows, columns = frames.shape
@@ -67,7 +67,7 @@ def load(
 
 
 def zones_bound(frames: np.ndarray, connectivity: int) -> int:
-    """At least as many as the zones of any frame: runs that touch nothing in the row above."""
+    """An upper bound on the zones of any frame: runs that touch nothing in the row above."""
     above = np.pad(frames, ((0, 0), (1, 0), (1, 1)))[:, :-1]
     touched = above[:, :, 1:-1]
     if connectivity == 8:
@@ -89,10 +89,10 @@ def skin_for(
     barycenter_bits: int | None = None,
     closed: bool = False,
 ) -> Skin:
-    """A sheet of this size, scanned as fast as the link can carry frames of this many zones, so that none is dropped.
+    """A sheet of this size, scanned as fast as the link can carry frames of this many zones without drops.
 
-    With ``barycenter_bits`` the board divides, and reports that many fraction bits. Steps of the capacity are a third
-    at most, so that recordings of one sheet share few builds.
+    With ``barycenter_bits`` the board divides, and reports that many fraction bits. Capacity steps are at most a third,
+    so that recordings of one sheet share builds.
     """
     shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
     if closed:
@@ -116,10 +116,10 @@ def skin_for(
 
 
 def replay(frames: np.ndarray, skin: Skin) -> Iterator[ReplayedFrame]:
-    """Hold each (rows, columns) bool frame for exactly one scan of a board built from ``skin``; results in order.
+    """Hold each (rows, columns) bool frame for exactly one scan of a board of ``skin``; results are in order.
 
-    Scans in which the board says hello, and some at the start, are left to an untouched sheet. Raises
-    :class:`ReplayError` if a frame does not come out exactly once.
+    The first scans, and those with a hello, have an untouched sheet. Raises :class:`ReplayError` if a frame does not
+    come out exactly once.
     """
     plan = _Plan(skin, len(frames))
     with CompiledBoard(skin, capture=("rows", "records")) as board, ThreadPoolExecutor(1) as pool:
@@ -135,7 +135,7 @@ def replay(frames: np.ndarray, skin: Skin) -> Iterator[ReplayedFrame]:
 
 
 class _Plan:
-    """Which scan holds which input frame."""
+    """Assignment of input frames to scans."""
 
     def __init__(self, skin: Skin, count: int):
         derived = skin.derived
@@ -184,7 +184,7 @@ class _Collector:
         return _Events(*(self._board.take(name) for name in ("rows", "records", "received")))
 
     def collect(self, events: _Events) -> Iterator[ReplayedFrame]:
-        """The input frames whose last byte is among the events."""
+        """Input frames whose last byte is among the events."""
         self._note_times(events)
         stream = zip(events.received["cycle"].tolist(), events.received["data"].tolist())
         for got in self._receiver.take(stream):
@@ -206,7 +206,7 @@ class _Collector:
                 self._pending.append(cycle)
 
     def _place(self, frame: Frame, end: int) -> Iterator[ReplayedFrame]:
-        """Find the scan by its time; an untouched sheet's frames may be overwritten by each other."""
+        """Find the scan by its time; frames of an untouched sheet may replace each other."""
         scan = self._next
         while self._time(scan) != frame.time_us:
             if scan >= self._plan.scans or self._plan.frame_of[scan] is not None:
@@ -230,8 +230,8 @@ class _Collector:
 
 
 def to_json(index: int, result: ReplayedFrame, skin: Skin) -> dict[str, object]:
-    """One input frame as ``contactfpga replay --json`` prints it: as ``contactfpga zones --json`` does, with its
-    number in the input and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
+    """One input frame as ``contactfpga replay --json`` prints it: the output of ``contactfpga zones --json``, its input
+    number and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
     cycles = {
         "last_row_to_first_record": result.first_record,
         "last_row_to_last_record": result.last_record,

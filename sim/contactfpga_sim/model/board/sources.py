@@ -1,6 +1,6 @@
-"""What something was made by, for keys of what is kept: modules with all that they import, and the packages they use.
+"""Keys for cached results: hashes of modules with all their imports, and of the packages they use.
 
-Imports are read out of the text, and nothing is imported for it.
+Imports are read from the text, without importing.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _WORD = re.compile(r"\bimport\b")
 _PLACE = re.compile(r"""\b(contactfpga\w*(?:\.\w+)+):\w+["']""")
 
 _taken: dict[tuple[str, tuple[str, ...]], str] = {}
-"""Digests by module and packages. A module is imported once in a process, so it is read once."""
+"""Digests by module and packages; a process reads each once."""
 _read: dict[Path, object] = {}
-"""Modules of ours that were read, and what tells that they were written to."""
+"""Our modules read so far, with stamps that reveal later writes."""
 
 
 def digest(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
-    """Stands for a module, or all modules of a package, and what they import: text of ``packages`` and of data in
-    folders beside their modules, versions of others."""
+    """Hash of a module, or all modules of a package, with their imports: text of ``packages`` and of data in folders
+    beside their modules, versions of others."""
     key = root, packages
     if key not in _taken:
         _taken[key] = _digest(*key)
@@ -46,32 +46,32 @@ def digest(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
 
 @functools.cache
 def texts(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
-    """As :func:`digest`, but of modules of ours alone: the same in a clone and in a wheel, with every Python and beside
-    every version of others."""
+    """Hash like :func:`digest` over our modules alone: the same in a clone and a wheel, for every Python and other
+    versions."""
     folders = _folders(packages)
     return _sha(_texts(_closure([root], folders), folders))
 
 
 def changed() -> bool:
-    """Whether a module of ours was written to since it was read: what runs here may be neither version."""
+    """Whether one of our modules was written since it was read: the running code may be neither version."""
     return any(_stamp(file) != before for file, before in _read.items())
 
 
 def own(files: Iterable[Path]) -> str:
-    """The same for files of a user's own, and what they import from our packages and from beside themselves."""
+    """Hash of a user's own files, with imports from our packages and from beside themselves."""
     files = sorted(files)
     return _hashed([*map(_hash, files), *_marks(map(_name, files), _folders(PACKAGES) | _beside(files))])
 
 
 def files(modules: Iterable[str], scripts: Iterable[Path] = ()) -> set[Path]:
-    """All files of ours that modules and scripts reach: what they import, and data in folders beside it."""
+    """All our files that modules and scripts reach: imports, and data in folders beside them."""
     folders = _folders(PACKAGES) | _beside(scripts)
     found = {file for file in _closure({*modules, *map(_name, scripts)}, folders).values() if file}
     return found | {data for folder in {file.parent for file in found} for data in _data(folder)}
 
 
 def package(name: str) -> Path:
-    """Folder of a package, which is not imported. Raises :class:`MissingExtra`."""
+    """Folder of a package, without importing it. Raises :class:`MissingExtra`."""
     spec = importlib.util.find_spec(name)
     if spec is None or not spec.submodule_search_locations:
         raise MissingExtra("the virtual board", "sim")
@@ -80,7 +80,7 @@ def package(name: str) -> Path:
 
 @functools.cache
 def version(name: str) -> str:
-    """Of an installed package; empty where no package is called so."""
+    """Version of an installed package; empty if there is none."""
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
@@ -105,13 +105,13 @@ def _sha(marks: Iterable[str]) -> str:
 
 
 def _folders(packages: Iterable[str]) -> dict[str, Path]:
-    """Where each package is found."""
+    """Folder of each package."""
     return {name: package(name).parent for name in packages}
 
 
 def _beside(files: Iterable[Path]) -> dict[str, Path]:
-    """Where the packages are found that users' files can reach: their own, and what lies beside it unless it was
-    installed; what was has a version."""
+    """Folders of the packages that users' files can reach: their own, and neighbors without a version, which were not
+    installed."""
     installed = {Path(path).resolve() for path in sysconfig.get_paths().values()}
     found = {}
     for file in files:
@@ -130,13 +130,13 @@ def _top(file: Path) -> Path:
 
 
 def _name(file: Path) -> str:
-    """Of a module."""
+    """Name of a module."""
     parts = file.relative_to(_top(file).parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
-    """The file of a module, None where there is none in these folders."""
+    """The file of a module; None if these folders lack it."""
     top = name.partition(".")[0]
     if top not in folders:
         return None
@@ -145,8 +145,8 @@ def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
 
 
 def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False) -> list[str]:
-    """A line for each module that is reached and for each other package. Of packages of ``ours`` also for each file of
-    data beside a module; users' modules may be changed and loaded again."""
+    """A line per reached module and per other package; for packages of ``ours`` also per data file beside a module.
+    Users' modules may change and be reloaded."""
     found = _closure(roots, folders, _noted if ours else lambda _: None)
     marks = _texts(found, folders)
     for folder in {file.parent for file in found.values() if file} if ours else ():
@@ -156,7 +156,7 @@ def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False
 
 
 def _texts(found: Mapping[str, Path | None], folders: Mapping[str, Path]) -> list[str]:
-    """A line for each module that is reached, and for the packages around them."""
+    """A line per reached module and enclosing package."""
     marks = [f"{name} {_hash(file)}" for name, file in found.items() if file]
     marks += (f"{top} {_hash(file)}" for top in _tops(found) - set(found) if (file := _find(top, folders)))
     return sorted(marks)
@@ -169,7 +169,7 @@ def _tops(found: Iterable[str]) -> set[str]:
 def _closure(
     roots: Iterable[str], folders: Mapping[str, Path], about_to_read: Callable[[Path], None] = lambda _: None
 ) -> dict[str, Path | None]:
-    """The file of each module that is reached, by name; None for what is in none of these folders."""
+    """The file of each reached module, by name; None outside these folders."""
     todo, found = set(roots), dict[str, Path | None]()
     while todo:
         name = todo.pop()
@@ -201,7 +201,7 @@ def _hash(file: Path) -> str:
 
 
 def _data(folder: Path) -> Iterator[Path]:
-    """Files in those of a package's folders that are no packages."""
+    """Files in subfolders of a package that are no packages."""
     with os.scandir(folder) as entries:
         inner = [Path(entry) for entry in entries if entry.is_dir() and entry.name != "__pycache__"]
     for each in inner:
@@ -210,7 +210,7 @@ def _data(folder: Path) -> Iterator[Path]:
 
 
 def _imported(text: str, name: str, is_package: bool) -> set[str]:
-    """Names of modules that a module imports anywhere, or loads as a choice, and of attributes it imports from them."""
+    """Names of modules that a module imports anywhere, or loads as a choice, and of imported attributes."""
     found = set(_PLACE.findall(text))
     for statement in _statements(text):
         if isinstance(statement, ast.Import):
@@ -224,8 +224,7 @@ def _imported(text: str, name: str, is_package: bool) -> set[str]:
 
 
 def _statements(text: str) -> Iterator[ast.AST]:
-    """All import statements. They are looked for by themselves, as to parse all of a file takes ten times as long;
-    where the word stands elsewhere, too, that is done."""
+    """All import statements, found by text search, ten times faster than parsing; ambiguous files are parsed."""
     parts = _IMPORT.split(_TYPES.sub("", text))
     try:
         if any(map(_WORD.search, parts[::2])):

@@ -1,4 +1,4 @@
-"""A compiled board whose flip-flops and memory bits can be flipped one by one, and which can go back in time."""
+"""A compiled board with flips of single flip-flops and memory bits, and checkpoints."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Storage(NamedTuple):
     """A register or a memory of the gateware."""
 
     name: str
-    """With the submodules that it is in, joined by dots."""
+    """Name with the enclosing submodules, joined by dots."""
     width: int
-    """Bits of a word."""
+    """Bits per word."""
     depth: int
     """Words; 1 for a register."""
     memory: bool
@@ -33,7 +33,7 @@ class Storage(NamedTuple):
 
 
 class Bit(NamedTuple):
-    """One of them."""
+    """A bit of a storage."""
 
     place: int
     word: int
@@ -41,7 +41,7 @@ class Bit(NamedTuple):
 
 
 class Checkpoint:
-    """What a board was at one clock; of use as long as its board is open."""
+    """A board's state at one clock; valid while its board is open."""
 
     def __init__(self, board: StateBoard) -> None:
         self._board = board
@@ -53,7 +53,7 @@ class Checkpoint:
 
 
 class StateBoard(CompiledBoard):
-    """A compiled board with its state in reach; between two calls, so between two clocks."""
+    """A compiled board with access to its state between calls, hence between clocks."""
 
     def __init__(self, skin: Skin, capture: Iterable[str] = ()):
         super().__init__(skin, capture, _model(skin))
@@ -67,22 +67,22 @@ class StateBoard(CompiledBoard):
         return found
 
     def flip(self, bit: Bit) -> None:
-        """From the next cycle on this bit is the other one, until the gateware writes it."""
+        """Flip this bit from the next cycle on, until the gateware writes it."""
         place = self.places[bit.place]
         if not (0 <= bit.word < place.depth and 0 <= bit.bit < place.width):
             raise ValueError(f"{bit} is outside of {place}")
         self._call("flip", *map(ctypes.c_uint32, bit))
 
     def moment(self) -> Checkpoint:
-        """What the board is now."""
+        """The board's current state."""
         return Checkpoint(self)
 
     def go_to(self, moment: Checkpoint) -> None:
-        """Be what it was then; what was captured since stays."""
+        """Restore this state; captured events stay."""
         self._call("go_to", ctypes.c_void_p(moment.address))
 
     def same(self, moment: Checkpoint) -> bool:
-        """Whether all that follows is what followed then."""
+        """Whether the future is the same as from this state."""
         return bool(self._call("same", ctypes.c_void_p(moment.address)))
 
     def drop(self, moment: Checkpoint) -> None:
@@ -115,8 +115,8 @@ def _model(skin: Skin) -> Model:
 
 
 def places(model: str) -> str:
-    """``places.inc`` for a generated model: its registers, and its memories but for those that are never written,
-    which are logic or configuration."""
+    """``places.inc`` for a generated model: its registers, and memories except those never written, which are logic or
+    configuration."""
     lines = [f'PLACE("{_plain(name)}", {name})' for name in _WIRE.findall(model)]
     lines += [
         f'MEMORY("{_plain(name.removeprefix("memory_"))}", {name}, {depth})'
@@ -127,5 +127,5 @@ def places(model: str) -> str:
 
 
 def _plain(mangled: str) -> str:
-    """A name as it was before it became one of C++."""
+    """The original of a C++ name."""
     return re.sub(r"__|_([0-9a-f]+)_", lambda match: chr(int(match[1], 16)) if match[1] else "_", mangled[2:])

@@ -1,4 +1,4 @@
-"""The virtual board, of one sheet or of several: compiled gateware in simulated time, as a serial port."""
+"""The virtual board of one or several sheets: compiled gateware in simulated time, as a serial port."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from contactfpga_sim.model.scenes.scene import scene as make_scene
 from contactfpga_sim.model.sheet.line import lines_of
 
 CHUNK_S = 0.2e-3
-"""Simulated time between two looks at the scene and at the line."""
+"""Simulated time between two samples of the scene and the line."""
 
 
 UnitSource = Callable[[float], Sequence[int]]
-"""From the simulated time in s to what each pressure unit reads, in steps of its converter."""
+"""Readings of each pressure unit, in converter steps, by simulated time in s."""
 
 
 def _unit_source(skin: Skin, scene: Source, units: UnitSource | LoadCells | None) -> UnitSource:
-    """Raises ValueError for units that the Skin or the scene has no use for."""
+    """The source of readings. Raises ValueError for units that the Skin or the scene cannot use."""
     if not isinstance(units, LoadCells):
         return units or _at_rest(skin)
     if len(units.units) != skin.units:
@@ -58,18 +58,17 @@ def _at_rest(skin: Skin) -> UnitSource:
 
 
 class VirtualBoard:
-    """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
+    """A board in simulated time, with the interface of a serial port: time passes only in :meth:`read`.
 
-    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.model.scenes.scene.scene` takes, among
-    it a function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which
-    its contacts press, by default none; circuit: the sheet's, by which its lines take time to settle, by default none;
-    slow_rows, slow_columns: by line the factor by which it then takes longer; units: a function
-    of the simulated time in s that returns what each pressure unit reads, by default half of full scale; or the
-    LoadCells that the scene's contacts press on, if it has contacts; look_s: simulated time between two looks at the
-    scene.
+    skin: default the reference Skin; scene: any argument of :func:`contactfpga_sim.model.scenes.scene.scene`, for
+    instance a function from simulated time in s to pressed (rows, columns) bool cells; cover: through which its
+    contacts press, default none; circuit: the sheet's, for settling times, default none; slow_rows, slow_columns:
+    factors of settling time by line; units: a function from simulated time in s to the pressure units' readings,
+    default half of full scale, or the LoadCells under a scene with contacts; look_s: simulated time between two samples
+    of the scene.
 
-    ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
-    call that waits for a frame.
+    ``contactfpga.open(VirtualBoard())`` opens it like any port. The function's exceptions come out of the call that
+    waits for a frame.
     """
 
     def __init__(
@@ -90,7 +89,7 @@ class VirtualBoard:
         self._cover = cover
         self._touch: CellsAt | None = None
         self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
-        """(rows, columns) bool: the switches that are closed since the last :meth:`advance`."""
+        """(rows, columns) bool: the closed switches since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
         if circuit is not None:
             self._board.settle(*lines_of(circuit, self.skin))
@@ -104,7 +103,7 @@ class VirtualBoard:
         self._board.send(data)
 
     def read(self, seconds: float) -> bytes:
-        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        """Let simulated time pass until bytes arrive, at most ``seconds``; returns them."""
         left = round(seconds * self.skin.clock_hz)
         while True:
             if (data := self._board.receive()) or left <= 0:
@@ -115,11 +114,11 @@ class VirtualBoard:
 
     @property
     def by_force(self) -> bool:
-        """Whether it depends on a finger's force which switches close: there is a cover that goes by stress."""
+        """Whether a finger's force matters: the cover depends on stress."""
         return self._cover is not None and self._cover.model != "patch"
 
     def touch(self, fingers: Iterable[RoundContact]) -> None:
-        """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
+        """Touch the sheet with these fingers, besides its scene, until the next call; from any thread."""
         placed = [
             contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
             for one in fingers
@@ -130,7 +129,7 @@ class VirtualBoard:
             self._units.touching = scene
 
     def advance(self, cycles: int) -> None:
-        """Run clock cycles with the scene as it is now."""
+        """Run clock cycles with the current scene."""
         touch, pressed = self._touch, self._scene(self.clock())
         self.pressed = pressed if touch is None else pressed | touch(self.clock())
         if self.skin.units:
@@ -155,7 +154,7 @@ class VirtualBoard:
 class VirtualSheets:
     """A board of several sheets in simulated time, which passes only in :meth:`read`.
 
-    several: the sheets; scenes: what touches each of them, for :func:`contactfpga_sim.model.scenes.scene.scene`.
+    several: the sheets; scenes: touches of each, for :func:`contactfpga_sim.model.scenes.scene.scene`.
     """
 
     def __init__(self, several: Several, scenes: Sequence[Source]):
@@ -169,7 +168,7 @@ class VirtualSheets:
         self._board.send(data)
 
     def read(self, seconds: float) -> bytes:
-        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        """Let simulated time pass until bytes arrive, at most ``seconds``; returns them."""
         left = round(seconds * self.several.clock_hz)
         while True:
             data = self._board.receive()
@@ -180,7 +179,7 @@ class VirtualSheets:
             left -= cycles
 
     def advance(self, cycles: int) -> None:
-        """Run clock cycles with the scenes as they are now."""
+        """Run clock cycles with the current scenes."""
         for number, scene in enumerate(self._scenes):
             self._board.press(number, scene(self.clock()))
         self._board.run(cycles)
@@ -195,8 +194,8 @@ class VirtualSheets:
 
 
 def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:
-    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for; ``skin``: where it names no
-    file. Raises :class:`~contactfpga.AddressError`, and as the files that it names do."""
+    """The board of ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default without a file.
+    Raises :class:`~contactfpga.AddressError`, and the errors of its files."""
     address = Sim.parse(name)
     cover, circuit, units = None, None, None
     several = Several.load(address.sheets) if address.sheets is not None else None
@@ -215,7 +214,7 @@ def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheet
 
 
 def _compared(scene: str | None, threshold: float | None) -> str | Recording | None:
-    """The scene; with a threshold the recording in its file, whose numbers above it count as pressed."""
+    """The scene; with a threshold the recording in its file, whose larger numbers count as pressed."""
     if threshold is None:
         return scene
     if scene is None or not scene.endswith((".npy", ".npz")):

@@ -1,7 +1,7 @@
-"""Boards that the package carries as WebAssembly, which wasmtime runs where there is no compiler.
+"""Boards that the package carries as WebAssembly, which wasmtime runs without a compiler.
 
-Each is listed with a key of all that decides what it is built from. Where no file has the key that is asked for, as for
-other Skins or while somebody works on the gateware, there is none.
+Each is listed with a key of its sources. Without a matching file, as for other Skins or changed gateware, there is
+none.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from contactfpga_sim.model.board import native, sources
 
 FOLDER = Path(__file__).parent / "wasm"
 LIST = FOLDER / "files.json"
-"""By name of a file its key, the key of its design, which is no other where only texts are, and its sum; and the
-versions of the tools that built them."""
+"""By file name its key, its design's key (unchanged by text alone), and its sum; and the versions of the building
+tools."""
 
 NATIVE = "CONTACTFPGA_NATIVE"
-"""Environment variable; where it says something, native code is compiled, which is faster."""
+"""Environment variable that, if set, requests native code, which is faster."""
 
 FASTER = 1.4
-"""How many times as fast as WebAssembly native code is."""
+"""Speed of native code over WebAssembly."""
 
 _ALIGNED = 16  # bytes, as malloc's
 _ZIG = (sys.executable, "-m", "ziglang")
@@ -47,8 +47,8 @@ _C_FLAGS = (*_TARGET, "-std=c99", "-Os")
 
 
 class WebAssemblyLibrary:
-    """A board in memory of its own, used as a library of ctypes is: its functions take bytes and ctypes' numbers, and
-    return what their ``restype`` says."""
+    """A board in memory of its own, used like a ctypes library: functions take bytes and ctypes numbers, and return
+    their ``restype``."""
 
     def __init__(self, file: Path):
         import wasmtime
@@ -68,12 +68,12 @@ class WebAssemblyLibrary:
         return function
 
     def string_at(self, address: int, size: int) -> bytes:
-        """As that of ctypes."""
+        """Replacement of ctypes' ``string_at``."""
         return self._memory.read(address, size)
 
 
 class _Memory:
-    """What a board reads and writes."""
+    """A board's memory."""
 
     def __init__(self, store: Any, exports: Any):
         self._store, self._exports, self._bytes = store, exports, exports["memory"]
@@ -83,7 +83,7 @@ class _Memory:
         return bytes(self._bytes.read(self._store, address, address + size))
 
     def placed(self, datas: Sequence[bytes]) -> list[int]:
-        """Where they lie until the next call."""
+        """Addresses of these data until the next call."""
         if not datas:
             return []
         *starts, size = itertools.accumulate((-len(data) % _ALIGNED + len(data) for data in datas), initial=0)
@@ -96,7 +96,7 @@ class _Memory:
 
 
 class _Function:
-    """One of a library's, called as C programs do: the usual way takes as long as 500 clocks of a board."""
+    """A library function called by C convention: wasmtime's usual call costs 500 board clocks."""
 
     restype: Any = ctypes.c_int
 
@@ -132,7 +132,7 @@ class _Function:
 
 
 def load(key: str) -> WebAssemblyLibrary | None:
-    """The board with a key, if it is carried; None, too, where the user asks for native code by :data:`NATIVE`."""
+    """The packaged board with a key, or None; also None if the user requests native code by :data:`NATIVE`."""
     if os.environ.get(NATIVE) or importlib.util.find_spec("wasmtime") is None:
         return None
     found = file(key)
@@ -143,7 +143,7 @@ def load(key: str) -> WebAssemblyLibrary | None:
 
 @functools.cache
 def _tell() -> None:
-    """Say so on a terminal, once."""
+    """Report WebAssembly on a terminal, once."""
     if terminal.of(sys.stderr).live:
         faster = f"native code, which {NATIVE}=1 compiles, is {FASTER} times as fast"
         terminal.say(f"contactfpga: the virtual board runs as WebAssembly; {faster}", sys.stderr, hang=2)
@@ -151,13 +151,13 @@ def _tell() -> None:
 
 @atexit.register
 def _let_go() -> None:
-    """Free what is kept while wasmtime can still be called."""
+    """Free the cache while wasmtime still works."""
     _compiled.cache_clear()
 
 
 @functools.cache
 def _compiled(file: Path) -> tuple[Any, Any]:
-    """An engine and a module, which take 0.2 s."""
+    """An engine and a module, made in 0.2 s."""
     import wasmtime
 
     settings = wasmtime.Config()
@@ -167,24 +167,24 @@ def _compiled(file: Path) -> tuple[Any, Any]:
 
 
 def listed() -> dict[str, Any]:
-    """What :data:`LIST` holds."""
+    """The content of :data:`LIST`."""
     found: dict[str, Any] = json.loads(LIST.read_text(encoding="utf-8"))
     return found
 
 
 def write_list(files: Mapping[str, Mapping[str, str]]) -> None:
-    """Write :data:`LIST`, of files by name."""
+    """Write :data:`LIST` for files by name."""
     found = {name: {**keys, "sha256": sum_of(path_of(name).read_bytes())} for name, keys in files.items()}
     LIST.write_text(json.dumps({"tools": tools(), "files": found}, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def path_of(name: str) -> Path:
-    """Where a file is."""
+    """Path of a file."""
     return FOLDER / f"{name}.wasm"
 
 
 def file(key: str) -> Path | None:
-    """The file that was built of what the key stands for, if it is carried."""
+    """The packaged file with this key, if any."""
     for name, made in listed()["files"].items():
         if made["key"] == key and (path := path_of(name)).is_file():
             if sum_of(path.read_bytes()) == made["sha256"]:
@@ -194,25 +194,25 @@ def file(key: str) -> Path | None:
 
 
 def tools() -> dict[str, str]:
-    """By tool the version that would build a file here, or, where it is not installed, that built those carried."""
+    """Versions by tool: that for building a file here, or, if not installed, that of the packaged files."""
     return {tool: sources.version(tool) or listed()["tools"][tool] for tool in _TOOLS}
 
 
 def board_key(gateware: str, driver: str, defines: Mapping[str, int | str]) -> str:
-    """Of a board: what stands for its gateware, this file and these constants of its driver."""
+    """Key of a board: of its gateware, this file and its driver's constants."""
     options = (_FLAGS, native.FLATTEN, native.TO_CPP, sorted(defines.items()))
     drivers = (*sorted(native.DRIVERS.glob("*.h")), native.DRIVERS / driver)
     return _key(gateware, options, *(sum_of(file.read_bytes()) for file in drivers))
 
 
 def gateware_of(skin: Skin) -> str:
-    """Stands for the gateware of a Skin, by the text of its modules. Cheap, as nothing is elaborated."""
+    """Hash of a Skin's gateware by the text of its modules. Cheap: nothing is elaborated."""
     text = sources.texts("contactfpga_hdl.top", (sources.HOST, sources.GATEWARE))
     return repr((skin.fingerprint, skin.name, text))
 
 
 def c_key(source: Path) -> str:
-    """Of a C file and the headers beside it."""
+    """Key of a C file and its headers."""
     return _key(_C_FLAGS, *(sum_of(file.read_bytes()) for file in (source, *sorted(source.parent.glob("*.h")))))
 
 
@@ -221,19 +221,19 @@ def _key(*parts: Any) -> str:
 
 
 def build_board(model: native.Model, folder: Path) -> bytes:
-    """A model's file; ``folder`` holds what is made on the way."""
+    """Build a model's file; ``folder`` holds intermediate files."""
     made = folder / "model.wasm"
     native.compile_with([*_ZIG, "c++", *_FLAGS], model, folder, made)
     return made.read_bytes()
 
 
 def build_c(source: Path, folder: Path) -> bytes:
-    """The same for a C file."""
+    """Build a C file; ``folder`` holds intermediate files."""
     made = folder / "made.wasm"
     native.run([*_ZIG, "cc", *_C_FLAGS, str(source), "-o", str(made)])
     return made.read_bytes()
 
 
 def sum_of(data: bytes) -> str:
-    """A sum in hex digits."""
+    """A hash in hex digits."""
     return hashlib.sha256(data).hexdigest()

@@ -1,7 +1,7 @@
-"""Golden model: zones by flood fill, time by the rules of docs/timing.md.
+"""Golden model: zones by flood fill, times by docs/timing.md.
 
-It shares no code with the gateware or with the host's protocol, never imports Amaranth, and reads only the
-declared fields of a Skin.
+It shares no code with the gateware or the host's protocol, never imports Amaranth, and reads only the declared fields
+of a Skin.
 """
 
 from contactfpga_sim.model.golden.predict import beginnings, driven, predict

@@ -1,4 +1,4 @@
-"""The adaptive scan: which rows it drives slot by slot, what is sampled in them, and the contact pin."""
+"""The adaptive scan: driven rows by slot, their samples, and the contact pin."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from contactfpga_sim.model.golden.scan import Play, Scan, ScanOutput, ScanRule, 
 from contactfpga_sim.model.golden.trace import Timeline
 
 Choice = tuple[frozenset[int], bool]
-"""The rows of a slot, and whether it is one row driven alone; else it is a probe."""
+"""The rows of a slot, and whether it is one row alone; else it is a probe."""
 
 Choices = Generator[Choice, bool, None]
-"""Yields the choice for each slot; is sent whether any column read pressed in it."""
+"""Yields the choice for each slot; receives whether any column read pressed in it."""
 
 
 def row_choices(rows: int, listed: frozenset[int]) -> Choices:
-    """The slots of a frame that begins with these rows on the list."""
+    """The slots of a frame with these rows on the list at its beginning."""
     return _RowSearch(rows, listed).slots()
 
 
@@ -93,20 +93,20 @@ class _RowSearch:
 
 @dataclasses.dataclass(frozen=True)
 class RowSlot:
-    """A row time and the rows that are driven in it."""
+    """A row time and its driven rows."""
 
     begin: int
     rows: frozenset[int]
     strobe: int
-    """When its columns have come through the synchronizers."""
+    """The cycle in which its columns have passed the synchronizers."""
     released: int
-    """The first cycle without a driven row; the end of the slot if they stay driven."""
+    """The first cycle without a driven row; the slot's end if they stay driven."""
     end: int
-    """The cycle in which the next slot begins."""
+    """The first cycle of the next slot."""
 
 
 class AdaptiveScanModel:
-    """Goes through a timeline frame by frame, with the requests in the order in which they were received."""
+    """Runs through a timeline frame by frame, with the requests in order of reception."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request]):
         self.slots: list[RowSlot] = []
@@ -125,7 +125,7 @@ class AdaptiveScanModel:
         self._clean: np.ndarray = ~np.any(facts.mask, axis=0)
 
     def frame(self) -> tuple[Scan, np.ndarray]:
-        """The next frame, and its cells as they count once debounced."""
+        """The next frame, and its debounced cells."""
         facts = self._facts
         cells = np.zeros((facts.rows, facts.columns), bool)
         offered = [0] * facts.rows
@@ -178,7 +178,8 @@ class AdaptiveScanModel:
         return scan, counted
 
     def _strobe(self, begin: int, rows: frozenset[int]) -> int:
-        """When the slot's columns count: after its settle time; of idle rows that stay driven, when one is seen."""
+        """The cycle of the slot's sample: after its settle time; for idle rows that stay driven, when a pressed one is
+        seen."""
         regular = begin + self._facts.settle + 1
         if not self._watched():
             return regular
@@ -199,7 +200,7 @@ class AdaptiveScanModel:
         return len(rows) == self._facts.rows
 
     def _columns(self, cycle: int, rows: frozenset[int]) -> np.ndarray:
-        """Columns that read pressed in a cycle in which these rows are driven."""
+        """Columns that read pressed in a cycle with these rows driven."""
         cells, stuck = self._timeline.at(cycle)
         columns = np.zeros(self._facts.columns, bool)
         if cells is not None:
@@ -219,14 +220,14 @@ class AdaptiveScanModel:
         return bool(self.slots) and self.slots[-1].released == self.slots[-1].end
 
     def _watch(self, rows: frozenset[int], strobe: int) -> None:
-        """Idle rows stayed driven since the strobe before: each cycle counts for the pin."""
+        """Evaluate each cycle since the last strobe for the pin, as idle rows stayed driven."""
         if self._watched():
             seen = self._first_seen(self.slots[-1].strobe, strobe - 2, rows, self._clean)
             if seen is not None:
                 self._rise(seen + 3, True)
 
     def _first_seen(self, begin: int, end: int, rows: frozenset[int], counts: np.ndarray) -> int | None:
-        """The first cycle from ``begin`` to ``end`` in which a column that counts reads pressed."""
+        """The first cycle from ``begin`` to ``end`` in which one of these columns reads pressed."""
         inside = self._changes[bisect.bisect_right(self._changes, begin) : bisect.bisect_right(self._changes, end)]
         for cycle in (begin, *inside):
             if cycle <= end and (self._columns(cycle, rows) & counts).any():
@@ -238,7 +239,7 @@ class AdaptiveScanModel:
             self.contact.append((cycle, 1))
 
     def _end(self, cycle: int, pressed: bool) -> None:
-        """A frame with or without a pressed row; where idle rows stay driven, what is seen a clock before counts."""
+        """End a frame with or without a pressed row; if idle rows stay driven, readings count a clock earlier."""
         slot = self.slots[-1]
         if self._watched() and (self._columns(cycle - 3, slot.rows) & self._clean).any():
             self._rise(cycle, True)
@@ -251,7 +252,7 @@ class AdaptiveScanModel:
 
 
 def driven(facts: Facts, slots: Iterable[RowSlot]) -> list[tuple[int, int]]:
-    """(cycle, rows) of every change of the rows that are driven; bit r is row r."""
+    """(cycle, rows) of every change of the driven rows; bit r is row r."""
     changes: list[tuple[int, int]] = []
     for slot in slots:
         word = sum(1 << row for row in slot.rows)
@@ -263,7 +264,7 @@ def driven(facts: Facts, slots: Iterable[RowSlot]) -> list[tuple[int, int]]:
 
 
 class Adaptive(ScanRule):
-    """Rows together where nothing is touched, one by one where something is."""
+    """Probes of several rows while untouched, single rows where touched."""
 
     even = False
     waits = False

@@ -1,4 +1,4 @@
-"""Debounce: what each switch counts as, sample by sample."""
+"""Debounce: the state of each switch, sample by sample."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class DebounceRule:
     """The golden rule of a debounce, for one switch."""
 
     even: Callable[[list[bool], int, int], list[bool]]
-    """What the switch counts as, from what it reads, a sample per scan; press and release in scan periods."""
+    """A switch's states from its samples, one per scan; press and release in scan periods."""
     timed: Callable[[TimedDebounce, SwitchState, bool, int], None]
-    """The same sample by sample: changes the switch's state by what it reads in a tick."""
+    """Update of a switch's state by its sample in a tick."""
 
 
 def _rule(method: object) -> DebounceRule:
@@ -28,7 +28,7 @@ def _rule(method: object) -> DebounceRule:
 def debounced(samples: np.ndarray, method: object, press: int, release: int) -> np.ndarray:
     """Debounce (F, R, C) bool samples, one per scan and switch; ``press`` and ``release`` in scan periods.
 
-    Returns (F, R, C) bool: what each switch counts as from its sample of that scan on.
+    Returns (F, R, C) bool: the state of each switch from that scan's sample on.
     """
     rule = _rule(method).even
     result = np.zeros_like(samples)
@@ -71,9 +71,9 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
 
 
 class TimedDebounce:
-    """The same where samples are not a scan apart; times are counted in ticks, row times or us.
+    """Debounce for samples that are not a scan apart, in ticks, row times or us.
 
-    A time is over at the first sample that comes ``press`` or ``release`` ticks or more after its beginning.
+    A time ends at the first sample ``press`` or ``release`` ticks or more after its beginning.
     """
 
     def __init__(self, method: object, press: int, release: int):
@@ -82,9 +82,9 @@ class TimedDebounce:
         self._switches: dict[tuple[int, int], SwitchState] = {}
 
     def take(self, cells: np.ndarray, ticks: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
-        """(R, C) bool samples of a frame; ``ticks`` tells when, for the rows that were driven alone.
+        """(R, C) bool samples of a frame; ``ticks``: sample times of the rows that were driven alone.
 
-        Returns what each switch counts as, and the rows with one that counts as pressed or has a time running.
+        Returns the switches' states, and the rows with a pressed switch or a running time.
         """
         counts = np.zeros_like(cells)
         for row, tick in ticks.items():
@@ -136,9 +136,9 @@ class SwitchState:
 
     pressed: bool = False
     since: int | None = None
-    """The tick since when it reads otherwise."""
+    """Tick since which it reads differently from its state."""
     ignored_since: int | None = None
-    """The tick of its press, while what it reads is ignored."""
+    """Tick of its press, while readings are ignored."""
 
 
 NONE = DebounceRule(lambda reads, press, release: reads, TimedDebounce.none)

@@ -1,6 +1,6 @@
 """Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, from a Skin's declared fields.
 
-Worked out here a second time, in exact fractions, so that a slip in the gateware's own table cannot hide.
+Computed independently in exact fractions, so that a slip in the gateware's own table cannot hide.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ if TYPE_CHECKING:
 
 
 def exact(value: float) -> Fraction:
-    """The decimal number that was written into the Skin, without its binary rounding."""
+    """The decimal number in the Skin, without binary rounding."""
     return Fraction(repr(value))
 
 
 def upwards(value: Fraction) -> int:
-    """The next whole number upward. A billionth above one does not count: 37/12 us is 37 clocks of 12 MHz."""
+    """The next integer upward. An excess of a billionth does not count: 37/12 us is 37 clocks of 12 MHz."""
     return math.ceil(value - Fraction(1, 10**9))
 
 
 def downwards(value: Fraction) -> int:
-    """The next whole number downward. A billionth below one does not count."""
+    """The next integer downward. A deficit of a billionth does not count."""
     return math.floor(value + Fraction(1, 10**9))
 
 
 class ScanTiming(abc.ABC):
-    """The part of a scan's golden rule that clocks and widths depend on."""
+    """The part of a scan's golden rule behind clocks and widths."""
 
     even: bool
-    """Every frame takes the same time, every row once."""
+    """Whether every frame takes the same time, every row once."""
     waits: bool
-    """It waits for the stages after it, and the link counts no frames but time."""
+    """Whether it waits for the later stages, and the link counts time, not frames."""
 
     @abc.abstractmethod
     def choice(self, facts: Facts) -> int:
-        """Clocks that the scan takes to choose its next rows."""
+        """Clocks that the scan needs to choose its next rows."""
 
     @abc.abstractmethod
     def frame_slots(self, facts: Facts) -> int:
@@ -56,15 +56,15 @@ class ScanTiming(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """What the rules call R, C, M, E, X, Z, S, L, T, D, P and Q, and the widths of the fields on the wire."""
+    """The quantities R, C, M, E, X, Z, S, L, T, D, P and Q of the rules, and the widths of fields on the wire."""
 
     skin: Skin
     place: tuple[int, int] | None = None
-    """(number, sheets) of a sheet among several at one FPGA; None: it is alone."""
+    """(number, sheets) of a sheet among several on one FPGA; None: it is alone."""
 
     @property
     def closing(self) -> bytes:
-        """What follows the stuffed bytes of a packet: 2, and kind 11 with the sheet's number."""
+        """Bytes after a packet's stuffed ones: 2, and kind 11 with the sheet's number."""
         return b"" if self.place is None else bytes([2, 11 * 16 + self.place[0]])
 
     @property
@@ -77,17 +77,17 @@ class Facts:
 
     @property
     def row_lines(self) -> int:
-        """Rows, and the guard row."""
+        """Rows, including the guard row."""
         return self.rows + (1 if self.skin.guard else 0)
 
     @property
     def column_lines(self) -> int:
-        """Columns, and the guard column."""
+        """Columns, including the guard column."""
         return self.columns + (1 if self.skin.guard else 0)
 
     @functools.cached_property
     def mask(self) -> np.ndarray:
-        """(R, C) bool: True where there is no switch to read."""
+        """(R, C) bool: True without a readable switch."""
         mask = np.zeros((self.rows, self.columns), bool)
         for row, column in self.skin.mask:
             mask[row, column] = True
@@ -95,25 +95,25 @@ class Facts:
 
     @functools.cached_property
     def fault_bits(self) -> int:
-        """Of the word that the board tells of its lines: open rows and columns, stuck columns and the guard column's
-        bit, joined lines; 0: it tells none."""
+        """Bits of the fault word: open rows and columns, stuck columns and the guard column's bit, joined lines; 0:
+        none."""
         lines = [*range(self.rows), *range(self.columns), *range(self.columns + 1)] if self.skin.guard else []
         return len(lines) + int(self.skin.self_test)
 
     @property
     def commands(self) -> bytes:
-        """Numbers of the commands that the board takes: 1 is the self-test, 2 moves the sample, 3 to 5 are of units."""
+        """Command numbers of the board: 1 is the self-test, 2 moves the sample, 3 to 5 are of units."""
         of_units = b"\x03\x04" + b"\x05" * bool(self.skin.unit_sums) if self.skin.units else b""
         return b"\x01" * self.skin.self_test + b"\x02" * self.samples_early + of_units
 
     @property
     def samples_early(self) -> bool:
-        """The board can sample a row's columns before the settle time is over."""
+        """Whether the board can sample a row's columns before the settle time ends."""
         return self.skin.report == "cells" and self.skin.scan in ("raster", "reversal")
 
     @property
     def first_sample(self) -> int:
-        """The earliest of its clocks in which a row's columns can be sampled, counted from 1."""
+        """The earliest clock of a row in which columns can be sampled, counted from 1."""
         return max(2, self.load + self.column_shift)
 
     @functools.cached_property
@@ -122,28 +122,28 @@ class Facts:
 
     @functools.cached_property
     def shift_bit(self) -> int:
-        """E: clocks that a bit takes in the shift registers; 0 where there are none."""
+        """E: clocks of a bit in the shift registers; 0 without any."""
         if self.skin.row_drive == "direct" and self.skin.column_read == "direct":
             return 0
         return max(2, -(-self.skin.clock_hz // self.skin.shift_hz))
 
     @functools.cached_property
     def column_shift(self) -> int:
-        """X: clocks that the columns of a sample are shifted."""
+        """X: clocks to shift the columns of a sample."""
         if self.skin.column_read == "direct":
             return 0
         return -(-self.column_lines // self.skin.column_chains) * self.shift_bit
 
     @functools.cached_property
     def row_shift(self) -> int:
-        """Z: clocks from which on a row pattern is shifted before its slot, and the first slot begins."""
+        """Z: clocks by which a row pattern is shifted before its slot, and the start of the first slot."""
         if self.skin.row_drive == "direct":
             return 0
         return 1 + -(-self.row_lines // self.skin.row_chains) * self.shift_bit + self.shift_bit
 
     @functools.cached_property
     def load(self) -> int:
-        """Clocks of the pulse that takes the columns."""
+        """Clocks of the pulse that loads the columns."""
         return 0 if self.skin.column_read == "direct" else self.shift_bit
 
     @functools.cached_property
@@ -158,7 +158,7 @@ class Facts:
 
     @functools.cached_property
     def choice(self) -> int:
-        """Clocks that the scan takes to choose its next rows."""
+        """Clocks that the scan needs to choose its next rows."""
         return self.scan.choice(self)
 
     @functools.cached_property
@@ -176,7 +176,7 @@ class Facts:
 
     @functools.cached_property
     def precharge(self) -> int:
-        """Clocks for which columns are driven at least before a row is."""
+        """Minimum clocks for which columns are driven before a row."""
         return upwards(exact(self.skin.precharge_us) * self.clocks_per_us)
 
     @functools.cached_property
@@ -191,7 +191,7 @@ class Facts:
 
     @functools.cached_property
     def scan_clocks(self) -> int:
-        """Clocks of one scan period: every row once, the guard row too."""
+        """Clocks of one scan period: every row once, including the guard row."""
         return self.row_lines * self.row_clocks
 
     @functools.cached_property
@@ -205,7 +205,7 @@ class Facts:
 
     @functools.cached_property
     def column_groups(self) -> int:
-        """Groups of columns, at most four, in which a row is counted: of 4 columns, 8 or 16."""
+        """Groups of columns in which a row is counted, at most four: of 4 columns, 8 or 16."""
         group = next(width for width in (4, 8, 16) if 4 * width >= self.columns)
         return -(-self.columns // group)
 
@@ -223,7 +223,7 @@ class Facts:
 
     @functools.cached_property
     def keep_alive_slots(self) -> int:
-        """Row times after which an unchanged frame is sent; with one more frame it could come too late."""
+        """Row times after which an unchanged frame is sent; one more frame could be too late."""
         if self.scan.even:
             return self.row_lines * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
         row_us = Fraction(self.row_clocks, self.clocks_per_us)
@@ -231,13 +231,13 @@ class Facts:
 
     @property
     def keep_alive_periods(self) -> int:
-        """The same for a scan that waits, in periods of 1024 us."""
+        """Keep-alive time of a scan that waits, in periods of 1024 us."""
         periods = exact(self.skin.keep_alive_ms) * 1000 / 1024
         return downwards(periods) - 1 - math.ceil(2 * self.scan_clocks / Fraction(1024 * self.clocks_per_us))
 
     @functools.cached_property
     def press_ticks(self) -> int:
-        """When a press has lasted where samples are not a scan apart: in row times, or us with a scan that waits."""
+        """Duration of a press if samples are not a scan apart: in row times, or us with a scan that waits."""
         return self._ticks(exact(self.skin.debounce_press_us), self.press_scans)
 
     @functools.cached_property
@@ -259,7 +259,7 @@ class Facts:
 
     @property
     def zones(self) -> bool:
-        """True when the items of a frame are zone records, False when they are bitmap rows."""
+        """True if a frame has zone records, False if it has bitmap rows."""
         return self.skin.report in ("moments", "barycenter")
 
     @property
@@ -269,7 +269,7 @@ class Facts:
 
     @property
     def capacity(self) -> int:
-        """Items a frame can carry."""
+        """Items per frame."""
         if not self.zones:
             return self.rows
         assert self.skin.zone_capacity is not None
@@ -293,13 +293,13 @@ class Facts:
 
     @functools.cached_property
     def barycenter_bits(self) -> tuple[int, int, int]:
-        """Of area, x and y where records hold barycenters. Areas are 1 to R C, of which the last may wrap to 0."""
+        """Bits of area, x and y in barycenter records. Areas are 1 to R C, of which the last may wrap to 0."""
         steps = 2**self.skin.barycenter_bits
         return bits(self.rows * self.columns - 1), bits((self.columns - 1) * steps), bits((self.rows - 1) * steps)
 
     @functools.cached_property
     def division(self) -> int:
-        """Q: clocks that dividing takes, one for each bit of a row or column number, each fraction bit and rounding."""
+        """Q: clocks of a division, one for each bit of a row or column number, each fraction bit and rounding."""
         return math.ceil(math.log2(max(self.rows, self.columns))) + self.skin.barycenter_bits + 1
 
     @functools.cached_property
@@ -324,8 +324,8 @@ class Facts:
 
     @property
     def _most_zones(self) -> int:
-        """With 8-connectivity one in each 2x2 block, with 4 the checkerboard; around a cylinder no row has more than
-        half its columns."""
+        """The most zones: with 8-connectivity one per 2x2 block, with 4 the checkerboard; around a cylinder at most
+        half the columns of a row."""
         if self.skin.closed:
             return self.columns // 2 * (self.rows if self.skin.connectivity == 4 else math.ceil(self.rows / 2))
         if self.skin.connectivity == 4:
@@ -341,7 +341,7 @@ class Facts:
 
 
 def bits(largest: int) -> int:
-    """Least width, at least one bit, that holds 0 to ``largest``."""
+    """Least width, at least one bit, for 0 to ``largest``."""
     width = 1
     while 2**width <= largest:
         width += 1
@@ -350,5 +350,5 @@ def bits(largest: int) -> int:
 
 @functools.lru_cache(maxsize=64)
 def facts(skin: Skin) -> Facts:
-    """The facts of ``skin``, worked out once."""
+    """The facts of ``skin``, cached."""
     return Facts(skin)

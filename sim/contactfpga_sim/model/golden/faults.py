@@ -1,4 +1,4 @@
-"""Reports of faults: what the board tells of its lines, and from when on one is due (docs/timing.md)."""
+"""Fault reports: the board's report on its lines, and when one is due (docs/timing.md)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ KIND, SLOT = 9, 1
 
 
 class FaultHistory:
-    """What a scan knows of its lines, a word, by cycle; 0 until it says otherwise."""
+    """The fault word of a scan by cycle; 0 at first."""
 
     def __init__(self) -> None:
         self._cycles = [0]
         self._words = [0]
 
     def change(self, cycle: int, word: int) -> None:
-        """The word is this one from ``cycle`` on, which is after those of the changes before, or the same."""
+        """Set the word from ``cycle`` on, not before earlier changes."""
         assert cycle >= self._cycles[-1], "changes come in order"
         self._cycles.append(cycle)
         self._words.append(word)
@@ -30,7 +30,7 @@ class FaultHistory:
         return self._words[bisect.bisect_right(self._cycles, cycle) - 1]
 
     def between(self, first: int, last: int) -> list[tuple[int, int, int]]:
-        """(first, last, word) of each stretch of cycles, both ends included."""
+        """(first, last, word) of each stretch of cycles, ends included."""
         begin = bisect.bisect_right(self._cycles, first) - 1
         ends = [*self._cycles[begin + 1 :], last + 1]
         stretches = zip(self._cycles[begin:], ends, self._words[begin:])
@@ -38,12 +38,12 @@ class FaultHistory:
 
 
 def report(facts: Facts, digits: Sequence[int] | None = None) -> bytes:
-    """A report of these digits as on the wire, by default one of no fault."""
+    """A report of these digits as on the wire, by default one without faults."""
     return _sealed(facts, _digits(0, facts.fault_bits) if digits is None else digits, 0)
 
 
 def slot(facts: Facts, number: int, rows: int, columns: int) -> bytes:
-    """A slot of the self-test, which read these rows and columns, bit 0 the first one."""
+    """A slot of the self-test that read these rows and columns, bit 0 the first."""
     lines = _digits(rows | columns << facts.rows, facts.rows + facts.columns)
     return _sealed(facts, _digits(number, 14) + lines, SLOT)
 
@@ -59,9 +59,9 @@ def _digits(word: int, bits: int) -> list[int]:
 
 
 class Reports:
-    """When a report is due. Of one on the wire each digit is taken in the cycle after the byte before it was handed
-    over; while none is, the place of cycle t is t modulo a power of two, and a digit that would not be the one sent
-    last makes a report due two cycles later."""
+    """When a report is due. In a report on the wire each digit is read in the cycle after the handover of the byte
+    before it. Otherwise, in cycle t the digit at t modulo a power of two is checked; if it differs from the one sent
+    last, a report is due two cycles later."""
 
     def __init__(self, facts: Facts, told: FaultHistory):
         self._facts = facts
@@ -73,29 +73,29 @@ class Reports:
         self._due: int | None = None
 
     def greet(self, cycle: int) -> None:
-        """A hello was taken."""
+        """A hello was taken in this cycle."""
         self._due = cycle + 1 if self._due is None else min(self._due, cycle + 1)
 
     def due(self, cycle: int) -> int | None:
-        """The cycle from which on a report waits, if it does by ``cycle``."""
+        """The cycle from which a report waits, if by ``cycle``."""
         found = [at for at in (self._due, self._differs(cycle - 2)) if at is not None and at <= cycle]
         return min(found, default=None)
 
     def send(self, handed: Sequence[int], idle: int) -> None:
-        """A report goes out whose bytes are handed over in these cycles; the wire is idle from ``idle`` on."""
+        """Send a report with bytes handed over in these cycles; the wire is idle from ``idle`` on."""
         self._handed = handed
         self._due, self._since = None, idle
 
     def pause(self, idle: int) -> None:
-        """Something else of this kind goes out, and nothing is compared until ``idle``."""
+        """Send another packet of this kind; nothing is compared until ``idle``."""
         self._due, self._since = None, idle
 
     def packet(self, handed: Sequence[int]) -> bytes:
-        """The report whose bytes were handed over in these cycles."""
+        """The report with bytes handed over in these cycles."""
         return report(self._facts, self._sent(handed))
 
     def _sent(self, handed: Sequence[int] | None) -> list[int]:
-        """The digits of the report whose bytes were handed over in these cycles; before the first one of no fault."""
+        """The digits of the report with bytes handed over in these cycles; at first those without faults."""
         if handed is None:
             return [0] * self._places
         words = (self._told.at(cycle + 1) for cycle in handed[: self._places])

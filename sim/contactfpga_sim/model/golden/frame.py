@@ -1,4 +1,4 @@
-"""Frame: what is packed into a packet, barycenters where the board divides, when, and whether it is sent."""
+"""Frame: packing of a packet, division into barycenters, timing, and whether it is sent."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ OVERFLOW, FAULT, MOTION = 1, 4, 8
 
 @dataclasses.dataclass(frozen=True)
 class Items:
-    """What one scan hands to the packer."""
+    """The packer's input from one scan."""
 
     scan: Scan
     cells: np.ndarray
-    """(R, C) bool: the cells that count, debounced."""
+    """(R, C) bool: the debounced cells."""
     records: list[tuple[int, int]]
-    """(cycle, data) of every item, in the order of cycles."""
+    """(cycle, data) of every item, in cycle order."""
     end: int
     """Cycle of the end mark."""
 
 
 class Queue:
-    """Where items wait for the packer."""
+    """The queue of items before the packer."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
-        """A record put in at a cycle: from which one on the packer can take it, and the item's bits."""
+        """Put a record in at a cycle; returns the cycle from which the packer can read it, and the item's bits."""
         return put + 2, data
 
     def take(self, cycle: int, item: int) -> None:
         """The packer reads the last byte of the item offered last."""
 
     def pass_end(self, cycle: int) -> None:
-        """The packer takes an end mark."""
+        """The packer reads an end mark."""
 
 
 class Packer:
-    """Packs frame after frame, decides what is sent, and hands it to the link."""
+    """Packs frame after frame, decides which are sent, and passes them to the link."""
 
     def __init__(self, facts: Facts, link: Link, queue: Queue):
         self._facts = facts
@@ -56,11 +56,11 @@ class Packer:
         self._since_hello = 0
         self._before: np.ndarray | None = None
         self.due = 0
-        """For a scan that waits: the cycle from which on a frame is sent though nothing has changed."""
+        """For a scan that waits: the cycle from which an unchanged frame is sent."""
         self._overwritten = 0
 
     def take(self, items: Items) -> int:
-        """Pack one frame; returns the cycle from which the next one's items can be taken."""
+        """Pack one frame; returns the cycle from which the next one's items can be read."""
         packet = Packet()
         for put, data in items.records[: self._facts.capacity]:
             offered, item = self._queue.offer(put, data)
@@ -123,20 +123,20 @@ class Packer:
 
 
 def barycenter(total: int, area: int, fraction_bits: int) -> int:
-    """The nearest step of 1/2^fraction_bits to total / area, half a step upward."""
+    """total / area rounded to steps of 1/2^fraction_bits, halves upward."""
     return int(Fraction(total * 2**fraction_bits, area) + Fraction(1, 2))
 
 
 class Divider(Queue):
-    """Divides one zone at a time; items are noted in a trace as the packer takes them."""
+    """Divides one zone at a time; items enter a trace when the packer reads them."""
 
     def __init__(self, facts: Facts, trace: Trace):
         self._facts = facts
         self._trace = trace
         self._free = 0
-        """From when on a zone can begin."""
+        """Cycle from which a zone can begin."""
         self._gone = 0
-        """When the item before was taken."""
+        """Cycle in which the previous item was read."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
         begun = max(self._free, put + 2)
@@ -162,7 +162,7 @@ class Divider(Queue):
 
 
 def join(fields: tuple[tuple[int, int], ...]) -> tuple[int, int]:
-    """Bit fields (value, width) without gaps, the first one lowest; and the width of all."""
+    """Bit fields (value, width) joined without gaps, the first lowest; and the total width."""
     word = width = 0
     for value, field_width in fields:
         assert 0 <= value < 2**field_width, f"{value} does not fit {field_width} bits"

@@ -1,4 +1,4 @@
-"""Guard lines: what the sheet shows with them, which lines are found faulty, and for how long these are told."""
+"""Guard lines: their effect on the sheet, lines found faulty, and how long these are reported."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from contactfpga_sim.model.golden.facts import Facts
 from contactfpga_sim.model.golden.trace import Timeline
 
 RETRY_US = 2**16
-"""The first whole round of checks after the clock passes a multiple of this renews what is told."""
+"""The first whole round of checks after the clock passes a multiple of this renews the reports."""
 
 
 def closed(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
-    """(row lines, column lines) bool: switches that are closed and whose two pins are whole up to them; with ``guard``
-    the guard lines come last, and their corner is open."""
+    """(row lines, column lines) bool: closed switches with whole lines to both pins; with ``guard`` the guard lines are
+    last, and their corner is open."""
     cells, _ = timeline.at(cycle)
     shut = np.ones((facts.row_lines, facts.column_lines), bool)
     shut[-1, -1] = not facts.skin.guard
@@ -38,7 +38,7 @@ def stuck(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
 
 
 class FaultyLines:
-    """Faulty lines as the board tells them."""
+    """Faulty lines as the board reports them."""
 
     def __init__(self, facts: Facts):
         rows, columns = np.asarray(facts.mask.all(axis=1)), np.asarray(facts.mask.all(axis=0))
@@ -49,8 +49,8 @@ class FaultyLines:
     def check(
         self, lines: Literal["rows", "columns", "stuck"], found: np.ndarray, renews: bool, only: int | None = None
     ) -> None:
-        """A check finds these of all rows, columns or stuck columns faulty; or it checks ``only`` one row, and the
-        others stay as they are. In a round that ``renews`` a line that is well is told no more."""
+        """Apply a check that finds these of all rows, columns or stuck columns faulty; or that checks ``only`` one row,
+        leaving the others. In a round that ``renews``, a line found good is no longer reported."""
         place = slice(None) if only is None else slice(only, only + 1)
         told = self._told[lines]
         kept = np.zeros_like(told) if renews else told
@@ -58,6 +58,6 @@ class FaultyLines:
 
     @property
     def word(self) -> int:
-        """Bits: rows lowest, then columns, then stuck columns, the guard column's highest."""
+        """Report word: rows in the lowest bits, then columns, then stuck columns, the guard column highest."""
         bits = np.concatenate([self._told[name] for name in ("rows", "columns", "stuck")])
         return sum(1 << int(place) for place in np.flatnonzero(bits))

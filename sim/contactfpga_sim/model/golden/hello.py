@@ -1,4 +1,4 @@
-"""Hello: what a board says of itself, and the counters that it tells while it goes out (docs/protocol.md)."""
+"""Hello: a board's self-description, and the counters that it reports while it is sent (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contactfpga_sim.model.golden.scan import Scan
 KIND = 4
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255
 DIGITS = range(16, 32)
-"""Where the digits lie, counted from the delimiter in front."""
+"""Positions of the digits, counted from the leading delimiter."""
 
 
 def hello(facts: Facts, digits: Sequence[int] = (0,) * len(DIGITS)) -> bytes:
@@ -56,7 +56,7 @@ def _units(facts: Facts) -> bytes:
 
 
 class State:
-    """The counters that a hello tells, by cycle."""
+    """The counters in a hello, by cycle."""
 
     def __init__(self, facts: Facts, scanned: Sequence[Scan], heard: Reception):
         self._facts = facts
@@ -64,8 +64,8 @@ class State:
         self._heard = heard
 
     def digit(self, place: int, cycle: int, sent: int, taken: int) -> int:
-        """The digit at a place of the state, if it is taken in ``cycle`` and the hello was in cycle ``taken``, when so
-        many frames had been sent."""
+        """The digit at a place of the state, read in ``cycle`` for a hello taken in cycle ``taken``, after this many
+        sent frames."""
         if place < 7:
             return sent // 128**place % 128
         if place < 11:

@@ -5,16 +5,12 @@ docs/timing.md: clusters and steps of ``run``, columns of ``serial``. Labellers 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 
 import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.model.golden import volume
-from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labelling, closed_flood, flood, moments
-
-StripClocks = Callable[[np.ndarray, int], tuple[np.ndarray, int, int]]
+from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labelling, Strips, closed_flood, flood, moments
 
 
 def labelling(
@@ -34,22 +30,19 @@ def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labelle
     return rule.frame(cells, connectivity)
 
 
-def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks, closed: bool = False) -> Labelling:
-    """The work of an exact labeller on an (R, C) bool frame; ``strip_clocks``: its rule for two adjacent rows."""
-    shape = cells.shape
-    above = np.vstack([np.zeros((1, shape[1]), bool), cells])
-    strips = [strip_clocks(above[y : y + 2], connectivity) for y in range(shape[0])]
+def exact(cells: np.ndarray, connectivity: int, strips: Strips, closed: bool = False) -> Labelling:
+    """The work of an exact labeller on an (R, C) bool frame; ``strips``: its clocks, ``LabellerRule.strips``."""
+    last_clock, busy, end = (clocks[0] for clocks in strips(cells[None], connectivity))
     labels, turned = closed_flood(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
-    above_labels = np.vstack([np.zeros((1, shape[1]), int), labels])
     departures = []
     for zone in range(1, len(turned) + 1):
-        row = min(int(np.nonzero(labels == zone)[0].max()) + 1, shape[0] - 1)
-        clock = strips[row][0][above_labels[row : row + 2] == zone].max()
-        departures.append(Departure(row, int(clock), *moments(labels, zone), turned[zone - 1]))
+        row = min(int(np.nonzero(labels == zone)[0].max()) + 1, len(cells) - 1)
+        columns = (labels[max(row - 1, 0) : row + 1] == zone).any(axis=0)
+        departures.append(Departure(row, int(last_clock[row, columns].max()), *moments(labels, zone), turned[zone - 1]))
     departures.sort(key=lambda zone: (zone.row, zone.clock))
     places = [(zone.row, zone.clock) for zone in departures]
     assert len(set(places)) == len(places), "two zones would leave in one clock"
-    return Labelling(tuple(busy for _, busy, _ in strips), strips[-1][2], tuple(departures))
+    return Labelling(tuple(busy.tolist()), int(end[-1]), tuple(departures))
 
 
 def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
@@ -57,73 +50,72 @@ def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[
     return labels, [0] * count
 
 
-def run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
-    when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
-    """
-    last_step, steps = cluster_steps(strip, connectivity)
+def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``LabellerRule.strips`` of ``run``, for every row of (N, R, C) bool frames."""
+    last_step, steps = _strips(frames, connectivity)
     return last_step + 2, steps + 1, steps + 3
 
 
-def closed_run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """The same where the ends meet: where cells are joined over the seam one more step joins the last cluster with the
-    first."""
-    last_step, steps = cluster_steps(strip, connectivity)
-    first, last = strip[:, 0], strip[:, -1]
-    if first.any() and last.any() if connectivity == 8 else (first & last).any():
-        steps += 1
-        last_step[:, -1][last] = steps
+def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same where the ends meet: a step more joins the last cluster with the first."""
+    last_step, steps = _strips(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    joined = ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0)
+    steps = steps + joined
+    last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
     return last_step + 2, steps + 1, steps + 3
 
 
-def cluster_steps(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
-    """For the (2, C) cells of two adjacent rows: the last step of each cell's cluster, and all steps.
-
-    The first is a (2, C) int array, 0 where nothing is pressed.
-    """
-    labels, count = flood(strip, connectivity)
-    clusters = sorted(range(1, count + 1), key=lambda cluster: np.nonzero(labels == cluster)[1].min())
-    last_step = np.zeros(strip.shape, int)
-    done = 0
-    for cluster in clusters:
-        done += max(runs(labels[0] == cluster), runs(labels[1] == cluster))
-        last_step[labels == cluster] = done
-    return last_step, done
-
-
-def runs(row: np.ndarray) -> int:
-    """Runs of adjacent pressed cells in a (C,) bool row."""
-    return int(row[0]) + int(np.sum(row[1:] & ~row[:-1]))
-
-
-def serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
-    when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
-
-    The first is a (2, C) int array, 0 where nothing is pressed.
-    """
-    labels, count = flood(strip, connectivity)
-    columns = [np.nonzero(labels == cluster)[1] for cluster in range(1, count + 1)]
-    first, last = [column.min() for column in columns], [column.max() for column in columns]
-    clocks = np.ones(strip.shape[1], int)
-    for x in range(strip.shape[1]):
-        begins = strip[:, x] & ~(strip[:, x - 1] if x else np.zeros(2, bool))
-        right_behind = x in first and x - 1 in last
-        clocks[x] += begins[0] or (begins[1] and right_behind)
-    done = np.cumsum(clocks)  # the clock of a column's last cell or run
-    leaves = np.zeros(strip.shape, int)
-    for cluster in range(count):
-        leaves[labels == cluster + 1] = done[last[cluster]] + 1
-    over = int(done[-1]) + 2
-    return leaves, over, over
+def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
+    """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    taken = frames | before
+    none = np.zeros(taken.shape[:2], bool)
+    steps, begun = np.zeros(none.shape, int), np.zeros(none.shape, int)
+    above, new = begun.copy(), begun.copy()
+    reached = np.zeros(frames.shape, int)
+    joins = []
+    for column in range(frames.shape[2]):
+        a, b, here = before[..., column], frames[..., column], taken[..., column]
+        a_left, b_left, here_left = (array[..., column - 1] if column else none for array in (before, frames, taken))
+        joined = here & here_left if connectivity == 8 else (a & a_left) | (b & b_left)
+        joins.append(joined)
+        begun = np.where(joined, begun, steps)
+        above = np.where(joined, above, 0) + (a & ~a_left)
+        new = np.where(joined, new, 0) + (b & ~b_left)
+        steps = np.where(here, begun + np.maximum(above, new), steps)
+        reached[..., column] = steps
+    for column in range(frames.shape[2] - 2, -1, -1):
+        reached[..., column] = np.where(joins[column + 1], reached[..., column + 1], reached[..., column])
+    return reached, steps
 
 
-def closed_serial_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """The same where the ends meet: two clocks more after the last column if cells are joined over the seam."""
-    leaves, busy, end = serial_clocks(strip, connectivity)
-    first, last = strip[:, 0], strip[:, -1]
-    seam = 2 if (first.any() and last.any() if connectivity == 8 else (first & last).any()) else 0
-    leaves[:, -1][last] += seam
+def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
+    above = np.zeros_like(frames)
+    above[:, 1:] = frames[:, :-1]
+    above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
+    more = above & ~above_left
+    if connectivity == 4:
+        more |= frames & ~left & above_left & ~above
+        joined = frames & left | above & above_left
+    else:
+        joined = (frames | above) & (left | above_left)
+    leaves = np.cumsum(1 + more, axis=2) + 1
+    busy = leaves[..., -1] + 1
+    for column in range(frames.shape[2] - 2, -1, -1):
+        leaves[..., column] = np.where(joined[..., column + 1], leaves[..., column + 1], leaves[..., column])
+    return leaves * (frames | above), busy, busy
+
+
+def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """:func:`serial_clocks` where the ends meet."""
+    leaves, busy, end = serial_clocks(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    seam = 2 * (ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
+    leaves[..., -1] += seam * (before | frames)[..., -1]
     return leaves, busy + seam, end + seam
 
 
@@ -139,7 +131,7 @@ def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
         for left, right in _runs(np.any(cells[first:past], axis=0)):
             box = np.zeros_like(cells)
             box[first:past, left:right] = cells[first:past, left:right]
-            departures.append(Departure(closing, right + 2, *_moments(box)))
+            departures.append(Departure(closing, right + 2, *moments(box, 1)))
     return _work(walks, columns, departures)
 
 
@@ -148,7 +140,7 @@ def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
     rows, columns = cells.shape
     any_pressed = bool(cells.any())
     walks = [*np.any(cells[:-1], axis=1).tolist(), any_pressed]
-    departures = [Departure(rows - 1, columns + 2, *_moments(cells))] if any_pressed else []
+    departures = [Departure(rows - 1, columns + 2, *moments(cells, 1))] if any_pressed else []
     return _work(walks, columns + 1, departures)
 
 
@@ -164,25 +156,15 @@ def _runs(line: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _moments(cells: np.ndarray) -> tuple[int, int, int]:
-    y, x = np.nonzero(cells)
-    return len(x), int(x.sum()), int(y.sum())
-
-
 PROJECTION = LabellerRule(projection)
 SINGLE = LabellerRule(single)
 
 
-RUN = LabellerRule(
-    functools.partial(exact, strip_clocks=run_clocks),
-    volume.run_clocks,
-    LabellerRule(functools.partial(exact, strip_clocks=closed_run_clocks, closed=True), volume.closed_run_clocks),
-)
-SERIAL = LabellerRule(
-    functools.partial(exact, strip_clocks=serial_clocks),
-    volume.serial_clocks,
-    LabellerRule(
-        functools.partial(exact, strip_clocks=closed_serial_clocks, closed=True),
-        volume.closed_serial_clocks,
-    ),
-)
+def _exact_rule(strips: Strips, closed: Strips) -> LabellerRule:
+    """The rule of an exact labeller with these clocks, on a plane and where the sheet's ends meet."""
+    around = LabellerRule(functools.partial(exact, strips=closed, closed=True), closed)
+    return LabellerRule(functools.partial(exact, strips=strips), strips, around)
+
+
+RUN = _exact_rule(run_clocks, closed_run_clocks)
+SERIAL = _exact_rule(serial_clocks, closed_serial_clocks)

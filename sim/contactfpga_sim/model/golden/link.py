@@ -1,5 +1,5 @@
-"""Link: hellos, reports of faults, frames and readings of units share the wire; the newest complete frame waits, and
-the newest sweep of all units. Several sheets share one line, round-robin."""
+"""Link: hellos, fault reports, frames and unit readings share the wire; the newest complete frame waits, and the newest
+sweep of all units. Several sheets share one line, round-robin."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from contactfpga_sim.model.golden.hello import DIGITS, State, hello
 
 
 class Sender(Protocol):
-    """A sheet's link, as the line sees it."""
+    """A sheet's link as the line sees it."""
 
     def waits_from(self, cycle: int) -> int | None:
-        """The cycle from which on something waits, as far as is known in ``cycle``; None: nothing does."""
+        """The cycle from which a packet waits, as known in ``cycle``; None: none."""
 
     def take(self, taken: int, cycle: int) -> None:
-        """Send what is next from the cycle ``taken`` on."""
+        """Send the next packet from the cycle ``taken`` on."""
 
 
 class SharedLine:
-    """Asks one sheet per cycle, round and round, until the one asked sends a packet; then the next one is asked.
+    """Asks one sheet per cycle, round-robin, until one sends a packet; then the next is asked.
 
-    Each sheet's time moves forward by :meth:`advance`. What the line takes is known up to the cycle that all of them
-    have reached, so whoever is ahead waits there for the threads of the others.
+    Each sheet's time advances by :meth:`advance`. The line is known up to the cycle that all have reached, so a sheet's
+    thread that is ahead waits for the others.
     """
 
     def __init__(self, sheets: int):
         self.links: dict[int, Sender] = {}
-        """By the number of the sheet."""
+        """Links by sheet number."""
         self.idle_from = 0
-        """The cycle from which on a packet can be taken."""
+        """The cycle from which a packet can be taken."""
         self.uart_from = 0
-        """The cycle from which on a byte can be handed over."""
+        """The cycle from which a byte can be handed over."""
         self._sheets = sheets
         self._first_asked = 0
         """The sheet asked in the cycle ``idle_from``."""
@@ -44,19 +44,19 @@ class SharedLine:
         self._changed = threading.Condition()
 
     def advance(self, number: int, cycle: int) -> None:
-        """Let the line take what it takes up to and including ``cycle``."""
+        """Advance the line up to and including ``cycle``."""
         with self._changed:
             self._reach(number, cycle)
             while min(self._reached) < cycle:
                 self._changed.wait()
 
     def leave(self, number: int) -> None:
-        """A sheet's time is over: nobody waits for it any more."""
+        """A sheet has ended: nobody waits for it any more."""
         with self._changed:
             self._reach(number, math.inf)
 
     def _reach(self, number: int, cycle: float) -> None:
-        """Nobody but this sheet moves on to a cycle that is not yet reached by all, so their links stand still."""
+        """Advance this sheet alone to a cycle that not all have reached; all links stand still meanwhile."""
         before, self._reached[number] = min(self._reached), cycle
         known = min(self._reached)
         if known > before or self._sheets == 1:
@@ -75,7 +75,7 @@ class SharedLine:
             self.links[number].take(taken, known)
 
     def _first(self, number: int, known: int) -> tuple[int, int] | None:
-        """When something of this sheet is taken, if nothing of another one is before; and the sheet."""
+        """When this sheet's packet is taken, if no other's is earlier; and the sheet."""
         wait = self.links[number].waits_from(known)
         if wait is None:
             return None
@@ -85,11 +85,11 @@ class SharedLine:
 
 
 class Link:
-    """Who takes the wire when. Time only moves forward, by :meth:`advance`.
+    """Order of packets on the wire. Time only advances, by :meth:`advance`.
 
-    ``told``: what the scan knows of its lines, which must be known up to the cycle of each :meth:`advance`; in the end
-    up to that of :meth:`finish`. ``units``: (cycle from which on it waits, packet) of each sweep, the next one of which
-    takes its place. ``line``: that it shares with other links; by default it is its own.
+    ``told``: the scan's fault words, known up to the cycle of each :meth:`advance`; finally up to that of
+    :meth:`finish`. ``units``: (cycle from which it waits, packet) of each sweep, replaced by the next. ``line``: shared
+    with other links; by default its own.
     """
 
     def __init__(
@@ -103,33 +103,32 @@ class Link:
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
         self.sent = 0
-        """Frames the wire has taken so far."""
+        """Frames sent so far."""
         self._facts = facts
         self._state = state
         self._byte_clocks = 10 * facts.bit_clocks
         self._hellos: list[int] = []
         self._blank: list[tuple[int, int, int]] = []
-        """Hellos whose state is not filled in: where they begin in ``bytes``, when they were taken, how many frames
-        had been sent."""
+        """Hellos without their state: position in ``bytes``, cycle taken, frames sent by then."""
         self._frame: tuple[int, bytes] | None = None
         self._reports = Reports(facts, told or FaultHistory()) if facts.fault_bits else None
         self._reported: list[int] = []
-        """Where reports begin in ``bytes``; they are not filled in either."""
+        """Positions in ``bytes`` of reports, not yet filled in."""
         self._after_report = -1
-        """The cycle from which on the wire was idle after the last one, or after a slot of the self-test."""
+        """The cycle from which the wire was idle after the last report or self-test slot."""
         self._slot: tuple[int, bytes] | None = None
         self._slot_over: int | None = None
         self._units = units
         self._swept = 0
-        """Sweeps that were taken, or replaced by one that was."""
+        """Sweeps sent, or replaced by a sent one."""
         self._frames_since = 0
-        """Frames that went since the last sweep did."""
+        """Frames sent since the last sweep."""
         self._line = line or SharedLine(1)
         self._number = 0 if facts.place is None else facts.place[0]
         self._line.links[self._number] = self
 
     def want_hello(self, cycle: int) -> None:
-        """A hello waits from ``cycle`` on; one hello answers all that wait when it is taken."""
+        """A hello waits from ``cycle`` on; one hello answers all requests until it is taken."""
         self._hellos.append(cycle)
 
     def offer(self, cycle: int, packet: bytes) -> None:
@@ -138,7 +137,7 @@ class Link:
         self._frame = (cycle, packet)
 
     def drop(self) -> bool:
-        """Drop the frame that waits; tells whether there was one."""
+        """Drop the waiting frame; returns whether there was one."""
         waited = self._frame is not None
         self._frame = None
         return waited
@@ -150,16 +149,16 @@ class Link:
         self._slot_over = None
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which the slot was taken as a whole, if that is not after ``cycle``."""
+        """The cycle in which the slot was completely taken, if not after ``cycle``."""
         self.advance(cycle)
         return self._slot_over if self._slot_over is not None and self._slot_over <= cycle else None
 
     def advance(self, cycle: int) -> None:
-        """Let the wire take what it takes up to and including ``cycle``."""
+        """Advance the wire up to and including ``cycle``."""
         self._line.advance(self._number, cycle)
 
     def waits_from(self, cycle: int) -> int | None:
-        """The cycle from which on something waits, as far as is known in ``cycle``."""
+        """The cycle from which a packet waits, as known in ``cycle``."""
         due = self._due(cycle)
         frame_from = [self._frame[0]] if self._frame else []
         slot_from = [self._slot[0]] if self._slot else []
@@ -167,7 +166,7 @@ class Link:
         return min((*self._hellos, *frame_from, *slot_from, *([] if due is None else [due]), *swept), default=None)
 
     def take(self, taken: int, cycle: int) -> None:
-        """Have the wire take what is next in the cycle ``taken``, as far as is known in ``cycle``."""
+        """Take the next packet in the cycle ``taken``, as known in ``cycle``."""
         due = self._due(cycle)
         if self._hellos and min(self._hellos) <= taken:
             self._hellos = [wait for wait in self._hellos if wait > taken]
@@ -189,8 +188,8 @@ class Link:
         return self._reports.due(cycle) if self._reports and self._line.idle_from <= cycle else None
 
     def finish(self, cycle: int) -> None:
-        """Let the wire take what it takes up to ``cycle``, and fill in the state of the hellos, now that all is known
-        that came while they went out."""
+        """Advance the wire up to ``cycle``, and fill in the hellos' state, now that all inputs during them are
+        known."""
         self.advance(cycle)
         for begin, taken, sent in self._blank:
             self._fill_in(begin, taken, sent)
@@ -200,7 +199,7 @@ class Link:
             self.bytes[begin : begin + len(handed)] = list(zip(handed, self._reports.packet(handed), strict=True))
 
     def _frame_is_next(self, cycle: int) -> bool:
-        """One that waits is, where a report has just been sent."""
+        """Whether a waiting frame is next, right after a report."""
         return cycle == self._after_report and self._frame is not None and self._frame[0] <= cycle
 
     def _send_report(self, taken: int) -> None:
@@ -212,7 +211,7 @@ class Link:
         self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._line.idle_from)
 
     def _sweep_is_next(self, cycle: int) -> bool:
-        """One that waits is, after four frames."""
+        """Whether a waiting sweep is next, after four frames."""
         waits = self._swept < len(self._units) and self._units[self._swept][0] <= cycle
         return waits and self._frames_since >= 4
 
@@ -224,7 +223,7 @@ class Link:
         self._send(taken, packet)
 
     def _send_slot(self, taken: int, packet: bytes) -> None:
-        """It is over in the cycle after the last byte before its check was handed over."""
+        """Send a slot; it is over in the cycle after the handover of the last byte before its check."""
         assert self._reports is not None
         begin, self._slot = len(self.bytes), None
         self._send(taken, packet)
@@ -239,7 +238,7 @@ class Link:
         self._send(taken, hello(self._facts))
 
     def _fill_in(self, begin: int, taken: int, sent: int) -> None:
-        """Each digit is taken in the cycle after the transfer of the byte before it."""
+        """Fill in a hello's digits, each read in the cycle after the transfer of the byte before it."""
         before = (self.bytes[begin + place - 1][0] for place in DIGITS)
         digits = [self._state.digit(place, at + 1, sent, taken) for place, at in enumerate(before)]
         packet = hello(self._facts, digits)

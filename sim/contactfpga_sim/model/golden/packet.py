@@ -1,17 +1,17 @@
-"""Packet: plain bytes to what goes over the wire, with their stuffing and check."""
+"""Packet: plain bytes to bytes on the wire, with stuffing and check."""
 
 from __future__ import annotations
 
 
 class Packet:
-    """A packet while it is packed: COBS blocks fill up."""
+    """A packet being packed: COBS blocks fill up."""
 
     def __init__(self) -> None:
         self._plain = bytearray()
         self._block = 0
 
     def push(self, plain: bytes) -> int:
-        """Pack bytes; returns the cycles that takes."""
+        """Pack bytes; returns the cycles that this needs."""
         cycles = 0
         for byte in plain:
             cycles += 1
@@ -23,8 +23,8 @@ class Packet:
         return cycles
 
     def wire(self, before: bytes = b"", after: bytes = b"") -> bytes:
-        """The packet as it goes over the wire: stuffed, then ``after``, check bytes, delimiter. The check covers
-        ``before`` as well."""
+        """The packet as on the wire: stuffed bytes, ``after``, check bytes, delimiter. The check covers ``before`` as
+        well."""
         stuffed = stuff(bytes(self._plain)) + after
         return stuffed + check(stuffed, before) + b"\0"
 

@@ -1,4 +1,4 @@
-"""The raster scan: which cells are sampled when, the contact pin, stuck columns, checks of guard lines, device time."""
+"""The raster scan: samples and their cycles, contact pin, stuck columns, guard-line checks, device time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga_sim.model.golden.trace import Timeline
 
 
 class Raster(ScanRule):
-    """Row after row, each for the same time."""
+    """Row after row, each of the same duration."""
 
     even = True
     waits = False
@@ -51,24 +51,24 @@ RASTER = Raster()
 
 
 def strobe(facts: Facts, slot: int) -> int:
-    """The cycle in which the sample of a row slot has come through shift registers and synchronizers."""
+    """The cycle in which a slot's sample has passed shift registers and synchronizers."""
     return sampled(facts, slot) + 2 + facts.column_shift
 
 
 def sampled(facts: Facts, slot: int) -> int:
-    """The cycle whose column levels count for the row of a slot."""
+    """The cycle whose column levels count for a slot."""
     return facts.row_shift + slot * facts.row_clocks + facts.settle - 1
 
 
 def _asked_before(facts: Facts, slot: int) -> int:
-    """The cycle from which on a request comes too late for a frame that begins with this slot."""
+    """The cycle from which a request is too late for a frame that begins with this slot."""
     if facts.samples_early:
         return facts.row_shift + slot * facts.row_clocks
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
 
 
 def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
-    """The first ``count`` scans, with the requests in the order in which they were received."""
+    """The first ``count`` scans, with the requests in order of reception."""
     result = []
     for index in range(count):
         slots = row_slots(facts, index)
@@ -112,30 +112,31 @@ def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
 
 
 def row_slots(facts: Facts, frame: int) -> range:
-    """The slots of a frame's rows; a guard row has the one before them."""
+    """The slots of a frame's rows; a guard row has the slot before them."""
     end = (frame + 1) * facts.row_lines
     return range(end - facts.rows, end)
 
 
 def _row(facts: Facts, slot: int) -> int:
-    """The row of a slot, counting a guard row as the last one."""
+    """The row of a slot, a guard row counting as the last."""
     return (slot - (facts.row_lines - facts.rows)) % facts.row_lines
 
 
 def _line(facts: Facts, slot: int) -> int:
-    """The line that is driven in a slot."""
+    """The driven line of a slot."""
     return (*(facts.skin.row_order or range(facts.rows)), facts.rows)[_row(facts, slot)]
 
 
 def _read(facts: Facts, timeline: Timeline, slot: int, ahead: int = 0) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed in a slot, sampled some clocks ahead of the settle time's end."""
+    """(column lines,) bool: columns that read pressed in a slot, sampled ``ahead`` clocks before the settle time's
+    end."""
     cycle = sampled(facts, slot) - ahead
     return np.asarray(closed(facts, timeline, cycle)[_row(facts, slot)] | stuck(facts, timeline, cycle))
 
 
 def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed while no row was driven, from the sample before the frame's first
-    slot to the one before its last."""
+    """(column lines,) bool: columns that read pressed with no row driven, from the sample before the frame's first slot
+    to the one before its last."""
     columns = np.zeros(facts.column_lines, bool)
     for slot in range(max(0, frame * facts.row_lines), (frame + 1) * facts.row_lines):
         if slot:
@@ -144,8 +145,8 @@ def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
 
 
 def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Request] = ()) -> list[Changes]:
-    """By frame what is told of faulty lines: (cycle, word) of each check, the last one at the frame's end. Rows are not
-    checked in a frame that is sampled early."""
+    """By frame the reported faults: (cycle, word) of each check, the last at the frame's end. A frame sampled early has
+    no row checks."""
     if not facts.skin.guard:
         return [[]] * count
     told, result = FaultyLines(facts), []
@@ -167,8 +168,8 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
 
 
 def _renews(facts: Facts, frame: int) -> bool:
-    """Whether a frame's checks end what is told no more: the clock in us passed a multiple of 2^16 in the frame before,
-    which ends with its last row's strobe."""
+    """Whether a frame's checks end obsolete reports: the us clock passed a multiple of 2^16 in the frame before, which
+    ends with its last row's strobe."""
     late = facts.column_shift + (facts.rows - 1) * facts.row_clocks
 
     def retries(ended: int) -> int:

@@ -1,5 +1,4 @@
-"""Requests and commands: what the host sends, what the board takes for one, and which number it repeats
-(docs/protocol.md)."""
+"""Requests and commands: the host's bytes, the board's interpretation, and the number it repeats (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -16,26 +15,26 @@ _CHECK_BYTES = 3
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """A request, taken in ``cycle``."""
+    """A request, accepted in ``cycle``."""
 
     cycle: int
     number: int
     hello: bool
-    """It asks for one."""
+    """Whether it requests a hello."""
     command: tuple[int, int] | None = None
     """(what, value) of a command."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Reception:
-    """What the board makes of the bytes at its receive pin."""
+    """The board's reading of the bytes at its receive pin."""
 
     requests: list[Request]
     numbers: list[tuple[int, int]]
-    """(cycle, number) of every change of the number that a hello repeats."""
+    """(cycle, number) of every change of the number in a hello."""
 
     def number(self, cycle: int) -> int:
-        """The number that a hello repeats whose digit is taken in ``cycle``."""
+        """The number in a hello whose digit is read in ``cycle``."""
         index = bisect.bisect_right(self.numbers, cycle, key=lambda change: change[0])
         return self.numbers[index - 1][1] if index else 0
 
@@ -43,13 +42,13 @@ class Reception:
 def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"", kind: int = KIND) -> bytes:
     """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit.
 
-    ``closing``: that of the sheet, among several ones, that it is for. Of another ``kind`` it is none.
+    ``closing``: the addressed sheet's, among several. Another ``kind`` makes it no request.
     """
     return _sent(_digits(number, 3) + bytes([kind << 4 | hello]), bit_clocks, closing)
 
 
 def command(number: int, what: int, value: int = 0, hello: bool = False, bit_clocks: int = 4) -> bytes:
-    """A command likewise."""
+    """A command as on the wire, with a delimiter at either end."""
     plain = _digits(number, 3) + _digits(what, 1) + _digits(value, 3)
     return _sent(plain + bytes([COMMAND_KIND << 4 | hello]), bit_clocks)
 
@@ -66,16 +65,15 @@ def _sent(plain: bytes, bit_clocks: int, closing: bytes = b"") -> bytes:
 
 
 def pulses(data: bytes) -> bytes:
-    """The same bytes as a board takes them whose bits are too short: a byte for each bit, lowest first, and one for
-    each zero byte."""
+    """The bytes for a board whose bits are too short: a byte for each bit, lowest first, and one for each zero byte."""
     mark, one, zero = b"\xf0", b"\xff", b"\x00"
     parts = [[one if bit == "1" else zero for bit in f"{value:08b}"[::-1]] if value else [mark] for value in data]
     return b"".join(b"".join(part) for part in parts)
 
 
 def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
-    """A request at each cycle, numbered as a host does; every other one asks for a hello. Those that would begin within
-    the one before are left out."""
+    """A request at each cycle, numbered as a host does, every other one for a hello. Requests that would overlap are
+    omitted."""
     sent: list[tuple[int, bytes]] = []
     number = 129 * 128 + 1
     for cycle in cycles:
@@ -89,8 +87,8 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
 def heard(
     received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False, closing: bytes = b""
 ) -> Reception:
-    """Requests, and on a board that takes them ``commands``, among (cycle, bytes), each of which begin at the pin back
-    to back in that cycle; ``closing``: of those for this one of several sheets."""
+    """Requests and supported ``commands`` in (cycle, bytes), which begin back to back at the pin in that cycle;
+    ``closing``: this sheet's among several."""
     found = Reception([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):
@@ -110,7 +108,7 @@ def heard(
 
 
 def _read(packet: list[int], cycle: int, commands: bool, closing: bytes) -> Request | None:
-    """The request that a packet is, if it is one. Where there are commands, bit 3 of the first byte tells them."""
+    """The request in a packet, if any. With commands, bit 3 of the first byte marks them."""
     is_command = commands and packet[:1] != [] and bool(packet[0] & 8)
     stuffed, kind = (9, COMMAND_KIND) if is_command else (5, KIND)
     checked = stuffed + len(closing)

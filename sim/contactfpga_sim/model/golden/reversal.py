@@ -1,4 +1,4 @@
-"""The scan by line reversal: when the board listens to the rows, which rows it drives then, and the contact pin."""
+"""The scan by line reversal: when rows are read, which rows are then driven, and the contact pin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contactfpga_sim.model.golden.scan import Changes, Play, Rows, Scan, ScanOut
 
 @dataclasses.dataclass(frozen=True)
 class Slot:
-    """A row is driven from cycle ``begin`` to cycle ``end``; its columns are sampled in the last one, or earlier."""
+    """A row driven from cycle ``begin`` to cycle ``end``; its columns are sampled in the last one, or earlier."""
 
     row: int
     begin: int
@@ -25,17 +25,17 @@ class Slot:
 
     @property
     def strobe(self) -> int:
-        """When the sample has come through the synchronizer."""
+        """The cycle in which the sample has passed the synchronizer."""
         return self.sample + 2
 
 
 class RowOffers:
-    """Which rows of a frame are offered: where zones are found those that were driven, each with an empty one after it
-    whose neighbor is not; otherwise all."""
+    """Rows of a frame that are offered: with zones the driven rows, each followed by an empty one if its next neighbor
+    is not driven; otherwise all."""
 
     def __init__(self, facts: Facts, rows: Rows):
         self.taken = 0
-        """The cycle in which the last one was taken."""
+        """The cycle in which the last row was taken."""
         self._facts = facts
         self._rows = rows
         self._place = 0
@@ -69,13 +69,13 @@ class RowOffers:
 
 
 class ReversalScanModel:
-    """Goes through a timeline frame by frame; the stages say when they take a row and a frame."""
+    """Runs through a timeline frame by frame; the stages decide when a row and a frame are taken."""
 
     def __init__(self, play: Play):
         facts = play.facts
         self.slots: list[Slot] = []
         self.begun: list[int] = []
-        """For each frame the cycle in which the rows count, as the synchronizer shows them."""
+        """For each frame the cycle in which the rows count, after the synchronizer."""
         self.contact: Changes = []
         self._facts = facts
         self._timeline = play.timeline
@@ -121,8 +121,8 @@ class ReversalScanModel:
     # ---- when a frame begins
 
     def _begin(self) -> int:
-        """Rows have been let go for long enough, and the frame before is packed; and on an untouched sheet something is
-        touched or a frame is wanted."""
+        """The start of the next frame: rows were released long enough, and the frame before is packed; for an untouched
+        sheet, also a touch or a wanted frame."""
         project = self._facts.project
         if not self._rests:
             return self._after_tests(max(self._listens + project + 1, self._packed))
@@ -151,14 +151,14 @@ class ReversalScanModel:
             begin = self._listens + project + 1
 
     def _after_tests(self, begin: int) -> int:
-        """A frame would begin in this cycle, but slots of the self-test that are wanted by then come before."""
+        """The start of a frame planned for this cycle, after the self-test slots that are wanted by then."""
         while self._test_asked(begin, begin) is not None:
             self._test_at(begin)
             begin = self._listens + self._facts.project + 1
         return begin
 
     def _test_asked(self, begin: int, until: int) -> int | None:
-        """The first cycle from ``begin`` to ``until`` in which a slot of the self-test can begin and is wanted."""
+        """The first cycle from ``begin`` to ``until`` in which a wanted self-test slot can begin."""
         begin = max(begin, self._packed)
         asked = self.test.asked(until) if self.test and begin <= until else None
         return None if asked is None else max(asked, begin)
@@ -171,20 +171,20 @@ class ReversalScanModel:
 
     @property
     def _word(self) -> int:
-        """What is told of lines."""
+        """The current fault word."""
         joined = self.test is not None and self.test.joined
         checked = self._facts.fault_bits - 1 if joined else 0
         return (self.checks.word if self.checks else 0) | joined << checked
 
     def _watch(self, begin: int, end: int) -> None:
-        """The sheet rests in these cycles; without guard lines that is told now and then."""
+        """The sheet rests in these cycles; without guard lines that is reported now and then."""
         period = reversal_lines.CHECK_US * self._facts.clocks_per_us
         if not self.checks:
             for cycle in range(-(-begin // period) * period, end + 1, period):
                 self._stages.watch(cycle)
 
     def _wake(self, touched: int) -> int:
-        """A row reads touched in this cycle; returns the one in which it is seen."""
+        """The cycle in which a touched row of this cycle is seen."""
         seen = touched + 2
         self._held.cut(seen)
         if self._touched(touched) & self._clean_rows():
@@ -192,28 +192,28 @@ class ReversalScanModel:
         return seen
 
     def _listen_after(self, checked: int, guard_is_stuck: bool) -> None:
-        """A check had its sample in this cycle."""
+        """A check was sampled in this cycle."""
         if guard_is_stuck:
             self._held.guard_found(checked + 2)
         self._listens = checked + 2
         self._stages.tell(checked + 3, self._word)
 
     def _wanted(self) -> int:
-        """The first cycle in which a frame is, though nothing is touched."""
+        """The first cycle in which a frame is wanted without a touch."""
         before = self.begun[-1]
         if self._facts.skin.send == "always":
             return before + 1
         return max(before + 1, min([*(one.cycle + 1 for one in self._waiting()), self._stages.due]))
 
     def _waiting(self) -> list[Request]:
-        """Requests that no frame has answered."""
+        """Requests not yet answered by a frame."""
         before = self.begun[-1] if self.begun else 0
         return [one for one in self._requests if one.cycle >= before]
 
     # ---- what the sheet shows while the board listens
 
     def _touched(self, cycle: int) -> frozenset[int]:
-        """Rows that read touched at the pins and are not masked whole."""
+        """Rows that read touched at the pins, without fully masked ones."""
         facts = self._facts
         driven = ~self._held.undriven(cycle) & ~stuck(facts, self._timeline, cycle)
         lines = closed(facts, self._timeline, cycle)[: facts.rows] & driven
@@ -231,7 +231,7 @@ class ReversalScanModel:
     # ---- rows that are driven
 
     def _drive(self, begun: int, todo: list[int], rows: Rows, cells: np.ndarray) -> np.ndarray:
-        """Drives the rows and fills in ``cells``; returns (R, C) bool: what counts, debounced."""
+        """Drive the rows and fill in ``cells``; returns the (R, C) bool debounced cells."""
         facts = self._facts
         counted = np.zeros_like(cells)
         offers = RowOffers(facts, rows)
@@ -269,7 +269,7 @@ class ReversalScanModel:
 
 
 class Reversal(ScanRule):
-    """Line reversal: the rows that read touched, one by one."""
+    """Line reversal: the touched rows, one by one."""
 
     even = False
     waits = True

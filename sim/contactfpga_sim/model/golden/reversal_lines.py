@@ -1,5 +1,5 @@
-"""Line reversal: what the scan learns of its lines. Which columns are stuck, and so not driven; when rows and columns
-are checked with guard lines; when the self-test has its slots, and what they read."""
+"""Fault knowledge of line reversal: stuck columns, which are not driven; guard checks of rows and columns; slots of the
+self-test and their readings."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from contactfpga_sim.model.golden.scan import Stages
 from contactfpga_sim.model.golden.trace import Timeline
 
 LOOKS = 4
-"""Of a window, each ``apart`` cycles after the one before or later."""
+"""Sample times of a window, each at least ``apart`` cycles after the one before."""
 
 
 @dataclasses.dataclass(frozen=True)
 class _State:
-    """After a cycle."""
+    """State after a cycle."""
 
     cycle: int
     count: int
-    """Of the window, each cycle; but it stands still before each of the :data:`LOOKS` until this comes."""
+    """Cycles of the window; it stops before each of the :data:`LOOKS` until this happens."""
     low: np.ndarray
-    """(C,) bool: columns that read pressed at each look of the window."""
+    """(C,) bool: columns that read pressed at each sample of the window."""
     stuck: np.ndarray
-    """(C,) bool."""
+    """(C,) bool: columns found stuck."""
     asked: bool = False
-    """In the next window stuck columns are driven."""
+    """Whether stuck columns are driven in the next window."""
     tries: bool = False
-    """They are in this one."""
+    """Whether stuck columns are driven in this window."""
 
     @property
     def let_go(self) -> np.ndarray:
@@ -42,7 +42,7 @@ class _State:
 
 
 class StuckColumns:
-    """Goes through a timeline with the scan, which tells when it looks at the columns; cycles rise."""
+    """Runs through a timeline with the scan, which reports when it samples the columns; cycles rise."""
 
     def __init__(self, facts: Facts, timeline: Timeline):
         self._facts = facts
@@ -57,13 +57,13 @@ class StuckColumns:
         self._guard: list[int] = []
 
     def rests(self, begin: int, end: int) -> None:
-        """Each of these cycles is a look."""
+        """Sample in each of these cycles."""
         if begin <= end:
             self._go_to(self._passed(begin - 1))
             self._rest(end)
 
     def cut(self, cycle: int) -> None:
-        """The last rest ends with this cycle of it."""
+        """The last rest ends with this cycle."""
         while self._states[-1].cycle > cycle:
             self._states.pop()
         while self._moved and self._moved[-1] > cycle:
@@ -71,25 +71,25 @@ class StuckColumns:
         self._rest(cycle)
 
     def look(self, cycle: int) -> None:
-        """One; nothing if it was one of a rest."""
+        """Sample in this cycle, unless it belongs to a rest."""
         if self._states[-1].cycle < cycle:
             self._go_to(self._passed(cycle - 1))
             self._go_to(self._looked(self._states[-1]))
 
     def guard_found(self, cycle: int) -> None:
-        """The guard column reads pressed in a check, as the gateware sees in this cycle."""
+        """The guard column reads pressed in a check, as seen in this cycle."""
         self._guard.append(cycle)
 
     def at(self, cycle: int) -> np.ndarray:
-        """(column lines,) bool: columns that are stuck in this cycle."""
+        """(column lines,) bool: columns stuck in this cycle."""
         return self._with_guard(self._after(cycle - 1).stuck, cycle - 1)
 
     def undriven(self, cycle: int) -> np.ndarray:
-        """(column lines,) bool: those that are not driven at the pins."""
+        """(column lines,) bool: columns not driven at the pins."""
         return self._with_guard(self._after(cycle - 2).let_go, cycle - 2)
 
     def driven_anew(self, begin: int, end: int) -> list[int]:
-        """Cycles from ``begin`` to ``end`` in which the pins drive other columns than before."""
+        """Cycles from ``begin`` to ``end`` in which the driven columns change."""
         first = bisect.bisect_left(self._moved, begin - 2)
         return [cycle + 2 for cycle in self._moved[first:] if cycle + 2 <= end]
 
@@ -103,14 +103,14 @@ class StuckColumns:
         return self._states[max(index - 1, 0)]
 
     def _with_guard(self, columns: np.ndarray, cycle: int) -> np.ndarray:
-        """What is known after this cycle; a guard column is let go until the next retry."""
+        """Columns as known after this cycle; a stuck guard column is released until the next retry."""
         found = bisect.bisect_right(self._guard, cycle) - 1
         last = self._guard[found] if found >= 0 else 0
         held = found >= 0 and last // self._retry == cycle // self._retry and last % self._retry != 0
         return np.append(columns, np.full(self._facts.column_lines - self._facts.columns, held))
 
     def _passed(self, cycle: int) -> _State:
-        """No look up to this cycle."""
+        """The state without a sample up to this cycle."""
         state = self._states[-1]
         waits = state.count // self._apart * self._apart + self._apart - 1
         count = min(state.count + cycle - state.cycle, waits)
@@ -122,7 +122,7 @@ class StuckColumns:
             self._go_to(self._alike(self._states[-1], end))
 
     def _alike(self, state: _State, end: int) -> _State:
-        """After all looks from the next one on that find the same, in the same window or in windows without news."""
+        """The state after all later samples with the same reading, in this window or in windows without changes."""
         first = state.cycle + 1
         later = [cycle + 2 for cycle in self._changes[bisect.bisect_right(self._changes, first - 2) :][:1]]
         later += [cycle + 4 for cycle in self._moved[-4:] if cycle + 4 > first]
@@ -149,8 +149,8 @@ class StuckColumns:
         return _State(cycle, 0, np.ones_like(low), found, asked=wraps, tries=state.asked)
 
     def _reads(self, cycle: int) -> np.ndarray:
-        """(C,) bool: columns that read pressed, as the synchronizer shows them: those that are stuck, and those that
-        are not driven and that a pressed switch leads to a row that no other column lifts."""
+        """(C,) bool: columns that read pressed after the synchronizer: stuck ones, and undriven ones that a pressed
+        switch joins to a row that no other column lifts."""
         facts, cycle = self._facts, cycle - 2
         held = stuck(facts, self._timeline, cycle)[: facts.columns]
         undriven = self.undriven(cycle)[: facts.columns] | ~self._present
@@ -160,11 +160,11 @@ class StuckColumns:
 
 
 CHECK_US = 2**8
-"""A sheet at rest is checked when the clock passes a multiple of this."""
+"""Interval of checks of a sheet at rest, by multiples of the clock."""
 
 
 class GuardChecks:
-    """Checks of columns and of rows, one after the other."""
+    """Guard checks of columns and rows, in turn."""
 
     def __init__(self, facts: Facts, timeline: Timeline, held: StuckColumns):
         self.slots: list[tuple[int, int]] = []
@@ -181,12 +181,12 @@ class GuardChecks:
 
     @property
     def word(self) -> int:
-        """What is told, from three cycles after the last check's sample on."""
+        """The fault word, from three cycles after the last check's sample on."""
         return self._told.word
 
     @property
     def asked(self) -> int:
-        """The cycle from which on a sheet at rest is checked."""
+        """The cycle from which a sheet at rest is checked."""
         period = CHECK_US * self._facts.clocks_per_us
         return (self._last // period + 1) * period + 1
 
@@ -198,7 +198,8 @@ class GuardChecks:
         return self._check(sample, sample + wait)
 
     def at_rest(self, cycle: int) -> tuple[int, bool]:
-        """The same for a sheet that rests in this cycle, the last one before the check."""
+        """The sheet rests in this cycle, the last before the check; returns the cycle of its sample, and whether it
+        finds the guard column stuck."""
         return self._check(cycle, cycle + self._facts.settle + (1 if self._of_rows else 2))
 
     def _check(self, start: int, sample: int) -> tuple[int, bool]:
@@ -231,7 +232,7 @@ class GuardChecks:
         return bool(self.word >> self._facts.rows + 2 * self._facts.columns)
 
     def _guard_reads(self, sample: int) -> bool:
-        """In a check of rows the guard column reads pressed: it is stuck, or not driven, and any row pulls it."""
+        """Whether the guard column reads pressed in a row check: it is stuck, or undriven and pulled by any row."""
         pulled = closed(self._facts, self._timeline, sample)[: self._facts.rows, -1].any()
         return bool(self._stuck(sample)[-1] or (pulled and self._held.undriven(sample)[-1]))
 
@@ -243,13 +244,13 @@ COMMAND = 1
 
 
 class SelfTestModel:
-    """Slot after slot: no line, each row, each column. After power-up at once, after a command as they go out."""
+    """Self-test slots: no line, each row, each column. At once after power-up; after a command as they are sent."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], stages: Stages):
         self.discharged: list[tuple[int, int]] = []
-        """(cycle, rows) of every change of the rows that are driven to the selecting level."""
+        """(cycle, rows) of every change of the rows driven to the selecting level."""
         self.joined = False
-        """What is told from three cycles after a slot's sample on."""
+        """Joined lines as reported from three cycles after a slot's sample on."""
         self._facts = facts
         self._timeline = timeline
         self._stages = stages
@@ -263,7 +264,7 @@ class SelfTestModel:
         self._rises = np.zeros(facts.rows + facts.columns, bool)
 
     def asked(self, until: int) -> int | None:
-        """The cycle from which on a slot is wanted, if that is not after ``until``."""
+        """The cycle from which a slot is wanted, if not after ``until``."""
         if self._waits:
             over = self._stages.slot_over(until)
             if over is None:
@@ -275,7 +276,7 @@ class SelfTestModel:
         return self._asked if self._asked is not None and self._asked <= until else None
 
     def slot(self, cycle: int) -> int:
-        """One begins in this cycle; returns that of its sample."""
+        """Begin a slot in this cycle; returns the cycle of its sample."""
         facts = self._facts
         let_go = cycle + 3 + facts.project
         sample = let_go + facts.settle
@@ -292,7 +293,7 @@ class SelfTestModel:
         return sample
 
     def _go_on(self, cycle: int) -> None:
-        """A slot is over in this cycle."""
+        """A slot ends in this cycle."""
         last = self._number == self._facts.rows + self._facts.columns
         self._number += 1
         self._asked, self._idle = (None if last else cycle + 1), cycle + 1
@@ -300,7 +301,7 @@ class SelfTestModel:
             self._start(cycle)
 
     def _start(self, cycle: int) -> None:
-        """Commands before this cycle start a test in it."""
+        """Start a test in this cycle if commands before it request one."""
         self._commands = [one for one in self._commands if one >= cycle]
         self._number, self._tells, self._asked = 0, True, cycle + 1
 

@@ -1,4 +1,4 @@
-"""What every scan is given, what it hands to the stages after it, and what it leaves at the pins."""
+"""A scan's inputs, its outputs to the later stages, and its effect on the pins."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ class Scan:
     cells: np.ndarray
     """(R, C) bool: raw samples, masked switches removed."""
     offered: list[int]
-    """Cycle at which each row is offered to the next stage."""
+    """Cycle in which each row is offered to the next stage."""
     stuck: int
-    """Columns that read pressed while no row was driven, without a guard column."""
+    """Number of columns, without a guard column, that read pressed while no row was driven."""
     time_us: int
-    """Device time of the first row's strobe, less what the columns were shifted; unbounded."""
+    """Device time of the first row's strobe, less the column shift; unbounded."""
     requested: bool
-    """A request came in since the scan before began."""
+    """Whether a request arrived since the previous scan began."""
     heard: int
-    """The lowest three bits of the last request's number before it began; 0 before the first one."""
+    """The lowest three bits of the last request's number before it began; 0 without any."""
     told: int
-    """From this cycle on a hello tells its stuck columns."""
+    """Cycle from which a hello reports its stuck columns."""
     slots: int
-    """Row times it took."""
+    """Its duration in row times."""
     alone: frozenset[int]
-    """Rows that were driven alone."""
+    """Rows driven alone."""
     faults: int = 0
-    """What was told of faulty lines when it ended: :attr:`contactfpga_sim.model.golden.guard.FaultyLines.word`."""
+    """Reported faults at its end: :attr:`contactfpga_sim.model.golden.guard.FaultyLines.word`."""
 
     motion: bool = False
-    """A row read touched as the frame began, and empty when it was driven."""
+    """A row read touched at the frame's beginning, but empty when driven."""
 
     @property
     def fault(self) -> bool:
-        """What its frame tells of faults."""
+        """Whether its frame has the fault flag."""
         return self.stuck > 0 or self.faults > 0
 
 
@@ -55,49 +55,49 @@ Changes = list[tuple[int, int]]
 
 @dataclasses.dataclass(frozen=True)
 class ScanOutput:
-    """What a scan does at the pins in the cycles it was asked for, and beyond."""
+    """A scan's pin changes in the cycles requested, and beyond."""
 
     contact: Changes
-    """Of the contact pin."""
+    """Changes of the contact pin."""
     driven: Changes
-    """Of the rows that are driven; bit r is row r."""
+    """Changes of the driven rows; bit r is row r."""
     beginnings: list[int]
-    """Cycles in which a frame begins, one of them beyond."""
+    """First cycles of frames, one of them beyond."""
 
 
 class Rows(Protocol):
-    """A frame's rows, for a scan that waits until each is taken."""
+    """A frame's rows, for a scan that waits for each transfer."""
 
     def take(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> int:
-        """A row of the sheet, its (C,) cells as they count, offered from a cycle on; ``alone``: it was driven. Returns
-        the cycle in which it is taken."""
+        """Offer a row of the sheet, (C,) debounced cells, from a cycle on; ``alone``: it was driven. Returns the cycle
+        of the transfer."""
 
     def end(self, one: Scan, cells: np.ndarray) -> int:
-        """All rows were taken, (R, C) ``cells`` in all; returns the cycle from which the next frame may begin."""
+        """All rows were taken, (R, C) ``cells``; returns the cycle from which the next frame may begin."""
 
 
 class Stages(Protocol):
-    """What comes after the scan."""
+    """The stages after the scan."""
 
     @property
     def due(self) -> int:
-        """The cycle from which on a frame is due, for a scan that waits."""
+        """The cycle from which a frame is due, for a scan that waits."""
 
     def tell(self, cycle: int, faults: int) -> None:
-        """From a cycle on, no earlier than any before, this is told of faulty lines. It is said before a frame of which
-        anything is on the wire in that cycle."""
+        """Report these faulty lines from a cycle on, no earlier than before. Call it before any frame with bytes on the
+        wire in that cycle."""
 
     def watch(self, cycle: int) -> None:
-        """In a cycle an untouched sheet was looked at, for a scan that waits."""
+        """An untouched sheet was checked in a cycle, for a scan that waits."""
 
     def slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
-        """A slot of the self-test, which read these lines as bits, goes out, from a cycle on."""
+        """Send a self-test slot, with read lines as bits, from a cycle on."""
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which it went out, if that is not after ``cycle``; all before must have been said."""
+        """The cycle in which the slot was sent, if not after ``cycle``; everything earlier must have been reported."""
 
     def frame(self, one: Scan, cells: np.ndarray) -> None:
-        """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
+        """All rows of a frame, ``cells`` (R, C) debounced; the scan does not wait."""
 
     def rows(self) -> Rows:
         """The next frame, row by row."""
@@ -105,12 +105,12 @@ class Stages(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class Play:
-    """What a scan goes through."""
+    """Inputs of a scan."""
 
     facts: Facts
     timeline: Timeline
     requests: Sequence[Request]
-    """In the order of their coming."""
+    """Requests in order of arrival."""
     cycles: int
     stages: Stages
 
@@ -120,18 +120,18 @@ class ScanRule(ScanTiming):
 
     @abc.abstractmethod
     def scan(self, play: Play) -> ScanOutput:
-        """The frames of all its cycles, or more; each is handed to its stages."""
+        """The frames of all its cycles, or more; each is passed to its stages."""
 
 
 def early_clocks(facts: Facts, requests: Sequence[Request], late: int) -> int:
-    """By how many clocks the samples of a frame come before the end of the settle time: it takes the commands over that
-    were received before cycle ``late``."""
+    """Clocks by which a frame's samples precede the end of the settle time, by the commands received before cycle
+    ``late``."""
     moved = [one.command[1] for one in requests if one.cycle < late and one.command and one.command[0] == 2]
     fits = moved and facts.samples_early and facts.first_sample <= moved[-1] < facts.settle
     return facts.settle - moved[-1] if fits else 0
 
 
 def last_number(requests: Sequence[Request], cycle: int) -> int:
-    """Of the last request that was received before ``cycle``; 0 if there was none."""
+    """Number of the last request before ``cycle``; 0 without any."""
     index = bisect.bisect_left(requests, cycle, key=lambda request: request.cycle)
     return requests[index - 1].number if index else 0

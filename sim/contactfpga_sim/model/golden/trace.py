@@ -1,4 +1,4 @@
-"""What goes in and what comes out: cells over time, and events at the stage boundaries."""
+"""Inputs and outputs: cells over time, and events at the stage boundaries."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact", "alive")
-"""Where model and gateware are compared, in the order the data takes; see :func:`boundaries`."""
+"""Boundaries at which model and gateware are compared, in order of the data; see :func:`boundaries`."""
 
 
 def boundaries(skin: Skin) -> tuple[str, ...]:
-    """Those of :data:`BOUNDARIES` that the board of a Skin has: items are apart from records where they are divided."""
+    """The :data:`BOUNDARIES` of a Skin's board: items differ from records if they are divided."""
     has = {"items": skin.report == "barycenter", "alive": skin.alive}
     return tuple(name for name in BOUNDARIES if has.get(name, True))
 
 
 @dataclasses.dataclass(frozen=True)
 class Cuts:
-    """Lines that are cut; a guard row counts as the last row, a guard column as the last column."""
+    """Cut lines; a guard row counts as the last row, a guard column as the last column."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """By row the column from which on its switches no longer reach its pin."""
+    """By row the first column whose switches no longer reach the row's pin."""
     columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """By column the row from which on its switches no longer reach its pin."""
+    """By column the first row whose switches no longer reach the column's pin."""
 
     def reach(self, row: int, column: int) -> bool:
-        """Whether a switch is still between two pins."""
+        """Whether a switch is still connected to both pins."""
         return column < self.rows.get(row, column + 1) and row < self.columns.get(column, row + 1)
 
 
 @dataclasses.dataclass(frozen=True)
 class Timeline:
-    """What happens at the pins of the board, from cycle 0 on.
+    """Inputs at the board's pins, from cycle 0 on.
 
-    ``pieces`` are (start cycle, cells, stuck): from that cycle on the (R, C) bool array ``cells`` is pressed,
-    and the (C,) bool array ``stuck`` (or None) tells the columns that read pressed whatever row is driven; with a guard
-    column it may be (C + 1,). Starts rise; before the first one nothing is pressed. ``received`` are (cycle, bytes):
-    bytes whose first start bit begins at the receive pin in that cycle, back to back; cycles rise, and those before are
-    over. ``units`` are (start cycle, readings): what the converter's inputs would read from that cycle on, 0 before the
-    first one. ``cuts`` are (start cycle, :class:`Cuts`) at rising starts; before the first one all lines are whole.
+    ``pieces`` are (start cycle, cells, stuck): from then on the (R, C) bool ``cells`` are pressed, and the (C,) bool
+    ``stuck`` columns (or None) read pressed whatever row is driven; with a guard column (C + 1,) is allowed. Starts
+    rise; before the first nothing is pressed. ``received`` are (cycle, bytes): bytes back to back at the receive pin,
+    whose first start bit begins in that cycle; cycles rise without overlap. ``units`` are (start cycle, readings) of
+    the converter's inputs, at first 0. ``cuts`` are (start cycle, :class:`Cuts`) at rising starts; at first all lines
+    are whole.
     """
 
     pieces: Sequence[tuple[int, np.ndarray, np.ndarray | None]]
@@ -80,7 +80,7 @@ class Timeline:
         stuck: Iterable[np.ndarray | None] | None = None,
         received: Sequence[tuple[int, bytes]] = (),
     ) -> Timeline:
-        """Each (R, C) frame, with its stuck columns if any, held for exactly one scan; the first one from power-up."""
+        """Each (R, C) frame, with its stuck columns if any, held for exactly one scan from power-up."""
         held = [np.asarray(cells, bool) for cells in frames]
         lines = list(stuck) if stuck is not None else [None] * len(held)
         first, scan = facts(skin).row_shift, facts(skin).scan_clocks
@@ -89,55 +89,55 @@ class Timeline:
         return cls(pieces, received)
 
     def at(self, cycle: int) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Cells and stuck columns in ``cycle``; None stands for none pressed."""
+        """Cells and stuck columns in ``cycle``; None: none pressed."""
         index = bisect.bisect_right(self._starts, cycle) - 1  # type: ignore[attr-defined]
         return (None, None) if index < 0 else (self.pieces[index][1], self.pieces[index][2])
 
     def cuts_at(self, cycle: int) -> Cuts:
-        """Lines that are cut in ``cycle``."""
+        """Cut lines in ``cycle``."""
         index = bisect.bisect_right(self._cut, cycle) - 1  # type: ignore[attr-defined]
         return Cuts() if index < 0 else self.cuts[index][1]
 
     def units_at(self, cycle: int, unit: int) -> int:
-        """What a unit would read in ``cycle``."""
+        """Reading of a unit in ``cycle``."""
         index = bisect.bisect_right(self._read, cycle) - 1  # type: ignore[attr-defined]
         return 0 if index < 0 else self.units[index][1][unit]
 
 
 @dataclasses.dataclass
 class Trace:
-    """Events at every boundary in cycles 0 to ``cycles`` - 1, each list in rising order of cycles."""
+    """Events at every boundary in cycles 0 to ``cycles`` - 1, each list in cycle order."""
 
     cycles: int
     rows: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, cells, last): a row handed to the labeller, bit c is column c; last row of its frame."""
+    """(cycle, cells, last): a row handed to the labeller, bit c is column c; whether it is its frame's last."""
     records: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
     """(cycle, data, end): a zone's exact moments or a bitmap row, in bit fields as on the wire, or the end mark."""
     items: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, data, end): with ``report = "barycenter"`` what becomes of them, when the packer takes it."""
+    """(cycle, data, end): with ``report = "barycenter"`` the divided records, when the packer reads them."""
     bytes: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, value): a byte handed to the UART."""
+    """(cycle, value) of each byte handed to the UART."""
     line: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the transmit pin, which is high before cycle 0."""
+    """(cycle, level): a change of the transmit pin, high before cycle 0."""
     contact: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the contact pin, which is low before cycle 0."""
+    """(cycle, level): a change of the contact pin, low before cycle 0."""
     alive: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the alive pin, which is low before cycle 0."""
+    """(cycle, level): a change of the alive pin, low before cycle 0."""
 
     def events(self, boundary: str) -> list[tuple[Any, ...]]:
         """The events of one of :data:`BOUNDARIES`."""
         return getattr(self, boundary)
 
     def until(self, cycles: int) -> Trace:
-        """The same trace, ended before ``cycles``."""
+        """The trace, ended before ``cycles``."""
         kept = {name: [event for event in self.events(name) if event[0] < cycles] for name in BOUNDARIES}
         return Trace(min(cycles, self.cycles), **kept)
 
     def at_the_pins(self) -> Trace:
-        """The same trace without what only probes see."""
+        """The trace without events that only probes see."""
         return Trace(self.cycles, line=self.line, contact=self.contact, alive=self.alive)
 
     def since(self, cycle: int) -> Trace:
-        """The same trace, ``cycle`` counted as 0."""
+        """The trace with ``cycle`` counted as 0."""
         shifted = {name: [(at - cycle, *rest) for at, *rest in self.events(name)] for name in BOUNDARIES}
         return Trace(self.cycles - cycle, **shifted)

@@ -1,4 +1,4 @@
-"""Serial: the level of the line for the bytes sent, and when a byte that comes in is received."""
+"""Serial: the line's level for sent bytes, and the reception of bytes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 
 def line(sent: Iterable[tuple[int, int]], bit_clocks: int) -> list[tuple[int, int]]:
-    """(cycle, level) of every change of the transmit pin for bytes (cycle, value)."""
+    """(cycle, level) of every change of the transmit pin for sent bytes (cycle, value)."""
     changes = []
     level = 1
     for cycle, value in sent:
@@ -22,12 +22,12 @@ def line(sent: Iterable[tuple[int, int]], bit_clocks: int) -> list[tuple[int, in
 
 @dataclasses.dataclass(frozen=True)
 class Byte:
-    """A byte that was received: when its first data bit was, and its stop bit."""
+    """A received byte: cycles of its first data bit and of its stop bit."""
 
     value: int | None
-    """None: it was cut short."""
+    """None: the byte was cut short."""
     first_bit: int | None
-    """None: it had no bits, as a mark among pulses."""
+    """None: it had no bits, like a mark among pulses."""
     stop: int
 
 
@@ -37,7 +37,7 @@ def pulsed(bit_clocks: int) -> bool:
 
 
 def received(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[Byte]:
-    """What is received of (cycle, bytes), each of which begin at the pin back to back in that cycle."""
+    """Reception of (cycle, bytes), which begin back to back at the pin in that cycle."""
     starts = _starts(sent, bit_clocks)
     if pulsed(bit_clocks):
         return _of_pulses(starts, bit_clocks)
@@ -79,6 +79,6 @@ def _of_pulses(starts: list[tuple[int, int]], bit_clocks: int) -> list[Byte]:
 
 
 def _lows(value: int) -> list[tuple[int, int]]:
-    """(end, length) in bits of each stretch of low line in a byte, counted from the beginning of its start bit."""
+    """(end, length) in bits of each low stretch in a byte, from the beginning of its start bit."""
     levels = "0" + f"{value:08b}"[::-1] + "1"
     return [(match.end(), len(match[0])) for match in re.finditer("0+", levels)]

@@ -1,4 +1,4 @@
-"""Pressure units: when each is read, what is sent of it, and when thresholds raise the contact pin (docs/timing.md)."""
+"""Pressure units: reading times, packets, and thresholds that raise the contact pin (docs/timing.md)."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ class UnitSample(NamedTuple):
     """A unit's reading."""
 
     sampled: int
-    """Cycle of the input that it is of."""
+    """Cycle of the sampled input."""
     done: int
-    """Cycle in which it is there."""
+    """Cycle in which the reading is available."""
     time_us: int
-    """As the packet says it of the sweep's first one."""
+    """Time in the packet, of the sweep's first reading."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ConverterRule:
-    """A converter that reads one unit after the other; times in levels of its clock, high or low."""
+    """A converter that reads the units in turn; times in half periods (levels) of its clock."""
 
     bits: int
     supplies: tuple[tuple[float, int], ...]
-    """(V, Hz): from this supply on its clock may be this fast."""
+    """(V, Hz): maximum clock from this supply on."""
     least_level_ns: int
     levels: int
-    """From one conversion to the next."""
+    """Levels from one conversion to the next."""
     sampled: int
-    """From the selection to the sample."""
+    """Levels from the selection to the sample."""
     last_bit: int
-    """From the selection to the edge at which the last bit is taken."""
+    """Levels from the selection to the edge that reads the last bit."""
 
     def level(self, facts: Facts) -> int:
-        """Clocks of a level of the SPI clock."""
+        """Clocks per level of the SPI clock."""
         fastest = max(hz for volts, hz in self.supplies if volts <= facts.skin.converter_v)
         by_rate = Fraction(facts.skin.clock_hz, 2 * fastest)
         by_level = Fraction(self.least_level_ns * facts.skin.clock_hz, 10**9)
@@ -69,29 +69,30 @@ class ConverterRule:
             yield sweep
 
     def first(self, facts: Facts) -> int:
-        """The cycle in which the first conversion selects the converter: two levels after power-up, from a register."""
+        """The cycle in which the first conversion selects the converter: two levels after power-up, through a
+        register."""
         return 2 * self.level(facts) + 1
 
 
 @dataclasses.dataclass(frozen=True)
 class PacedRule:
-    """A converter that converts all units by itself, at the pace of a clock from the board, and says when it did."""
+    """A converter that converts all units by itself, paced by a clock from the board, and reports completion."""
 
     bits: int
     least_level_ns: int
     pace_hz: int
     pace_level_ns: int
     periods: int
-    """Of that clock, from one conversion to the next."""
+    """Periods of that clock from one conversion to the next."""
     word_levels: int
-    """Of its SPI clock in a word; the first word is its status."""
+    """Levels of its SPI clock per word; the first word is its status."""
 
     def level(self, facts: Facts) -> int:
-        """Cycles of a level of the SPI clock."""
+        """Cycles per level of the SPI clock."""
         return -(-self.least_level_ns * facts.skin.clock_hz // 10**9)
 
     def pace(self, facts: Facts) -> int:
-        """Cycles of a level of the clock that it is given."""
+        """Cycles per level of the pacing clock."""
         hz = facts.skin.clock_hz
         return max(-(-hz // (2 * self.pace_hz)), -(-self.pace_level_ns * hz // 10**9))
 
@@ -100,7 +101,7 @@ class PacedRule:
         return 0, 2 * self.periods * self.pace(facts)
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[UnitSample]]:
-        """The first two conversions are left out; the n-th is that of what was there one and a half periods before."""
+        """Sweeps without the first two conversions; the n-th is of the input one and a half periods earlier."""
         whole, pace, level = self.spans(facts)[1], self.pace(facts), self.level(facts)
         late_us = round(1.5e6 * whole / facts.skin.clock_hz)
         ready = 3 * whole - pace
@@ -120,18 +121,18 @@ MCP3208 = ConverterRule(12, ((2.7, 1_000_000), (5.0, 2_000_000)), 250, levels=40
 
 @dataclasses.dataclass
 class Units:
-    """What the units do in a run."""
+    """Results of the units in a run."""
 
     packets: list[tuple[int, bytes]] = dataclasses.field(default_factory=list)
-    """(cycle from which on it waits, packet) of every sweep, as on the wire."""
+    """(cycle from which it waits, packet) of every sweep, as on the wire."""
     over: Changes = dataclasses.field(default_factory=list)
-    """(cycle, level): whether a threshold is reached."""
+    """(cycle, level): whether a threshold is exceeded."""
     armed: Changes = dataclasses.field(default_factory=list)
-    """(cycle, level): whether there is a threshold."""
+    """(cycle, level): whether a threshold is set."""
 
 
 class _Settings:
-    """Zeros and thresholds by cycle; a command counts from the cycle after it was taken."""
+    """Zeros and thresholds by cycle; a command counts from the cycle after its reception."""
 
     def __init__(self, facts: Facts, bits: int, requests: Sequence[Request]):
         skin = facts.skin
@@ -172,7 +173,7 @@ class _Settings:
 
 
 def play(facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Units:
-    """What happens in cycles 0 to ``cycles`` - 1, and some beyond."""
+    """Results in cycles 0 to ``cycles`` - 1, and some beyond."""
     skin = facts.skin
     if not skin.units:
         return Units()

@@ -137,47 +137,6 @@ def _flat(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray
     return min_labels(frames, connectivity), turns, turns
 
 
-def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
-    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
-    taken = frames | before
-    none = np.zeros(taken.shape[:2], bool)
-    steps, begun = np.zeros(none.shape, int), np.zeros(none.shape, int)
-    above, new = begun.copy(), begun.copy()
-    reached = np.zeros(frames.shape, int)
-    joins = []
-    for column in range(frames.shape[2]):
-        a, b, here = before[..., column], frames[..., column], taken[..., column]
-        a_left, b_left, here_left = (array[..., column - 1] if column else none for array in (before, frames, taken))
-        joined = here & here_left if connectivity == 8 else (a & a_left) | (b & b_left)
-        joins.append(joined)
-        begun = np.where(joined, begun, steps)
-        above = np.where(joined, above, 0) + (a & ~a_left)
-        new = np.where(joined, new, 0) + (b & ~b_left)
-        steps = np.where(here, begun + np.maximum(above, new), steps)
-        reached[..., column] = steps
-    for column in range(frames.shape[2] - 2, -1, -1):
-        reached[..., column] = np.where(joins[column + 1], reached[..., column + 1], reached[..., column])
-    return reached, steps
-
-
-def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``LabellerRule.strips`` of ``run``, for every row of (N, R, C) bool frames."""
-    last_step, steps = _strips(frames, connectivity)
-    return last_step + 2, steps + 1, steps + 3
-
-
-def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same where the ends meet: a step more joins the last cluster with the first."""
-    last_step, steps = _strips(frames, connectivity)
-    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
-    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
-    joined = ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0)
-    steps = steps + joined
-    last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
-    return last_step + 2, steps + 1, steps + 3
-
-
 def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of (N, R, C) bool frames, (N, R, C) int64 each: for a pressed cell the least index, over all frames, of its
     zone's cells, else -1; on which turn it lies, seen from that cell; and 1 where a neighbor disagrees about that.
@@ -235,31 +194,3 @@ def _crossed(frames: np.ndarray, step: tuple[int, int]) -> np.ndarray:
     if step[1]:
         crossed[-1 if step[1] > 0 else 0] = step[1]
     return crossed
-
-
-def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
-    above = np.zeros_like(frames)
-    above[:, 1:] = frames[:, :-1]
-    above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
-    more = above & ~above_left
-    if connectivity == 4:
-        more |= frames & ~left & above_left & ~above
-        joined = frames & left | above & above_left
-    else:
-        joined = (frames | above) & (left | above_left)
-    leaves = np.cumsum(1 + more, axis=2) + 1
-    busy = leaves[..., -1] + 1
-    for column in range(frames.shape[2] - 2, -1, -1):
-        leaves[..., column] = np.where(joined[..., column + 1], leaves[..., column + 1], leaves[..., column])
-    return leaves * (frames | above), busy, busy
-
-
-def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """:func:`serial_clocks` where the ends meet."""
-    leaves, busy, end = serial_clocks(frames, connectivity)
-    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
-    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
-    seam = 2 * (ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
-    leaves[..., -1] += seam * (before | frames)[..., -1]
-    return leaves, busy + seam, end + seam

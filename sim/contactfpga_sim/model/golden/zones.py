@@ -1,6 +1,5 @@
-"""Zones by flood fill over the whole frame, and over the unrolled cylinder of a sheet whose ends meet; and what a
-labeller does with one frame, with the rule that says so.
-"""
+"""Zones by flood fill over the frame, or over the unrolled cylinder of a sheet whose ends meet; and a labeller's work
+on one frame, with its rule."""
 
 from __future__ import annotations
 
@@ -40,7 +39,7 @@ def flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
 
 
 def moments(labels: np.ndarray, zone: int) -> tuple[int, int, int]:
-    """Area, sum x and sum y, in cells, of the cells that carry the label ``zone``."""
+    """Area, sum x and sum y, in cells, of the cells with label ``zone``."""
     y, x = np.nonzero(labels == zone)
     return len(x), int(x.sum()), int(y.sum())
 
@@ -54,8 +53,7 @@ def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
 def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
     """Label the connected pieces of an (R, C) bool array whose last column is a neighbor of the first.
 
-    Returns an (R, C) int array, 0 where nothing is pressed and 1 to n elsewhere, and what a record says of the turns of
-    each piece, :func:`turned`.
+    Returns an (R, C) int array, 0 where nothing is pressed and 1 to n elsewhere, and :func:`turned` of each piece.
     """
     columns = cells.shape[1]
     labels = np.zeros(cells.shape, int)
@@ -70,8 +68,8 @@ def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list
 
 
 def turned(turns: list[int], ring: bool, most: int) -> int:
-    """How many of a piece's cells lie on the upper one of its two turns: fewer than there are. As many as there are: it
-    is a ring; all ones, in the bits that the number of the sheet's cells takes: it needs more than two turns."""
+    """Number of a piece's cells on the upper of its two turns, less than its area. Its area itself: the piece is a
+    ring; all ones, in the bits of the sheet's cell count: it needs more than two turns."""
     lowest = min(turns)
     if ring:
         return len(turns)
@@ -81,7 +79,7 @@ def turned(turns: list[int], ring: bool, most: int) -> int:
 
 
 def _unroll(cells: np.ndarray, connectivity: int, seed: tuple[int, int]) -> tuple[dict[tuple[int, int], int], bool]:
-    """The piece of a cell: of each of its cells a column counted on past the seam, and whether a way leads round."""
+    """The piece of a cell: the column of each of its cells, counted on past the seam, and whether it closes around."""
     rows, columns = cells.shape
     unrolled = {seed: seed[1]}
     todo = [(seed[0], seed[1])]
@@ -101,7 +99,7 @@ def _unroll(cells: np.ndarray, connectivity: int, seed: tuple[int, int]) -> tupl
 
 @dataclasses.dataclass(frozen=True)
 class Departure:
-    """A zone that leaves: this many clocks after the one in which row ``row`` was handed over."""
+    """A zone that leaves this many clocks after the handover of row ``row``."""
 
     row: int
     clock: int
@@ -109,7 +107,7 @@ class Departure:
     sum_x: int
     sum_y: int
     turned: int = 0
-    """Where the sheet's ends meet: :func:`contactfpga_sim.model.golden.zones.turned`."""
+    """For a sheet whose ends meet: :func:`contactfpga_sim.model.golden.zones.turned`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,11 +115,11 @@ class Labelling:
     """A labeller's work on one frame."""
 
     busy: tuple[int, ...]
-    """Clocks from each row to the next that can be handed over."""
+    """Clocks from each row to the next handover."""
     end: int
     """Clocks from the last row to the end mark."""
     departures: tuple[Departure, ...]
-    """Zones in the order they leave."""
+    """Zones in order of departure."""
 
 
 Strips = Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -132,10 +130,9 @@ class LabellerRule:
     """The golden rule of a labeller."""
 
     frame: Callable[[np.ndarray, int], Labelling]
-    """Its work on (R, C) bool cells with this connectivity."""
+    """Work on (R, C) bool cells with this connectivity."""
     strips: Strips | None = None
-    """The clocks of every row of (N, R, C) bool frames at once, for volume tests: when a zone leaves whose last cluster
-    is that of the cell, when the next row can come, and when an end mark leaves; (N, R, C), (N, R) and (N, R) int64.
-    Only exact labellers have it."""
+    """The clocks of every row of (N, R, C) bool frames at once, for volume tests: departure of a zone by its last
+    cluster's cells, next row, and end mark; (N, R, C), (N, R) and (N, R) int64. Exact labellers only."""
     closed: LabellerRule | None = None
-    """The same of sheets whose ends meet; None: it takes none."""
+    """The rule for sheets whose ends meet; None: unsupported."""

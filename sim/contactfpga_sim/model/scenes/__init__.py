@@ -1,1 +1,1 @@
-"""What touches the sheet: contacts, families of scenes, files, recordings, and the truth about them."""
+"""Touches of the sheet: contacts, families of scenes, files, recordings, and the truth about them."""

@@ -1,4 +1,4 @@
-"""Pressed cells: what counts as one, and how the native models take them."""
+"""Pressed cells: their definition, and their form for the native models."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 
 def pressed(values: np.ndarray, what: str, threshold: float | None = None) -> np.ndarray:
-    """Bools as they are, and of numbers those above ``threshold``; the one rule, wherever cells come from.
+    """Bools unchanged, numbers compared with ``threshold``: the one rule for all sources of cells.
 
-    Raises ValueError that calls the array ``what``: for numbers without a threshold, NaN, and all that is neither.
+    Raises ValueError that calls the array ``what`` for numbers without a threshold, NaN, and other types.
     """
     if values.dtype == bool:
         return values

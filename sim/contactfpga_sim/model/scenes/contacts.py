@@ -1,6 +1,6 @@
-"""What touches a sheet, as physical things: shape, place, force and motion. Lengths in mm on the sheet laid flat.
+"""Touches as physical objects: shape, place, force and motion. Lengths in mm on the sheet laid flat.
 
-x runs along the columns, y along the rows, cell (row 0, column 0) lies at 0 mm; angles turn from x toward y.
+x runs along the columns, y along the rows, cell (row 0, column 0) is at 0 mm; angles turn from x toward y.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Value = float | Callable[[float], float]
 """A number, or a function of the time in s."""
 
 Shape = tuple[Part, ...]
-"""Convex parts around the origin, as the cover takes them: in m. Parts may overlap or lie apart."""
+"""Convex parts around the origin in m, as the cover needs them. Parts may overlap or be separate."""
 
 M = 1e-3
 """Meters in a mm: a Skin counts in mm, the cover's physics in m."""
@@ -25,7 +25,7 @@ M = 1e-3
 
 @dataclasses.dataclass(frozen=True)
 class Track:
-    """A value that runs straight from point to point, and stays at the first and last one outside of them."""
+    """A piecewise linear value, constant beyond its first and last points."""
 
     seconds: tuple[float, ...]
     values: tuple[float, ...]
@@ -55,7 +55,7 @@ class Swing:
 
 @dataclasses.dataclass(frozen=True)
 class Round:
-    """A value that runs from ``start`` over ``length`` and begins again, ``hertz`` times per second."""
+    """A sawtooth from ``start`` over ``length``, ``hertz`` times per second."""
 
     start: float
     length: float
@@ -67,31 +67,31 @@ class Round:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Contact:
-    """One thing that touches the sheet while its force is above 0."""
+    """An object that touches the sheet while its force is above 0."""
 
     shape: Shape | Callable[[float], Shape]
-    """Its parts, or a function of the time in s that gives them."""
+    """Its parts, or a function of the time in s."""
     x_mm: Value
-    """Where the shape's origin lies along the columns."""
+    """Position of the shape's origin along the columns."""
     y_mm: Value
-    """Where it lies along the rows."""
+    """Position of the shape's origin along the rows."""
     angle_deg: Value = 0.0
-    """How far the shape is turned."""
+    """Rotation of the shape."""
     force_n: Value = 10.0
-    """Normal force in N; none at 0 and below."""
+    """Normal force in N; at most 0: no contact."""
     drag_n: tuple[Value, Value] = (0.0, 0.0)
-    """Force along the surface in N, toward columns and rows that count up; switches do not feel it, units do."""
+    """Force along the surface in N, toward rising columns and rows; felt by units, not by switches."""
     torsion_nm: Value = 0.0
-    """Moment in Nm about the outward normal; units feel it."""
+    """Moment in Nm about the outward normal; felt by units."""
 
     @property
     def still(self) -> bool:
-        """Nothing about it changes with time."""
+        """Whether it is constant over time."""
         values = (getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "drag_n")
         return not any(map(callable, (*values, *self.drag_n)))
 
     def load(self, seconds: float) -> Load | None:
-        """What it puts on the cover at that time; None while it does not touch."""
+        """Its load on the cover at that time; None without contact."""
         force = at(self.force_n, seconds)
         if not force > 0:
             return None
@@ -102,7 +102,7 @@ class Contact:
 
 
 def at(value: Value, seconds: float) -> float:
-    """What a value is at that time."""
+    """A value at that time."""
     return value(seconds) if callable(value) else value
 
 
@@ -122,14 +122,14 @@ def edge(length_mm: float, width_mm: float) -> Shape:
 
 
 def palm(scale: float = 1.0) -> Shape:
-    """A hand laid flat, 84 mm wide and 92 mm long, fingers toward -y: two balls, the pads below the fingers and the
-    heel, one contact around a hollow."""
+    """A hand laid flat, 84 mm wide and 92 mm long, fingers toward -y: two balls, finger pads and heel, one contact
+    around a hollow."""
     return _scaled(scale, (-24, 16, 18, 34), (26, 16, 16, 34), (0, -24, 42, 14), (0, 42, 30, 12))
 
 
 def sole(length_mm: float = 260.0) -> Shape:
-    """A bare right foot, toes toward -y: heel, outer edge and ball, which are one contact, and the big toe, 8 mm
-    apart from it where the foot is 260 mm long."""
+    """A bare right foot, toes toward -y: heel, outer edge and ball as one contact, and the big toe, separated by 8 mm
+    for a foot of 260 mm."""
     scale = length_mm / 260
     outer = Rectangle(16 * M * scale, 50 * M * scale, 22 * M * scale, 25 * M * scale)
     return (*_scaled(scale, (4, 98, 30, 32), (-2, -50, 46, 36), (-26, -112, 15, 18)), outer)
@@ -144,7 +144,7 @@ def _scaled(scale: float, *ellipses: tuple[float, float, float, float]) -> Shape
 
 @dataclasses.dataclass(frozen=True)
 class ChangingPatch:
-    """The shape of a ball's patch while its force changes: a disc of Hertz's radius."""
+    """A ball's patch under a changing force: a disc of Hertz's radius."""
 
     ball: Ball
     force_n: Value
@@ -155,13 +155,13 @@ class ChangingPatch:
 
 
 BODY_PA = 2e5
-"""Effective modulus E* in Pa of what touches, a fingertip on soft foam, by which it sinks in: chosen, not measured."""
+"""Effective modulus E* in Pa of the touching object, a fingertip on soft foam: chosen, not measured."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rise:
-    """A force that rises from a touch at 0 s on and then stays: force_n (t / seconds)^(3/2), as that of a round body
-    that sinks in at an even speed (Hertz)."""
+    """A force that rises from 0 s on, then stays: force_n (t / seconds)^(3/2), as of a round body at constant speed
+    (Hertz)."""
 
     force_n: float
     seconds: float
@@ -172,8 +172,8 @@ class Rise:
 
 @dataclasses.dataclass(frozen=True)
 class GrowingPatch:
-    """The shape of a contact whose force is a :class:`Rise`: round parts grow as the force's cube root (Hertz), those
-    of flat bodies are there at once."""
+    """The shape of a contact whose force is a :class:`Rise`: round parts grow as the force's cube root (Hertz), flat
+    ones are full at once."""
 
     shape: Shape
     seconds: float
@@ -188,9 +188,9 @@ def _shrunk(part: Ellipse, share: float) -> Ellipse:
 
 
 def approaching(contact: Contact, speed_mm_s: float) -> Contact:
-    """The same contact, of fixed shape and force, touching at 0 s and coming in at this speed until it has its force.
+    """The contact, of fixed shape and force, arriving at 0 s at this speed until it has its force.
 
-    It then has sunk in by delta = 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5),
+    Its indentation is then delta = 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5),
     with E* = :data:`BODY_PA`; of several parts the deepest counts.
     """
     if callable(contact.shape) or callable(contact.force_n):
@@ -209,14 +209,15 @@ def _depth_m(part: Part, force_n: float) -> float:
 
 
 def pressed_ball(ball: Ball, force_n: Value, x_mm: Value, y_mm: Value) -> Contact:
-    """A ball whose patch grows with the force on it."""
+    """A ball whose patch grows with its force."""
     return Contact(shape=ChangingPatch(ball, force_n), force_n=force_n, x_mm=x_mm, y_mm=y_mm)
 
 
 def pair(
     gap_mm: float, radius_mm: float, x_mm: float, y_mm: float, angle_deg: float = 0.0, force_n: Value = 10.0
 ) -> tuple[Contact, Contact]:
-    """Two fingers of this radius around a place, ``gap_mm`` free between their rims; they meet at 0 and below."""
+    """Two fingers of this radius around a place, with a gap of ``gap_mm`` between their rims; they meet at 0 and
+    below."""
     apart = gap_mm / 2 + radius_mm
     if not apart > 0:
         raise ValueError(f"gap_mm is {gap_mm}; two discs of {radius_mm} mm need more than {-2 * radius_mm:g} mm")

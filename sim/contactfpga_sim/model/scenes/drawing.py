@@ -17,13 +17,13 @@ from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.golden.zones import closed_flood, flood
 
 COLORS = style.PALETTE[:6]
-"""Of the zones: those that show on dark terminals, too."""
+"""Colors of zones, visible on dark terminals, too."""
 
 ACROSS = 4
 
 
 class Drawn(Protocol):
-    """What a drawing needs of a scene."""
+    """Parts of a scene needed for drawing."""
 
     @property
     def skin(self) -> Skin: ...
@@ -36,7 +36,7 @@ class Drawn(Protocol):
 
 
 def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
-    """Two rows of cells per line of text, each zone in a color of its own; in ASCII one row per line."""
+    """Two rows of cells per line of text, each zone in its color; in ASCII one row per line."""
     return Columns([_sheet(out, unicode) for out in outcomes], padding=(0, 3))
 
 
@@ -76,7 +76,7 @@ _GLYPHS = {(False, False): "·", (True, False): "▀", (False, True): "▄", (Tr
 
 
 def _style(above: int, below: int) -> str:
-    """Both halves of a full block are of one zone, or, where two zones meet, the lower one is the background."""
+    """Style of a full block of one zone; between two zones the lower is the background."""
     if not above and not below:
         return "dim"
     colors = [COLORS[(number - 1) % len(COLORS)] for number in (above, below) if number]
@@ -84,7 +84,7 @@ def _style(above: int, below: int) -> str:
 
 
 def to_file(outcomes: Sequence[Drawn], path: Path) -> None:
-    """A panel a scene: its cells in the colors of their zones, and the barycenters that came over the wire."""
+    """A panel per scene: cells in their zones' colors, and the received barycenters."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):

@@ -1,8 +1,8 @@
-"""Families of scenes at random places, for charts: the same seed gives the same scenes, each one by its number alone.
+"""Families of scenes at random places, for charts: the same seed gives the same scenes, each by its number alone.
 
-A scene lies wholly on the sheet where it fits; where it does not, it lies in the middle, give or take a pitch, and
-`Scene.truth(t, skin)` counts what is on the sheet. Sheets of the same extents and another pitch get the same scenes,
-shifted with the sheet's corner.
+A scene is wholly on the sheet if it fits; else it is in the middle, within a pitch, and `Scene.truth(t, skin)` counts
+the part on the sheet. Sheets of the same extents but another pitch get the same scenes, shifted with the sheet's
+corner.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ FINGER_MM = 6.0
 """Radius of the fingers of a pair."""
 
 HALF_MM, RATIO = (5.0, 10.0), (0.6, 1.0)
-"""Half the length of a finger's ellipse, from the least to the greatest, and its width over its length."""
+"""Least and greatest half length of a finger's ellipse, and its width over its length."""
 
 TRIES = 200
-"""Places that are tried for one more finger, before the scene stays without it."""
+"""Places tried for one more finger before the scene goes without it."""
 
 Random = np.random.Generator
 
@@ -34,8 +34,8 @@ Random = np.random.Generator
 def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
     """``count`` scenes of a family at random places on a sheet, from number ``first`` on.
 
-    ``family``: one of :data:`FAMILIES`; ``options``: its function's, such as ``gap_mm``. Scene n depends on the
-    family, the options, the seed, the sheet's pitch and size, and n only. Raises ValueError for what is not known.
+    ``family``: one of :data:`FAMILIES`; ``options``: its function's, such as ``gap_mm``. Scene n depends only on
+    family, options, seed, the sheet's pitch and size, and n. Raises ValueError for an unknown family or option.
     """
     if family not in FAMILIES:
         raise ValueError(f"family {family!r} is not known; take one of {', '.join(FAMILIES)}")
@@ -49,12 +49,12 @@ def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, *
 
 
 APPROACH_MM_S = (50.0, 250.0)
-"""Speeds with which contacts come in, up to the reduced speed of ISO 10218-1 for a robot beside people: chosen."""
+"""Speeds of approach, up to the reduced speed of ISO 10218-1 for a robot beside people: chosen."""
 
 
 def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
-    """The scenes of :func:`placements` with forces that rise: all contacts of a scene touch at 0 s and come in at the
-    same speed, drawn from :data:`APPROACH_MM_S`. From ``settled_s`` on a scene is that of :func:`placements`."""
+    """The scenes of :func:`placements` with rising forces: all contacts of a scene touch at 0 s and approach at one
+    speed, drawn from :data:`APPROACH_MM_S`. From ``settled_s`` on they are those of :func:`placements`."""
     name = zlib.crc32(family.encode())
     scenes = placements(family, count, seed, skin, first, **options)
     speeds = (
@@ -72,10 +72,8 @@ def bumper(rng: Random, skin: Skin) -> Scene:
 
 
 def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scene:
-    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any place and angle, at least ``gap_mm`` apart, 2 to 20 N.
-
-    A sheet without room for all of them gets fewer.
-    """
+    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any place and angle, at least ``gap_mm`` apart, 2 to 20 N;
+    fewer if the sheet lacks room."""
     if gap_mm < 0 or most < 2:
         raise ValueError(f"gap_mm is {gap_mm} and most is {most}; they must be at least 0 and 2")
     placed: list[tuple[float, float, float]] = []
@@ -95,7 +93,7 @@ def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scen
 def finger(
     rng: Random, skin: Skin, half_mm: tuple[float, float] = HALF_MM, ratio: tuple[float, float] = RATIO
 ) -> Scene:
-    """One finger as in :func:`fingers`; ``half_mm``: from which to which half length, ``ratio``: of its width to it."""
+    """One finger as in :func:`fingers`; ``half_mm``: range of half lengths, ``ratio``: width over length."""
     _, shape, angle, force = _finger(rng, half_mm, ratio)
     return Scene((_anywhere(rng, skin, shape, angle, force_n=force),))
 
@@ -109,7 +107,7 @@ def _finger(
 
 
 def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGER_MM) -> Scene:
-    """Two round fingers ``gap_mm`` apart between their rims, their line at any angle; 5 to 20 N each."""
+    """Two round fingers with ``gap_mm`` between their rims, at any angle; 5 to 20 N each."""
     angle = rng.uniform(0, 180)
     loads = (contact.load(0.0) for contact in contacts.pair(gap_mm, radius_mm, 0.0, 0.0, angle))
     x, y = place(rng, skin, tuple(part for load in loads if load for part in load.parts))
@@ -135,7 +133,7 @@ def edge(rng: Random, skin: Skin, width_mm: float = 12.0) -> Scene:
 
 
 def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
-    """A finger that circles on the sheet, at ``speed_mm_s`` or at 50 to 1000 mm/s; 5 to 20 N."""
+    """A finger that circles at ``speed_mm_s`` or at 50 to 1000 mm/s; 5 to 20 N."""
     left, right, top, bottom = (end / M for end in sheet(skin))
     finger = rng.uniform(5, 10)
     most = max(1.0, min(right - left, bottom - top) / 2 - finger)
@@ -151,7 +149,7 @@ def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
 FAMILIES: dict[str, Callable[..., Scene]] = {
     family.__name__: family for family in (bumper, fingers, pair, palm, sole, edge, moving, finger)
 }
-"""Every family by its name; its options are its keyword arguments."""
+"""Families by name; options are keyword arguments."""
 
 
 def _anywhere(rng: Random, skin: Skin, shape: Shape, angle_deg: float, **values: Any) -> Contact:
@@ -161,7 +159,7 @@ def _anywhere(rng: Random, skin: Skin, shape: Shape, angle_deg: float, **values:
 
 
 def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
-    """Where in mm the shape's origin lies when the shape is anywhere on the sheet."""
+    """Position in mm of the shape's origin for a random place on the sheet."""
     left, right, top, bottom = sheet(skin)
     boxes = [(part.x_m, part.y_m, *part.half_box_m) for part in shape]
     ends = [(0.0, 0.0)] if skin.closed else [(x - half, x + half) for x, _, half, _ in boxes]  # it may lie on the seam
@@ -171,7 +169,7 @@ def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
 
 
 def _along(rng: Random, low: float, high: float, ends: list[tuple[float, float]], pitch_mm: float) -> float:
-    """A place in mm for something that reaches from the least to the greatest of these ends, in m."""
+    """A position in mm for an object that reaches from the least to the greatest of these ends, in m."""
     first, last = low - min(start for start, _ in ends), high - max(end for _, end in ends)
     if first > last:
         middle = (first + last) / 2

@@ -1,4 +1,4 @@
-"""What pressure units under a bumper read while a scene touches it."""
+"""Readings of pressure units under a bumper that a scene touches."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from contactfpga_sim.model.scenes.scene import Scene
 
 
 class LoadedUnits:
-    """What units read under a wrench, with their noise, in whole steps of the converter.
+    """Readings of units under a wrench, with noise, in whole converter steps.
 
-    Units share a load by least squares where there are more of them than the load needs; one that nothing presses any
-    more reads what it reads without preload.
+    Redundant units share a load by least squares; an unloaded one reads as without preload.
     """
 
     def __init__(self, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
@@ -32,38 +31,38 @@ class LoadedUnits:
         self._least = -preloads / gains
 
     def exactly(self, wrench: Floats) -> Floats:
-        """(n,): readings without noise, rounding and ends, under a (6,) wrench on the link in N and Nm."""
+        """(n,): readings without noise, rounding and limits, under a (6,) wrench on the link in N and Nm."""
         return np.asarray(np.maximum(self._steps @ wrench, self._least) + self._zeros)
 
     def under(self, wrench: Floats) -> Sequence[int]:
-        """What all units read."""
+        """Readings of all units."""
         noisy = self.exactly(wrench) + self._sigma * self._rng.standard_normal(len(self._sigma))
         found: list[int] = np.clip(np.rint(noisy), 0, self._full).astype(int).tolist()
         return found
 
 
 class UnitReadings(LoadedUnits):
-    """The same as a function of the time in s, while a scene touches the bumper."""
+    """Readings as a function of the time in s, while a scene touches the bumper."""
 
     def __init__(self, scene: Scene, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
-        """Raises ValueError where the cells have no surface."""
+        """Raises ValueError if the cells have no surface."""
         super().__init__(cells, skin, seed, noise)
         if cells.surface is None:
             raise ValueError("the units have no surface; give units.toml a table [surface] with the bumper's outside")
         self._scene, self._cells, self._surface = scene, cells, cells.surface
         self.touching = Scene(())
-        """What touches besides the scene."""
+        """Touches besides the scene."""
         outside = cells.surface.radius_m if isinstance(cells.surface, Cylinder) else None
         # A sheet around a cylinder lies under the foam, on whose outside things push.
         self._wider = 1e3 * outside / skin.radius_mm if outside and skin.radius_mm else 1.0
 
     def wrench(self, seconds: float) -> Floats:
-        """(6,): what all contacts exert on the link."""
+        """(6,): wrench of all contacts on the link."""
         contacts = (*self._scene.contacts, *self.touching.contacts)
         return sum((self._of(one, seconds) for one in contacts), np.zeros(6))
 
     def _of(self, contact: Contact, seconds: float) -> Floats:
-        """Each of its parts pushes along the normal at its middle."""
+        """Wrench of a contact whose parts each push along the normal at their middle."""
         total, load = np.zeros(6), contact.load(seconds)
         if load is None:
             return total
@@ -77,14 +76,14 @@ class UnitReadings(LoadedUnits):
         return total
 
     def _at(self, x_m: float, y_m: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Point, normal, and the directions of columns and rows, of a place on the sheet laid flat."""
+        """Point, normal, and directions of columns and rows at a place on the sheet laid flat."""
         x, y = x_m * self._wider + self._cells.sheet_m[0], y_m + self._cells.sheet_m[1]
         point, normal = (np.array(each) for each in self._surface.place(x, y))
         across = np.array(self._surface.place(x, y + 1.0)[0]) - point
         return point, normal, np.cross(across, normal), across
 
     def exact(self, seconds: float) -> Floats:
-        """(n,): readings without noise, rounding and ends."""
+        """(n,): readings without noise, rounding and limits."""
         return self.exactly(self.wrench(seconds))
 
     def __call__(self, seconds: float) -> Sequence[int]:

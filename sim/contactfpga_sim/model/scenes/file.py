@@ -1,8 +1,8 @@
 """Scenes in a TOML file: contacts with fixed or random shape, place, force and motion, so that one file is a family;
-and its scenes, each by its number alone, on a sheet of any pitch.
+each scene by its number, on a sheet of any pitch.
 
-Places count in mm from the corner of the sheet, which lies half a pitch before the first switch, so that the same
-contacts press sheets of any pitch. docs/scenes.md tells the keys.
+Places are in mm from the sheet's corner, half a pitch before the first switch, independent of the pitch. docs/scenes.md
+lists the keys.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from contactfpga_sim.model.scenes.truth import Box, on_all_turns, widths
 
 MAX_MM = 100_000.0
 MAX_NUMBER = 64
-"""Contacts of one kind."""
+"""Most contacts of one kind."""
 
 
 class SceneFileError(ValueError):
-    """What a file says that cannot be; the message names the key, its value and the limit."""
+    """An invalid scene file; the message names the key, its value and the limit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """A number that is drawn for each contact; a fixed one where both ends are the same."""
+    """A number drawn for each contact; fixed if both ends are equal."""
 
     low: float
     high: float
 
     def draw(self, rng: np.random.Generator) -> float:
-        """One of them."""
+        """A random number of the range."""
         return self.low if self.low == self.high else float(rng.uniform(self.low, self.high))
 
 
@@ -56,52 +56,52 @@ SHAPES: dict[str, tuple[Callable[..., Shape], dict[str, float | None]]] = {
     "palm": (contacts.palm, {"scale": 1.0}),
     "sole": (contacts.sole, {"length_mm": 260.0}),
 }
-"""By name: what makes the shape, and its sizes with what they are when the file does not say; None: it must."""
+"""By name: the maker of the shape, and its sizes with defaults; None: required."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """Contacts that are alike: a `[[contact]]` of a file."""
+    """Similar contacts: a `[[contact]]` of a file."""
 
     shape: str
     sizes: tuple[tuple[str, Range], ...]
     number: tuple[int, int] = (1, 1)
-    """The least and the most of them in a scene."""
+    """Range of their number in a scene."""
     x_mm: Range | Track | None = None
-    """From the sheet's left edge; None: anywhere on the sheet."""
+    """Distance from the sheet's left edge; None: anywhere on the sheet."""
     y_mm: Range | Track | None = None
-    """From its upper edge."""
+    """Distance from the sheet's upper edge; None: anywhere on the sheet."""
     angle_deg: Range | Track = Range(0.0, 0.0)
     force_n: Range | Track = Range(10.0, 10.0)
     approach_mm_s: Range | None = None
-    """Speed with which it comes in from the touch at 0 s until it has its force; None: it has it at once."""
+    """Speed of approach from the touch at 0 s until it has its force; None: full force at once."""
     speed_mm_s: Range = Range(0.0, 0.0)
     heading_deg: Range = Range(0.0, 360.0)
 
     def outline(self, rng: np.random.Generator) -> Shape:
-        """One of the shapes, around the origin."""
+        """A shape around the origin."""
         return SHAPES[self.shape][0](**{name: size.draw(rng) for name, size in self.sizes})
 
 
 @dataclasses.dataclass(frozen=True)
 class SceneFile:
-    """What a file says."""
+    """The content of a file."""
 
     kinds: tuple[Kind, ...]
     width_mm: float | None = None
-    """Of the sheet; None: any."""
+    """Width of the sheet; None: any."""
     height_mm: float | None = None
     seconds: float = 0.0
-    """How long a scene lasts; it is looked at in one instant of it."""
+    """Duration of a scene, which is sampled at one instant."""
     gap_mm: float | None = None
-    """The least distance between two contacts when the scene begins; None: they may overlap."""
+    """Least distance of two contacts at the beginning; None: overlaps are allowed."""
     count: int = 500
-    """Scenes to choose a Skin with; as many others are reported."""
+    """Scenes to choose a Skin with; as many others are for the report."""
     seed: int = 0
 
     @classmethod
     def load(cls, path: str | Path) -> SceneFile:
-        """Read a file. Raises :class:`SceneFileError` for what cannot be."""
+        """Read a file. Raises :class:`SceneFileError` for invalid content."""
         values = tomlfile.load(path, SceneFileError)
         try:
             return _scene_file(values)
@@ -181,7 +181,7 @@ def _count(where: str, value: Any) -> tuple[int, int]:
 
 
 def _value(name: str, value: Any, low: float, high: float) -> Range | Track:
-    """A number, a range, or what it is over time."""
+    """A number, a range, or a course over time."""
     if not isinstance(value, dict):
         return _range(name, value, low, high)
     _keys(name, value, ("seconds", "values"))
@@ -224,18 +224,17 @@ def _whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 DIRECTIONS = 128
-"""In which the distance of two shapes is looked for; it comes out short by at most 0.03 % of their size."""
+"""Directions for the distance of two shapes, which is short by at most 0.03 % of their size."""
 
 PLACES = 10
-"""Places that are tried for a contact beside others, before the scene is drawn again."""
+"""Places tried for a contact beside others before the scene is drawn again."""
 
 
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
-    """Scene ``number`` of a file on a sheet, and the instant in s at which it is looked at: not before all forces that
-    rise with an approach have risen.
+    """Scene ``number`` of a file on a sheet, and its sampling instant in s, after all approaches.
 
-    Depends on what the file says, the number, and the sheet's pitch and size. Raises SceneFileError where contacts
-    cannot be as far apart as the file asks.
+    Depends on the file's content, the number, and the sheet's pitch and size. Raises SceneFileError if contacts cannot
+    be as far apart as requested.
     """
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
@@ -251,7 +250,7 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
 
 
 def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | None:
-    """All contacts of a scene; None where one was not as far as asked from the others in some tries."""
+    """All contacts of a scene; None if one found no place far enough from the others."""
     placed: list[tuple[Shape, Contact]] = []
     for kind in file.kinds:
         for _ in range(int(rng.integers(kind.number[0], kind.number[1] + 1))):
@@ -267,7 +266,7 @@ def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | No
 
 
 def _start(contact: Contact) -> Shape:
-    """Its parts at 0 s, whether it presses yet or not."""
+    """Its parts at 0 s, even if it does not press yet."""
     x, y, angle = (
         value(0.0) if callable(value) else value for value in (contact.x_mm, contact.y_mm, contact.angle_deg)
     )
@@ -300,7 +299,7 @@ def _value_of(rng: Random, value: Range | Track) -> Value:
 def _along(
     rng: Random, given: Range | Track | None, edge: float, anywhere: float, speed: float, seconds: float
 ) -> Value:
-    """A place in mm over time; ``edge`` is where the sheet begins."""
+    """A place in mm over time; ``edge`` is the beginning of the sheet."""
     if isinstance(given, Track):
         return Track(given.seconds, tuple(edge + value for value in given.values))
     start = anywhere if given is None else edge + given.draw(rng)
@@ -308,7 +307,7 @@ def _along(
 
 
 def _gap_mm(one: Shape, other: Shape, skin: Skin) -> float:
-    """How far two shapes are apart on the sheet, around a closed one either way."""
+    """Distance of two shapes on the sheet, the shorter way around a closed one."""
     if skin.closed:
         around = around_m(skin)
         ends = [end for part in one for end in widths(part, Box())]
@@ -317,17 +316,17 @@ def _gap_mm(one: Shape, other: Shape, skin: Skin) -> float:
 
 
 def distance_mm(one: Shape, other: Shape) -> float:
-    """How far two shapes are apart; 0 or less where they meet.
+    """Distance of two shapes; at most 0 if they meet.
 
-    Convex sets are as far apart as the widest strip that parts them: the greatest -h_A(u) - h_B(-u) over all
-    directions u, where h is how far a set reaches (Boyd and Vandenberghe, Convex Optimization, 8.2).
+    The distance of convex sets is the width of the widest strip between them: the maximum of -h_A(u) - h_B(-u) over
+    directions u, with support functions h (Boyd and Vandenberghe, Convex Optimization, 8.2).
     """
     ahead, back = _reach(one), np.roll(_reach(other), DIRECTIONS // 2, axis=1)
     return float((-ahead[:, None] - back[None]).max(axis=2).min()) / M
 
 
 def _reach(shape: Shape) -> np.ndarray:
-    """(parts, directions): how far each part reaches from the origin, in m."""
+    """(parts, directions): support function of each part, in m."""
     angles = np.arange(DIRECTIONS) * (2 * math.pi / DIRECTIONS)
     along = np.cos(angles), np.sin(angles)
     return np.array([part.x_m * along[0] + part.y_m * along[1] + part.reach_m(angles) for part in shape])

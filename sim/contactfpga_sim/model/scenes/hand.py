@@ -1,17 +1,17 @@
-"""A hand that does on a virtual sheet what `contactfpga bringup` asks a person to do."""
+"""A simulated hand for the requests of `contactfpga bringup` on a virtual sheet."""
 
 from __future__ import annotations
 
 import numpy as np
 
 PRESS_S, MOVE_S = 1.0e-3, 0.4e-3
-"""A finger on each switch, and on its way to the next one."""
+"""Time of a finger on each switch, and on its way to the next."""
 HOLD_S = 0.025
-"""A ruler on each column: as long as it takes to tell that its switches have stopped bouncing."""
+"""Time of a ruler on each column, enough to see that its switches have stopped bouncing."""
 
 
 class Hand:
-    """Pressed cells as a function of the simulated time in s, as :class:`~contactfpga_sim.VirtualBoard` takes them."""
+    """Pressed cells as a function of the simulated time in s, for :class:`~contactfpga_sim.VirtualBoard`."""
 
     def __init__(self, rows: int, columns: int):
         self._shape = rows, columns
@@ -19,9 +19,9 @@ class Hand:
         self._since_s: float | None = None
 
     def does(self, what: str) -> float:
-        """From the next look on the hand does this: ``nothing``; ``finger``: it presses one switch after the other;
+        """Change the hand's action from the next sample on: ``nothing``; ``finger``: one switch after the other;
         ``ruler``: one column after the other; ``card``: the first half of the columns; ``plate``: all. Returns the
-        seconds that it takes for all of it; 0 for what it keeps doing."""
+        duration in s; 0 for a constant action."""
         if what not in DOES:
             raise ValueError(f"a hand cannot do {what!r}; take one of {', '.join(DOES)}")
         self._does, self._since_s = what, None

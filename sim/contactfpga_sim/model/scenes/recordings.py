@@ -1,4 +1,4 @@
-"""Frames that a real sheet recorded. What touched it is not known: a recording has cells and no truth."""
+"""Frames recorded from a real sheet: cells without a known truth."""
 
 from __future__ import annotations
 
@@ -15,29 +15,30 @@ from contactfpga.skin.limits import MAX_LINES, MAX_PITCH_MM, MIN_PITCH_MM
 from contactfpga_sim.model.scenes import cells
 
 DEFAULT_HZ = 100.0
-"""Rate at which a recording is played that does not come with one."""
+"""Default playback rate."""
 
 
 _RANGES = {"rate_hz": (1e-3, 1e6), "pitch_mm": (MIN_PITCH_MM, MAX_PITCH_MM)}
-"""What a .npz file may say of its frames, and within which limits."""
+"""Numbers that a .npz file may give for its frames, and their limits."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Recording:
-    """Frames in the order in which they were recorded."""
+    """Frames in recorded order."""
 
     pressed: np.ndarray
     """(frames, rows, columns) bool."""
     rate_hz: float = DEFAULT_HZ
-    """Frames per second; :data:`DEFAULT_HZ` where the file says nothing."""
+    """Frames per second; default :data:`DEFAULT_HZ`."""
     pitch_mm: float | None = None
-    """Distance of rows and columns; None where the file does not say."""
+    """Distance of rows and columns; None if unknown."""
     what: str = "the recording"
     """Its name, for messages."""
 
     @classmethod
     def of(cls, frames: np.ndarray, what: str, threshold: float | None = None) -> Recording:
-        """From (rows, columns) or (frames, rows, columns), bool or numbers with a threshold (:func:`cells.pressed`)."""
+        """A recording from (rows, columns) or (frames, rows, columns), bool or numbers with a threshold
+        (:func:`cells.pressed`)."""
         if frames.ndim == 2:
             frames = frames[None]
         if frames.ndim != 3:
@@ -51,13 +52,13 @@ class Recording:
 
     @classmethod
     def load(cls, path: str | Path, threshold: float | None = None) -> Recording:
-        """From a .npy file, or a .npz file with `pressed` and, where known, `rate_hz` and `pitch_mm`."""
+        """Load a .npy file, or a .npz file with `pressed` and optionally `rate_hz` and `pitch_mm`."""
         held = array_file.read(path, ("pressed", *_RANGES))
         facts: dict[str, Any] = {name: _number(path, name, held[name]) for name in _RANGES if name in held}
         return dataclasses.replace(cls.of(held["pressed"], str(path), threshold), **facts)
 
     def on(self, skin: Skin) -> Callable[[float], np.ndarray]:
-        """Time in s to the cells pressed then, played in a loop; the sheet must be the recorded one's size."""
+        """A function from time in s to pressed cells, played in a loop; the sheet must have the recorded size."""
         rows, columns = self.pressed.shape[1:]
         if (rows, columns) != (skin.rows, skin.columns):
             raise ValueError(

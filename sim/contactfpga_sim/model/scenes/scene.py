@@ -1,6 +1,6 @@
-"""What touches the sheet: contacts over time with their truth, recordings, and scenes by name.
+"""Touches of the sheet: contacts over time with their truth, recordings, and scenes by name.
 
-A :class:`Scene` knows no sheet: the same contacts press sheets of any pitch and size, through any cover.
+A :class:`Scene` is independent of the sheet: the same contacts press sheets of any pitch and size, through any cover.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from contactfpga_sim.model.scenes.shapes import SHAPES
 from contactfpga_sim.model.scenes.truth import Box, Truth, all_loads, truth_around, truth_of
 
 CellsAt = Callable[[float], np.ndarray]
-"""Time in s to the (rows, columns) bool cells that are pressed then."""
+"""A function from time in s to the pressed (rows, columns) bool cells."""
 
 FINGER_MM = 12.0
 """Radius of a fingertip's contact."""
 
 FOOT_MM = 260.0
-"""Length of a foot, where the sheet is long enough for it."""
+"""Length of a foot, if the sheet is long enough."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """Contacts over time. On a cylinder places are those on the sheet laid flat, and the cover counts as flat. Around a
-    closed sheet they are counted on: a contact that reaches past one end also lies at the other."""
+    """Contacts over time. On a cylinder, places are on the sheet laid flat, and the cover counts as flat. Around a
+    closed sheet places wrap: a contact beyond one end is also at the other."""
 
     contacts: tuple[Contact, ...]
 
     def loads(self, seconds: float) -> list[Load]:
-        """What lies on the cover at that time."""
+        """Loads on the cover at that time."""
         found = (contact.load(seconds) for contact in self.contacts)
         return [load for load in found if load is not None]
 
     def truth(self, seconds: float, skin: Skin | None = None) -> Truth:
-        """Number of contacts, areas in mm2 and barycenters in mm at that time, from the continuous shapes: parts that
-        overlap or touch are one contact. With a Skin, of what lies on its sheet, which ends half a pitch beyond the
-        outermost switches, or where it is closed meets itself there."""
+        """Number of contacts, areas in mm2 and barycenters in mm at that time, from the continuous shapes: overlapping
+        or touching parts are one contact. With a Skin, only of the part on its sheet, which ends half a pitch beyond
+        the outermost switches, or joins itself there if closed."""
         parts = [part for load in self.loads(seconds) for part in load.parts]
         if skin is None:
             return truth_of(parts)
@@ -54,20 +54,20 @@ class Scene:
 
     @property
     def settled_s(self) -> float:
-        """From this time on all forces that rise with an approach have risen; 0 where none does."""
+        """Time by which all approaches have their forces; 0 without any."""
         rises = (contact.force_n for contact in self.contacts)
         return max((rise.seconds for rise in rises if isinstance(rise, contacts.Rise)), default=0.0)
 
     def approaching(self, speed_mm_s: float) -> Scene:
-        """The same scene with all contacts touching at 0 s and coming in at this speed until they have their forces."""
+        """The scene with all contacts touching at 0 s and approaching at this speed until they have their forces."""
         return Scene(tuple(contacts.approaching(contact, speed_mm_s) for contact in self.contacts))
 
     def pressed(
         self, seconds: float, skin: Skin, cover: Cover | None = None, before: np.ndarray | None = None
     ) -> np.ndarray:
-        """(rows, columns) bool: the switches that are closed at that time. ``cover``: where there is none, those whose
-        middle lies under a contact, whatever its force: a bare sheet. ``before``: those that were closed until then,
-        for a switch with hysteresis. ``skin.mask`` plays no part, it is the gateware's."""
+        """(rows, columns) bool: the closed switches at that time. ``cover``: None for a bare sheet, on which switches
+        close under a contact whatever its force. ``before``: the closed ones until then, for hysteresis. ``skin.mask``
+        is ignored; the gateware applies it."""
         loads = self.loads(seconds)
         if skin.closed:
             loads = all_loads(loads, sheet(skin).left, around_m(skin))
@@ -79,8 +79,8 @@ class Scene:
         )
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
-        """:meth:`pressed` on this sheet as a function of time. Switches with hysteresis remember the last time they
-        were asked about, so times should rise."""
+        """:meth:`pressed` on this sheet as a function of time. Switches with hysteresis depend on the previous call, so
+        times should rise."""
         if all(contact.still for contact in self.contacts):
             still = self.pressed(0.0, skin, cover)
             return lambda seconds: still
@@ -97,13 +97,13 @@ class Scene:
 
 
 def sheet(skin: Skin) -> Box:
-    """The sheet laid flat, in m: half a pitch more than the outermost switches on every side."""
+    """The sheet laid flat, in m: half a pitch beyond the outermost switches on every side."""
     x, y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
     return Box(-x / 2, (skin.columns - 0.5) * x, -y / 2, (skin.rows - 0.5) * y)
 
 
 def around_m(skin: Skin) -> float:
-    """Length of the sheet along its columns, which is the circumference of a closed one, in m."""
+    """Length of the sheet along its columns in m, the circumference of a closed one."""
     return skin.columns * skin.pitch_x_mm * contacts.M
 
 
@@ -119,7 +119,7 @@ def fingertip(skin: Skin) -> Scene:
 
 
 def two_fingers(skin: Skin) -> Scene:
-    """Two fingertips side by side, with at least one free column between them; on a single column, one free row."""
+    """Two fingertips side by side, with at least one free column between them; on a single column, a free row."""
     width, height = _extent(skin)
     gap, angle = (1.01 * skin.pitch_y_mm, 90.0) if skin.columns == 1 else (1.01 * skin.pitch_x_mm, 0.0)
     return Scene(contacts.pair(gap, FINGER_MM, width / 2, height / 2, angle))
@@ -132,7 +132,7 @@ def palm(skin: Skin) -> Scene:
 
 
 def sole(skin: Skin) -> Scene:
-    """A bare foot in the middle, along the sheet's longer side and as long as that allows."""
+    """A bare foot in the middle, along the sheet's longer side, as long as fits."""
     width, height = _extent(skin)
     along, angle = (height + 0.9 * skin.pitch_y_mm, 0.0) if height >= width else (width + 0.9 * skin.pitch_x_mm, 90.0)
     shape = contacts.sole(min(FOOT_MM, along))
@@ -140,7 +140,7 @@ def sole(skin: Skin) -> Scene:
 
 
 def edge(skin: Skin) -> Scene:
-    """A straight edge across the sheet, 20 degrees off the rows and wide enough to press a switch in each column."""
+    """A straight edge across the sheet, 20 degrees off the rows, wide enough to press a switch in each column."""
     width, height = _extent(skin)
     shape = contacts.edge(2 * (width + height) + 100, 1.1 * skin.pitch_y_mm)
     return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, angle_deg=20.0, force_n=40.0),))
@@ -155,7 +155,7 @@ def moving(skin: Skin) -> Scene:
 
 
 def pushing(skin: Skin) -> Scene:
-    """Two fingertips whose forces swing between 2 and 18 N, one rising while the other falls, once per second."""
+    """Two fingertips whose forces swing in opposition between 2 and 18 N, once per second."""
     width, height = _extent(skin)
     left, right = Swing(10.0, 8.0, 1.0), Swing(10.0, 8.0, 1.0, math.pi)
     places = ((0.3 * width, 0.35 * height, left), (0.7 * width, 0.65 * height, right))
@@ -170,8 +170,8 @@ def nothing(skin: Skin) -> Scene:
 
 
 def around(skin: Skin) -> Scene:
-    """A fingertip that moves around the limb of a closed sheet twice per second, over the seam at first; on an open
-    sheet it leaves at the last column and comes back at the first."""
+    """A fingertip that circles the limb of a closed sheet twice per second, starting over the seam; on an open sheet it
+    leaves at the last column and returns at the first."""
     _, height = _extent(skin)
     start = -skin.pitch_x_mm / 2
     x = Round(start, skin.columns * skin.pitch_x_mm, 2.0)
@@ -179,7 +179,7 @@ def around(skin: Skin) -> Scene:
 
 
 def grip(skin: Skin) -> Scene:
-    """A hand that grips the limb of a closed sheet all the way round; on an open sheet, a bar across all columns."""
+    """A hand around the limb of a closed sheet; on an open sheet, a bar across all columns."""
     width, height = _extent(skin)
     shape = contacts.edge(width + 2 * skin.pitch_x_mm, max(1.1 * skin.pitch_y_mm, 0.3 * height))
     return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, force_n=60.0),))
@@ -188,27 +188,27 @@ def grip(skin: Skin) -> Scene:
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
     scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
 }
-"""Every contact scene for any sheet by its name."""
+"""Contact scenes by name, for any sheet."""
 
 AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}
-"""Those for sheets whose ends meet."""
+"""Contact scenes by name, for sheets whose ends meet."""
 
 _BY_NAME = CONTACTS | AROUND
 
 NAMES = (*_BY_NAME, *SHAPES)
-"""All that :func:`scene` knows by name: contacts, and the shapes that break labellers."""
+"""Names that :func:`scene` accepts: contacts, and the shapes that break labellers."""
 
 Source = str | Path | np.ndarray | Scene | Recording | CellsAt | None
-"""What :func:`scene` takes."""
+"""Argument of :func:`scene`."""
 
 
 def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> CellsAt:
     """The cells that a scene presses on a sheet, as a function of time.
 
-    ``source``: one of :data:`NAMES` (none given: fingertip); a Scene; a Recording, or a .npy or .npz file of one, or
-    an array (rows, columns) or (frames, rows, columns), played in a loop
-    (:mod:`contactfpga_sim.model.scenes.recordings`); or a function of time. ``cover``: through which contacts
-    press; recordings and functions give cells. Raises ValueError for anything else.
+    ``source``: one of :data:`NAMES` (default: fingertip); a Scene; a Recording, its .npy or .npz file, or an array
+    (rows, columns) or (frames, rows, columns), played in a loop (:mod:`contactfpga_sim.model.scenes.recordings`); or a
+    function of time. ``cover``: through which contacts press; irrelevant for recordings and functions. Raises
+    ValueError for anything else.
     """
     if source is None:
         source = "fingertip"
@@ -232,7 +232,7 @@ def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> Cell
 
 
 def contacts_of(skin: Skin, source: Source) -> Scene | None:
-    """The contacts of a source, where it has some: a Scene, or the name of one."""
+    """The contacts of a Scene or the name of one; None for other sources."""
     if isinstance(source, Scene):
         return source
     if source is None:

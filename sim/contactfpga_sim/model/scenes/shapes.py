@@ -8,7 +8,7 @@ import numpy as np
 
 
 def spiral(rows: int, columns: int) -> np.ndarray:
-    """One arm, one cell wide, wound inwards with a gap of one cell: merged only at its very end."""
+    """One arm, one cell wide, wound inward with a gap of one cell: merged only at its end."""
     cells = np.zeros((rows, columns), bool)
     y, x, dy, dx = 0, 0, 0, 1
     cells[0, 0] = True
@@ -31,7 +31,7 @@ def _inside(cells: np.ndarray, place: tuple[int, int]) -> bool:
 
 
 def comb(rows: int, columns: int) -> np.ndarray:
-    """Teeth in every second column, joined by the last row: all of them merge at the very end."""
+    """Teeth in every second column, joined by the last row: all merge at the end."""
     cells = np.zeros((rows, columns), bool)
     cells[:, ::2] = True
     cells[-1] = True
@@ -39,20 +39,20 @@ def comb(rows: int, columns: int) -> np.ndarray:
 
 
 def checkerboard(rows: int, columns: int) -> np.ndarray:
-    """Every second cell: one zone with 8-connectivity, the most zones there can be with 4."""
+    """Every second cell: one zone with 8-connectivity, the most possible zones with 4."""
     y, x = np.indices((rows, columns))
     return (y + x) % 2 == 0
 
 
 def nested_u(rows: int, columns: int) -> np.ndarray:
-    """Cups in one another, open at the top: the most zones that wait at once, the inner ones closed first."""
+    """Nested cups, open at the top: the most zones that wait at once, the inner ones closed first."""
     y, x = np.indices((rows, columns))
     depth = np.minimum(np.minimum(x, columns - 1 - x), rows - 1 - y)
     return depth % 2 == 0
 
 
 def nested_arch(rows: int, columns: int) -> np.ndarray:
-    """The same upside down: the outer ones closed first."""
+    """Nested arches, open at the bottom: the outer ones closed first."""
     return nested_u(rows, columns)[::-1]
 
 
@@ -93,7 +93,7 @@ def rings(rows: int, columns: int) -> np.ndarray:
 
 
 def dots(rows: int, columns: int) -> np.ndarray:
-    """Single cells in every second row and column: the most zones there can be with 8-connectivity."""
+    """Single cells in every second row and column: the most possible zones with 8-connectivity."""
     y, x = np.indices((rows, columns))
     return (y % 2 == 0) & (x % 2 == 0)
 
@@ -112,7 +112,7 @@ def diagonals(rows: int, columns: int) -> np.ndarray:
 
 
 def zigzag(rows: int, columns: int) -> np.ndarray:
-    """Lines that run down and up again: every turn at the top is a new zone that merges later."""
+    """Lines that run down and up again: every upper turn is a new zone that merges later."""
     y, x = np.indices((rows, columns))
     wave = np.abs(x % 6 - 3)
     return (y - wave) % 4 == 0
@@ -134,7 +134,7 @@ SHAPES: dict[str, Callable[[int, int], np.ndarray]] = {
 
 
 def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:
-    """(name, (rows, columns) bool) of every shape in all eight flips and transposes that differ."""
+    """(name, (rows, columns) bool) of every shape in all distinct flips and transposes."""
     for name, shape in SHAPES.items():
         seen = set()
         for transposed in (False, True):
@@ -148,8 +148,8 @@ def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def around(rows: int, columns: int) -> np.ndarray:
-    """(n, rows, columns) bool, for a sheet whose last column is a neighbor of the first: all variants, shifted over the
-    seam and sheared around the cylinder; helices; spirals; hooks."""
+    """(n, rows, columns) bool, for a closed sheet: all variants, shifted over the seam and sheared around the cylinder;
+    helices; spirals; hooks."""
     frames = []
     for _, cells in variants(rows, columns):
         for lean in (-3, -1, 0, 1, 2):
@@ -169,8 +169,8 @@ def around(rows: int, columns: int) -> np.ndarray:
 
 
 def _hook(rows: int, columns: int) -> np.ndarray:
-    """An arch with one leg on either side of the seam, and inside it a zone that the last row joins with one leg: the
-    arch lies on two turns when it is found, the zone on one."""
+    """An arch with a leg on either side of the seam, and inside it a zone that the last row joins with one leg: the
+    arch is on two turns when found, the zone on one."""
     cells = np.zeros((rows, columns), bool)
     cells[0, [0, 1, 2, -2, -1]] = cells[-1, :3] = True
     cells[:, [2, -2]] = True

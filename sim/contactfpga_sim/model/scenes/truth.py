@@ -1,13 +1,12 @@
-"""How many contacts there are, how large and where, from their continuous shapes alone.
+"""Number, size and place of contacts, from their continuous shapes alone.
 
-Parts that overlap or touch are one contact. A row of constant y cuts each part, which is convex, in one interval; the
-union of the intervals is exact, and it is integrated over y by Gauss-Legendre between all heights at which a part
-begins, ends or has a corner, or at which two outlines cross. The result is off by 1e-7 of the area at most, unless two
-outlines cross twice between two of the :data:`SAMPLES` heights of a stretch at which they are compared; the sliver
-between them is then counted to about its own size.
+Overlapping or touching parts are one contact. A row of constant y cuts each convex part in one interval; the exact
+union of intervals is integrated over y by Gauss-Legendre between all heights of beginnings, ends, corners and crossings
+of outlines. The error is at most 1e-7 of the area, unless two outlines cross twice between two of the :data:`SAMPLES`
+compared heights of a stretch; the sliver between them is then miscounted.
 
-A sheet whose ends meet goes on past them, laid flat, for any number of turns, and so does everything that touches it.
-Each contact presses wherever it comes to lie around the cylinder.
+A sheet whose ends meet, laid flat, repeats for any number of turns, as do its contacts, which press wherever they reach
+around the cylinder.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ import numpy as np
 from contactfpga.design.cover import Load, Part
 
 TOUCH_M = 1e-9
-"""Parts that are no farther apart count as one contact, so that rounding does not part two that touch."""
+"""Largest gap of parts that count as one contact, so that rounding does not separate touching ones."""
 
 SAMPLES = 65
-"""Heights of a stretch at which outlines are compared to find where they cross."""
+"""Compared heights per stretch for finding crossings of outlines."""
 
 NODES = 24
-"""Gauss-Legendre nodes of a stretch without a crossing."""
+"""Gauss-Legendre nodes per stretch without a crossing."""
 
 
 class TrueContact(NamedTuple):
@@ -38,25 +37,25 @@ class TrueContact(NamedTuple):
 
     area_mm2: float
     x_mm: float
-    """Barycenter along the columns; column 0 lies at 0. NaN if the contact goes all the way round a closed sheet."""
+    """Barycenter along the columns; column 0 is at 0. NaN for a contact all around a closed sheet."""
     y_mm: float
-    """Barycenter along the rows; row 0 lies at 0."""
+    """Barycenter along the rows; row 0 is at 0."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """The contacts at one instant, in the order in which :class:`contactfpga.Zones` come: by y, x and area."""
+    """The contacts at one instant, in the order of :class:`contactfpga.Zones`: by y, x and area."""
 
     contacts: tuple[TrueContact, ...]
 
     @property
     def count(self) -> int:
-        """How many contacts there are."""
+        """Number of contacts."""
         return len(self.contacts)
 
     @property
     def area_mm2(self) -> float:
-        """The area of all of them."""
+        """Total area of the contacts."""
         return math.fsum(contact.area_mm2 for contact in self.contacts)
 
 
@@ -70,7 +69,7 @@ class Box(NamedTuple):
 
 
 def truth_of(parts: Sequence[Part], box: Box = Box()) -> Truth:  # noqa: B008, a tuple that cannot change
-    """The contacts that these parts make, as far as they lie in the box."""
+    """The contacts of these parts, within the box."""
     groups = _groups([part for part in parts if lies_in(part, box)], box)
     return in_order(measured(group, box) for group in groups)
 
@@ -87,18 +86,18 @@ def _heights(part: Part, box: Box) -> tuple[float, float]:
 
 
 def widths(part: Part, box: Box) -> tuple[float, float]:
-    """Where it begins and ends along the columns, in m."""
+    """Extent along the columns, in m."""
     half = part.half_box_m[0]
     return max(part.x_m - half, box.left), min(part.x_m + half, box.right)
 
 
 def lies_in(part: Part, box: Box) -> bool:
-    """Whether any of it does."""
+    """Whether any part of it is in the box."""
     return distance_m([part], box) < 0
 
 
 def _groups(parts: Sequence[Part], box: Box) -> list[list[Part]]:
-    """Parts that are joined, directly or through others."""
+    """Parts that are joined, directly or indirectly."""
     groups: list[list[Part]] = []
     for part in parts:
         joined = [group for group in groups if any(distance_m([part, other], box) <= TOUCH_M for other in group)]
@@ -108,10 +107,10 @@ def _groups(parts: Sequence[Part], box: Box) -> list[list[Part]]:
 
 
 def distance_m(parts: Sequence[Part], box: Box) -> float:
-    """Below 0 if all these parts have a place in the box in common; a distance along x or y in m otherwise.
+    """Below 0 if all these parts share a point in the box; else a distance along x or y in m.
 
-    A part's left end is convex over y and its right end concave, so what lies between the rightmost left end and the
-    leftmost right end is convex, and its minimum is found by narrowing.
+    A part's left end is convex over y and its right end concave, so the difference of the rightmost left end and the
+    leftmost right end is convex, and its minimum is found by bisection.
     """
     low = max(_heights(part, box)[0] for part in parts)
     high = min(_heights(part, box)[1] for part in parts)
@@ -162,14 +161,14 @@ def _holds(box: Box, part: Part) -> bool:
 
 
 def _outlines(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
-    """(curves, heights): where each part begins and ends, and the box's sides where it has some."""
+    """(curves, heights): beginning and end of each part, and the box's sides if any."""
     curves = [curve for part in parts for curve in part.span(y)]
     curves += [np.full(y.shape, side) for side in (box.left, box.right) if math.isfinite(side)]
     return np.array(curves)
 
 
 def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> list[float]:
-    """Heights between which outlines keep their order; each part is cut all the way from start to end, or nowhere."""
+    """Heights between which outlines keep their order; each part is cut from start to end, or nowhere."""
     middle, half = (start + end) / 2, (end - start) / 2
     active = [part for part in parts if np.isfinite(part.span(np.array(middle))[0])]
     if not active:  # between two parts that hardly touch
@@ -195,7 +194,7 @@ def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> lis
 
 @functools.cache
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
-    """Heights from -1 to 1 and weights. Turned by a cosine, the square root at an ellipse's end is smooth."""
+    """Heights from -1 to 1 and weights, substituted by a cosine, which smooths the square root at an ellipse's end."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     angle = math.pi / 2 * (nodes + 1)
     return -np.cos(angle), math.pi / 2 * weights * np.sin(angle)
@@ -220,8 +219,8 @@ def _stretch(parts: Sequence[Part], box: Box, low: float, high: float) -> np.nda
 
 
 def all_loads(loads: Sequence[Load], left_m: float, around_m: float) -> list[Load]:
-    """What presses the sheet that begins at ``left_m``: each load on all turns that come within a turn of it, as a
-    cover spreads what lies beside a switch."""
+    """The loads on the sheet that begins at ``left_m``: each on all turns within a turn of it, as a cover spreads loads
+    beside a switch."""
     box = Box(left_m - around_m, left_m + 2 * around_m)
     return [
         Load(tuple(_moved(part, turn * around_m) for part in load.parts), load.force_n)
@@ -231,9 +230,9 @@ def all_loads(loads: Sequence[Load], left_m: float, around_m: float) -> list[Loa
 
 
 def truth_around(parts: Sequence[Part], box: Box, around_m: float) -> Truth:
-    """The contacts that these parts make on a sheet of this circumference, which fills the box.
+    """The contacts of these parts on a sheet of this circumference, which fills the box.
 
-    The x of a contact counts from 0 to the circumference; one that goes all the way round has none.
+    The x of a contact is from 0 to the circumference; one all the way round has none.
     """
     band = Box(top=box.top, bottom=box.bottom)
     return in_order(
@@ -243,7 +242,7 @@ def truth_around(parts: Sequence[Part], box: Box, around_m: float) -> Truth:
 
 
 def on_all_turns(parts: Sequence[Part], box: Box, around_m: float) -> list[Part]:
-    """Where these parts lie in the box, or touch its left or right: each on as many turns as it does."""
+    """These parts on every turn where they are in the box, or touch its left or right."""
     return [_moved(part, turn * around_m) for part in parts for turn in _turns(part, box, around_m)]
 
 
@@ -253,13 +252,13 @@ def _unrolled(group: Sequence[Part], band: Box, around_m: float) -> tuple[float,
 
 
 def _around(group: Sequence[Part], box: Box, around_m: float) -> tuple[float, float, float]:
-    """Parts that lie over each other on several turns count once, so what is measured is one turn of all of them."""
+    """Area and barycenter of one turn, counting overlaps of several turns once."""
     area, _, y = measured(on_all_turns(group, box, around_m), box)
     return area, math.nan, y
 
 
 def _groups_around(parts: Sequence[Part], band: Box, around_m: float) -> Iterator[tuple[list[Part], bool]]:
-    """Parts that are joined, each on the turn where it joins the others, and whether a way through them leads round."""
+    """Joined parts, each on its turn, and whether they close around."""
     turns: dict[int, int] = {}
     for seed in range(len(parts)):
         if seed in turns:
@@ -276,13 +275,13 @@ def _groups_around(parts: Sequence[Part], band: Box, around_m: float) -> Iterato
 
 
 def _meetings(one: Part, other: Part, band: Box, around_m: float) -> list[int]:
-    """By how many turns the other part has to be moved to meet this one."""
+    """Turns by which the other part must move to meet this one."""
     near = _turns(other, Box(*widths(one, band)), around_m)
     return [turn for turn in near if distance_m([one, _moved(other, turn * around_m)], band) <= TOUCH_M]
 
 
 def _turns(part: Part, box: Box, around_m: float) -> range:
-    """By how many turns it can be moved to lie between the box's left and right, or to touch them."""
+    """Turns by which it can move to be between the box's left and right, or touch them."""
     left, right = widths(part, Box())
     first, last = (box.left - right - TOUCH_M) / around_m, (box.right - left + TOUCH_M) / around_m
     return range(math.ceil(first), math.floor(last) + 1)

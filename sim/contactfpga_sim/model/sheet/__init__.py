@@ -1,1 +1,1 @@
-"""The sheet and its wiring, as the board's pins see them."""
+"""The sheet and its wiring, seen from the board's pins."""

@@ -1,6 +1,6 @@
-"""Circuits of many kinds in the project's model and in ngspice: do both say the same of each phase of the scan?
+"""Circuits of many kinds in the project's model and in ngspice, compared over each phase of the scan.
 
-ngspice, where it is installed, is an opinion on the circuit model that shares no code.
+ngspice, if installed, is an independent check of the circuit model.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ PHASES: dict[str, tuple[Callable[[Network, Levels], Phase], tuple[str, ...]]] = 
     "project columns": (phases.project_columns, ("one cell", "all but a column", "checker")),
 }
 ROUNDS = 7
-"""Of each phase; the first one has the nominal circuit at 16x16."""
+"""Rounds per phase; the first has the nominal circuit at 16x16."""
 PATTERN_SEED = 13
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpiceCase:
-    """A circuit with a pattern, in a phase that ends."""
+    """A circuit with a pattern, in a phase."""
 
     circuit: Circuit
     pattern: str
@@ -49,7 +49,7 @@ class SpiceCase:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpiceComparison:
-    """Seconds of both, and the lowest volts of a column that should stay high, in a phase that settles."""
+    """Seconds by both models, and the lowest volts of a column that should stay high, for a phase."""
 
     case: SpiceCase
     ours_s: float
@@ -59,12 +59,12 @@ class SpiceComparison:
 
     @property
     def error(self) -> float:
-        """Share by which ours is longer."""
+        """Relative excess of our time."""
         return self.ours_s / self.spice_s - 1
 
 
 def cases() -> Iterator[SpiceCase]:
-    """Some 40 circuits, the same ones each time."""
+    """Some 40 reproducible circuits."""
     rng = np.random.default_rng(PATTERN_SEED)
     for again in range(ROUNDS):
         for number, (make, names) in enumerate(PHASES.values()):
@@ -79,7 +79,7 @@ def _case(
     rng: np.random.Generator,
     nominal: bool,
 ) -> SpiceCase:
-    """Circuits are drawn until one comes to levels that can be read."""
+    """A case whose circuit reaches readable levels."""
     pressed = rng.random(size) < 0.3 if pattern == "random" else patterns.named(*size)[pattern]
     while True:
         circuit = Circuit() if nominal else _drawn(rng)
@@ -90,7 +90,7 @@ def _case(
 
 
 def _drawn(rng: np.random.Generator) -> Circuit:
-    """Each value anywhere in a range, on a logarithmic scale, to two digits."""
+    """A circuit of values on a logarithmic scale, to two digits."""
 
     def between(low: float, high: float) -> float:
         return float(f"{low * (high / low) ** rng.random():.2g}")
@@ -110,7 +110,7 @@ def _drawn(rng: np.random.Generator) -> Circuit:
 
 
 def compared(case: SpiceCase) -> SpiceComparison:
-    """Both opinions."""
+    """Run both models."""
     phase = case.phase
     ours = phases.passed(phase)
     seconds, volts = run(phase, float(ours.trace.seconds[-1]))
@@ -125,19 +125,18 @@ def _lowest(phase: Phase, volts: np.ndarray) -> float:
 
 
 EDGE_S = 1e-12
-"""In which a pin begins or ends to drive."""
+"""Rise time of a pin's drive."""
 OPEN_OHM = 1e12
 TIMEOUT_S = 600
 
 
 def installed() -> bool:
-    """ngspice is on the PATH."""
+    """Whether ngspice is on the PATH."""
     return shutil.which("ngspice") is not None
 
 
 def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) seconds and (n, lines) volts under the phase's last drive; ``celsius``: of the diodes, which our model has
-    at 27."""
+    """(n,) seconds and (n, lines) volts under the phase's last drive; ``celsius``: of the diodes, 27 in our model."""
     if not installed():
         raise MissingTool("the comparison", "ngspice", "apt install ngspice")
     with tempfile.TemporaryDirectory() as folder:
@@ -156,11 +155,11 @@ def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) 
 
 
 SCHOTTKY_GAP = "EG=0.69 XTI=2"
-"""By which SPICE makes a Schottky diode's current follow its temperature; at 27 degrees Celsius it changes nothing."""
+"""SPICE's band gap for the temperature of a Schottky diode; no effect at 27 degrees Celsius."""
 
 
 def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: float = 27.0) -> str:
-    """The deck: it comes to rest under the first drive, and writes time and volts of all lines."""
+    """The deck: it settles under the first drive, and writes time and volts of all lines."""
     lines = phase.network.rows + phase.network.columns
     end = sum(phase.seconds) + seconds
     names = " ".join(f"v({line})" for line in range(1, lines + 1))
@@ -189,7 +188,7 @@ def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: floa
 
 
 def _parts(network: Network) -> Iterator[str]:
-    """Node 1 is the first column; rows follow the columns."""
+    """Circuit elements; node 1 is the first column, rows follow the columns."""
     circuit, rows, columns = network.circuit, network.rows, network.columns
     for line in range(1, rows + columns + 1):
         yield f"Cg{line} {line} 0 {circuit.line_pf}p"
@@ -211,7 +210,7 @@ def _parts(network: Network) -> Iterator[str]:
 
 
 def _pins(phase: Phase) -> Iterator[str]:
-    """Of each line a source with the level, and a switch that is closed while the pin drives."""
+    """For each line a source of the level, and a switch that is closed while the pin drives."""
     starts = [0.0, *np.cumsum([0.0, *phase.seconds]).tolist()]
     for line in range(phase.network.rows + phase.network.columns):
         levels = [float(drive.volts[line]) for drive in phase.drives]
@@ -226,7 +225,7 @@ def _pins(phase: Phase) -> Iterator[str]:
 
 
 def _steps(starts: list[float], values: list[float]) -> str:
-    """A source that has the first value at first, and each further one from its start on."""
+    """A source with each value from its start on."""
     points = [f"0 {values[0]:g}"]
     for start, before, after in zip(starts[1:], values, values[1:]):
         if before != after:

@@ -1,4 +1,4 @@
-"""A converter at the board's pins, edge by edge as its data sheet has it, with what its inputs are set to."""
+"""A converter at the board's pins, edge by edge by its data sheet, with set inputs."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Mcp3208:
 
     def __init__(self, codes: Sequence[int]):
         self.codes = list(codes)
-        """What each input would read now."""
+        """Current reading of each input."""
         self._select_n = self._clock = self._mosi = 1
         self._rises = 0  # since the start bit, that one counted
         self._command: list[int] = []
         self._held = self._output = 0
 
     def step(self, clock: int, select_n: int, mosi: int) -> tuple[int, ...]:
-        """The levels that it gives in this cycle."""
+        """Output levels in this cycle."""
         rose, fell = clock and not self._clock, self._clock and not clock
         if select_n:
             self._rises, self._command, self._output = 0, [], 0
@@ -50,23 +50,22 @@ class Mcp3208:
 
 
 PERIOD, AHEAD = 2048, 4
-"""Periods of its clock from one conversion to the next, and before that during which ready is high anyhow."""
+"""Clock periods per conversion, and periods before its end in which ready is high anyhow."""
 WORDS, BITS = 10, 24
 SETTLING = 2
 """Results after power-up from the filter that settles within one period."""
 
 
 class Ads131m08:
-    """All channels at once. A result is what the inputs were in the middle of what its filter averages: three periods,
-    but one alone for the first two results after power-up (SBAS950B 8.3.7.1). It keeps two results that were not read.
-    """
+    """All channels at once. A result is of the middle of the filter's window: three periods, but one for the first two
+    results after power-up (SBAS950B 8.3.7.1). It keeps two unread results."""
 
     reads: tuple[str, ...] = ("spi_clock", "spi_select_n", "spi_mosi", "spi_pace")
     gives: tuple[str, ...] = ("spi_miso", "spi_ready_n")
 
     def __init__(self, codes: Sequence[int]):
         self.codes = list(codes)
-        """What each input would read now, from 0 on, with no voltage in the middle."""
+        """Current reading of each input, from 0 on, with no voltage in the middle."""
         self._middles: list[list[int]] = []
         self._results: list[list[int]] = []
         self._ready_n, self._pace, self._clock, self._select_n = 1, 0, 0, 1
@@ -75,7 +74,7 @@ class Ads131m08:
         self._output = 0
 
     def step(self, clock: int, select_n: int, mosi: int, pace: int) -> tuple[int, ...]:
-        """The levels of data and ready that it gives in this cycle."""
+        """Levels of data and ready in this cycle."""
         if pace and not self._pace:
             self._convert()
         if select_n:
@@ -105,8 +104,8 @@ class Ads131m08:
             self._ready_n = 0
 
     def _next_frame(self) -> int:
-        """The oldest result, or where there is none the last one again: its status, eight channels in two's complement,
-        a check that nobody looks at."""
+        """The oldest result, else the last one again: its status, eight channels in two's complement, an unused
+        check."""
         if self._results:
             self._last = self._results[0]
         status, check = 0x050000 | 0xFF00 * bool(self._results), 0xA5A500
@@ -121,7 +120,7 @@ _MODELS: dict[str, type[Model]] = {"mcp3208": Mcp3208, "ads131m08": Ads131m08}
 
 
 def converter_of(skin: Skin) -> Model | None:
-    """The one of a Skin, or None without units."""
+    """The converter of a Skin; None without units."""
     if not skin.units:
         return None
     check_simulated(skin)
@@ -130,7 +129,7 @@ def converter_of(skin: Skin) -> Model | None:
 
 
 def check_simulated(skin: Skin) -> None:
-    """Raises SkinError for units on a converter that no simulation knows."""
+    """Raises SkinError for units on a converter without a simulation."""
     chosen = converters.find(skin.converter)
     if skin.units and chosen.name not in _MODELS:
         raise SkinError(f"converter is {chosen.name!r}, which is not simulated; give it a model (docs/extend.md)")

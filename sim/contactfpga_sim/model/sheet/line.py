@@ -1,4 +1,4 @@
-"""Lines that take time, as the compiled board has them: what is left of the sheet's circuit at each clock."""
+"""Lines with settling times in the compiled board: the sheet's circuit, reduced per clock."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class ColumnLine:
     """A column goes exponentially to the level that a pressed switch pulls it to, or back to the released one.
 
     Levels are shares of the way from the supply to ground. Both exponentials cross the threshold when the circuit's
-    column crosses the level from which on it is surely read.
+    column reaches its surely read level.
     """
 
     press_s: tuple[float, ...]
-    """Time constants toward pressed, by how many columns the selected row pulls."""
+    """Time constants toward pressed, by the number of columns that the row pulls."""
     pulled: tuple[float, ...]
-    """Share of the way at which a column comes to rest, by the same number."""
+    """Final share of the way of a column, by the same number."""
     release_s: float
     """Time constant toward released."""
     threshold: float
@@ -35,7 +35,7 @@ class ColumnLine:
     def of(
         cls, circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", most: int | None = None
     ) -> ColumnLine:
-        """Of a sheet whose rows are all pressed alike, the slowest; with at most ``most`` pressed switches a row."""
+        """The slowest column of a sheet with equally pressed rows, at most ``most`` pressed switches a row."""
         levels = Levels.of(circuit, diodes)
         threshold = 1 - levels.low / circuit.supply_v
         counts = [count for count in (1, 2, 4, 8, 16, 32) if count < (most or columns)] + [most or columns]
@@ -52,19 +52,19 @@ class ColumnLine:
 
     @staticmethod
     def share(constant_s: float, seconds: float) -> float:
-        """How much of its way a level goes in this time."""
+        """Share of the way covered in this time."""
         return -math.expm1(-seconds / constant_s) if constant_s else 1.0
 
 
 @dataclasses.dataclass(frozen=True)
 class RowLine:
-    """Likewise a row that is let go while columns drive: it goes to the level to which pressed switches lift it, or
-    back to the untouched one. Levels are shares of the way from the untouched level to the columns' one."""
+    """A released row while columns drive goes to the level to which pressed switches lift it, or back to the untouched
+    one. Levels are shares of the way from the untouched level to the columns'."""
 
     rise_s: tuple[float, ...]
-    """Time constants toward touched, by how many pressed switches lift the row."""
+    """Time constants toward touched, by the number of pressed switches."""
     lifted: tuple[float, ...]
-    """Share of the way at which it comes to rest, by the same number."""
+    """Final share of the way, by the same number."""
     fall_s: float
     """Time constant toward untouched."""
     threshold: float
@@ -72,7 +72,7 @@ class RowLine:
 
     @classmethod
     def of(cls, circuit: Circuit, columns: int, diodes: str = "col2row") -> RowLine:
-        """Of a row that is touched alone."""
+        """A row that is touched alone."""
         levels = Levels.of(circuit, diodes)
         threshold = levels.high / circuit.supply_v
         counts = [count for count in (1, 2, 4, 8, 16, 32) if count < columns] + [columns]
@@ -87,7 +87,7 @@ class RowLine:
 
 
 def lines_of(circuit: Circuit, skin: Skin, most: int | None = None) -> tuple[ColumnLine, RowLine | None]:
-    """Columns of a Skin's sheet, with at most ``most`` pressed switches a row, and rows if they are read."""
+    """Columns of a Skin's sheet, with at most ``most`` pressed switches a row, and rows if read."""
     if skin.guard:
         most = None  # the guard row presses all columns
     columns = ColumnLine.of(circuit, skin.row_lines, skin.column_lines, skin.diodes, most)
@@ -99,8 +99,7 @@ def _one_row(circuit: Circuit, columns: int, count: int) -> Network:
 
 
 def _lifted(circuit: Circuit, levels: Levels, columns: int, count: int) -> tuple[float, float]:
-    """Seconds until a row that so many pressed switches lift reads touched, 0 if that is never, and the share at which
-    it comes to rest."""
+    """Seconds until a row with ``count`` pressed switches reads touched, 0 if never, and its final share."""
     phase = phases.project_rows(_one_row(circuit, columns, count), levels, lifted=True)
     seconds = phases.passed(phase).seconds
     share = float(phases.rest_volts(phase)[columns]) / circuit.supply_v
@@ -108,12 +107,12 @@ def _lifted(circuit: Circuit, levels: Levels, columns: int, count: int) -> tuple
 
 
 def _alike(circuit: Circuit, rows: int, columns: int, count: int) -> Network:
-    """This many pressed switches in each row, side by side."""
+    """A network with this many adjacent pressed switches in each row."""
     return Network(circuit, np.tile(np.arange(columns) < count, (rows, 1)))
 
 
 def _pressed(circuit: Circuit, levels: Levels, rows: int, columns: int, count: int) -> tuple[float, float]:
-    """Seconds until the last column reads pressed, 0 if that is never, and the share at which it comes to rest."""
+    """Seconds until the last column reads pressed, 0 if never, and its final share."""
     phase = phases.settle(_alike(circuit, rows, columns, count), levels)
     share = 1 - float(phases.rest_volts(phase)[:count].max()) / circuit.supply_v
     done = phases.passed(phase)

@@ -1,6 +1,5 @@
-"""The sheet at the board's pins: switches with an ideal diode each, guard lines, lines that are stuck, cut or joined,
-and diodes that are bridged.
-"""
+"""The sheet at the board's pins: switches with ideal diodes, guard lines, stuck, cut or joined lines, and bridged
+diodes."""
 
 from __future__ import annotations
 
@@ -16,23 +15,23 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Shorts:
-    """Joints of no resistance, in the sheet's rows and columns, a guard line as the last one."""
+    """Joints without resistance, in the sheet's rows and columns, a guard line as the last."""
 
     rows: tuple[tuple[int, int], ...] = ()
-    """Pairs of rows."""
+    """Pairs of joined rows."""
     columns: tuple[tuple[int, int], ...] = ()
-    """Pairs of columns."""
+    """Pairs of joined columns."""
     crossed: tuple[tuple[int, int], ...] = ()
-    """A row and a column."""
+    """Joined pairs of a row and a column."""
     bridged: tuple[tuple[int, int], ...] = ()
-    """Row and column of switches whose diode is bridged; closed they conduct both ways."""
+    """Row and column of switches with bridged diodes; closed they conduct both ways."""
     supplied: tuple[int, ...] = ()
-    """Rows that are joined with the supply of the released level."""
+    """Rows joined with the supply of the released level."""
     pulled: tuple[int, ...] = ()
-    """Columns whose pull lifts them at once."""
+    """Columns whose strong pull lifts them at once."""
 
     def soldered(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Shorts:
-        """The same in lines, for the line of each row and of each column."""
+        """The joints in lines, given the line of each row and column."""
         return Shorts(
             tuple((rows[one], rows[other]) for one, other in self.rows),
             tuple((columns[one], columns[other]) for one, other in self.columns),
@@ -51,8 +50,8 @@ class LineBits(NamedTuple):
 
 
 def followers(shorts: Shorts, closed: list[int], sources: LineBits, selecting: bool) -> LineBits:
-    """Lines that take the level of the ``sources``: the selecting one, which passes switches from row to column, or the
-    released one, which passes them the other way. ``closed``: by row the columns that it reaches."""
+    """Lines at the level of the ``sources``: the selecting level passes switches from row to column, the released one
+    the other way. ``closed``: reached columns by row."""
     ties = [_both(1 << one, 1 << other) for one, other in shorts.rows]
     ties += [_both(1 << one, 1 << other, columns=True) for one, other in shorts.columns]
     crossed = [*shorts.crossed, *(place for place in shorts.bridged if closed[place[0]] >> place[1] & 1)]
@@ -94,29 +93,28 @@ def bits(lines: Iterable[int]) -> int:
 
 
 def words(cells: np.ndarray | None, rows: int) -> list[int]:
-    """The rows of (R, C) bool cells as ints, bit c is column c; None stands for nothing pressed."""
+    """The rows of (R, C) bool cells as ints, bit c is column c; None: nothing pressed."""
     if cells is None:
         return [0] * rows
     return [int("".join("1" if cell else "0" for cell in row[::-1]), 2) for row in np.asarray(cells, bool)]
 
 
 class Contention(AssertionError):
-    """A driven column and a row that is driven to the selecting level meet in a pressed switch."""
+    """A driven column and a row driven to the selecting level meet in a pressed switch."""
 
 
 class Matrix:
-    """Levels of columns and rows for pressed cells and for what the board drives.
+    """Levels of columns and rows for pressed cells and the board's drives.
 
-    A pressed switch passes its row's selecting level to its column and nothing else, as a diode in series
-    makes it do. ``col2row``: a row selects by being low and a column that reads pressed is low, else pulled
-    up; ``row2col``: both high, else pulled down. Masked cells may be pressed too: the board has to ignore them.
-    Likewise a driven column passes its level, the released one, to rows that are let go; else these are pulled to the
-    selecting level. So is a column that nothing drives, by a pressed switch to such a row, as its own pull is weaker
-    than the row's. A stuck column cannot be driven. After a discharge of a self-test columns that are let go stay at
-    the selecting level for as long as a slot takes, as their pulls are weak.
+    A pressed switch passes only its row's selecting level to its column, by a series diode. ``col2row``: a row selects
+    by low, and a pressed column is low, else pulled up; ``row2col``: both high, else pulled down. Masked cells may be
+    pressed too; the board must ignore them. Conversely, a driven column passes the released level to released rows,
+    which are otherwise pulled to the selecting level; so is an undriven column, by a pressed switch to such a row, as
+    its own pull is weaker. A stuck column cannot be driven. After a discharge of a self-test, released columns stay at
+    the selecting level for a slot, as their pulls are weak.
 
-    Switches and faults are told in the sheet's rows and columns, guard lines last; levels are those of the lines that
-    these are soldered to.
+    Switches and faults are in the sheet's rows and columns, guard lines last; levels are those of the lines that these
+    are soldered to.
     """
 
     def __init__(self, skin: Skin):
@@ -132,18 +130,18 @@ class Matrix:
         self._pressed = [0] * skin.rows
         self._reaches = [self._all_columns] * skin.row_lines
         self.stuck = 0
-        """LineBits of the columns that are stuck."""
+        """LineBits of the stuck columns."""
         self._shorts: Shorts | None = None
         self._released = LineBits(0, 0)  # let go, and lifted to the released level
         self._keeps = skin.derived.settle_clocks + 1 if skin.self_test else 0  # clocks
         self._kept, self._left = 0, 0  # columns, and clocks for which they are
         self.closed = [0] * skin.row_lines
-        """By a row's line, the lines of the columns that it reaches through closed switches."""
+        """By a row's line, the column lines that it reaches through closed switches."""
         self._solder()
 
     def press(self, cells: np.ndarray | Sequence[int] | None, stuck: np.ndarray | None = None) -> None:
-        """Press (R, C) bool cells (or R ints, bit c is column c) and make (C,) bool columns stuck, or with the guard
-        column (C + 1,)."""
+        """Press (R, C) bool cells (or R ints, bit c is column c) and make (C,) bool columns stuck, or (C + 1,) with the
+        guard column."""
         if cells is None or isinstance(cells, np.ndarray):
             self._pressed = words(cells, self._rows)
         else:
@@ -152,8 +150,8 @@ class Matrix:
         self._solder()
 
     def cut(self, rows: Mapping[int, int], columns: Mapping[int, int]) -> None:
-        """Cut lines, and mend all others: a row's switches from a column on no longer reach its pin, and a column's
-        from a row on. ``rows`` gives that column by row, ``columns`` that row by column."""
+        """Cut lines, and mend all others: a row's switches from a column on, and a column's from a row on, no longer
+        reach the pin. ``rows`` gives that column by row, ``columns`` that row by column."""
         self._reaches = [(1 << rows.get(row, self.column_lines)) - 1 for row in range(self.row_lines)]
         for column, end in columns.items():
             for row in range(end, self.row_lines):
@@ -161,11 +159,11 @@ class Matrix:
         self._solder()
 
     def join(self, shorts: Shorts | None) -> None:
-        """Join lines and bridge diodes, and part all others."""
+        """Join lines and bridge diodes, and separate all others."""
         self._shorts = shorts and shorts.soldered(self._row_line, self._column_line)
 
     def _solder(self) -> None:
-        """What is closed and whole, on the lines."""
+        """Compute the closed, whole connections of lines."""
         for row, guard in enumerate(self._guards):
             pressed = self._pressed[row] if row < self._rows else 0
             self.closed[self._row_line[row]] = self._on_lines((pressed | guard) & self._reaches[row])
@@ -174,8 +172,8 @@ class Matrix:
         return sum(1 << line for column, line in enumerate(self._column_line) if columns >> column & 1)
 
     def feeding(self, driven: int, level: int | None) -> tuple[int, int]:
-        """Of the columns that are driven those to the released level, and those to the selecting one. ``level`` is that
-        of all but a guard column, which is driven to the other one; None where columns are driven one way only."""
+        """Driven columns at the released level, and at the selecting one. ``level`` is that of all but a guard column,
+        which has the other; None if columns have one drive level."""
         if level is None:
             return driven, 0
         plain = self._all_columns >> self._guarded
@@ -183,10 +181,10 @@ class Matrix:
         return released, driven & ~released
 
     def levels(self, rows: int, rows_driven: int | None = None, columns_driven: int = 0, columns_held: int = 0) -> int:
-        """Levels of the columns, bit c is column c, for the levels of the row pins, bit r is row r.
+        """Column levels, bit c is column c, for row pin levels, bit r is row r.
 
-        ``rows_driven``: which rows are driven, by default all; ``columns_driven``: which columns are, to the released
-        level; ``columns_held``: which to the selecting one. To be asked for once per clock. Raises :class:`Contention`.
+        ``rows_driven``: driven rows, by default all; ``columns_driven``: columns driven to the released level;
+        ``columns_held``: to the selecting one. Call it once per clock. Raises :class:`Contention`.
         """
         driven = self._driven(rows_driven)
         selected = (rows ^ self._all_rows if self._selects_low else rows) & driven
@@ -210,7 +208,7 @@ class Matrix:
         return pulled
 
     def _drained(self, rows_driven: int, columns_driven: int) -> int:
-        """Columns that nothing drives and that a row pulls which is let go, and which nothing lifts."""
+        """Undriven columns that a released row pulls and nothing lifts."""
         drained, lifted = 0, self._lifted(columns_driven)
         for row, word in enumerate(self.closed):
             if not (rows_driven | lifted.rows) >> row & 1:
@@ -218,14 +216,14 @@ class Matrix:
         return drained & ~(columns_driven | lifted.columns)
 
     def _lifted(self, columns_driven: int) -> LineBits:
-        """What follows the columns that are driven to the released level; with shorts what did in this clock."""
+        """Lines that follow columns driven to the released level; with shorts, as of this clock."""
         if self._shorts is not None:
             return LineBits(self._released.rows, self._released.columns | bits(self._shorts.pulled))
         feeding = columns_driven & ~self.stuck
         return LineBits(sum(1 << row for row, word in enumerate(self.closed) if word & feeding), feeding)
 
     def _keep(self, held: int, lifted: int) -> int:
-        """Columns that are let go and still at the selecting level."""
+        """Released columns still at the selecting level."""
         if held:
             self._kept, self._left = held, self._keeps
         elif self._left:
@@ -235,8 +233,8 @@ class Matrix:
         return 0
 
     def _follow(self, selecting: LineBits, releasing: LineBits) -> tuple[int, int]:
-        """With shorts: columns that follow a line at the selecting level, and those that follow one at the released
-        level. A pin may work against the supply, and against no other pin."""
+        """With shorts: columns that follow a line at the selecting level, and at the released level. A pin may work
+        against the supply, but not against another pin."""
         assert self._shorts is not None
         feeding = LineBits(releasing.rows, releasing.columns & ~self.stuck)
         low = followers(self._shorts, self.closed, selecting, selecting=True)
@@ -247,7 +245,7 @@ class Matrix:
         return low.columns, self._released.columns | bits(self._shorts.pulled)
 
     def row_levels(self, rows: int, rows_driven: int, columns_driven: int) -> int:
-        """Levels at the row pins: those of ``rows`` where they are driven, else what the columns make of them."""
+        """Levels at the row pins: ``rows`` if driven, else by the columns."""
         touched = self._lifted(columns_driven).rows
         let_go = touched if self._selects_low else touched ^ self._all_rows
         return rows & rows_driven | let_go & ~rows_driven

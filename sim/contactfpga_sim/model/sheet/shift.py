@@ -1,4 +1,4 @@
-"""The sheet with what is between it and the board: nothing, or chains of 74HC595 and 74HC165."""
+"""The sheet with its connection to the board: direct, or chains of 74HC595 and 74HC165."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ COLUMN_DATA = {"direct": "columns", "74hc165": "column_data"}
 
 
 class RowRegisters:
-    """Chains of 74HC595. Output i of a chain is its line i; what they hold at power-up is random.
+    """Chains of 74HC595. Output i of a chain is its line i; power-up contents are random.
 
-    The data pin counts as it was before a rising edge of the shift clock, the shifted bits as they were before a rising
-    edge of the latch.
+    The data pin counts as before a rising edge of the shift clock, the shifted bits as before a rising edge of the
+    latch.
     """
 
     def __init__(self, lines: int, chains: int, power_up: random.Random):
@@ -32,7 +32,7 @@ class RowRegisters:
         self._before: tuple[int, int, int] | None = None
 
     def step(self, data: int, clock: int, latch: int, enable_n: int) -> int | None:
-        """Levels of all outputs in this cycle, bit r is row r; None while they are switched off."""
+        """Levels of all outputs in this cycle, bit r is row r; None while disabled."""
         data_before, clock_before, latch_before = self._before or (data, clock, latch)
         self._before = (data, clock, latch)
         if latch and not latch_before:
@@ -45,7 +45,7 @@ class RowRegisters:
 
 
 class ColumnRegisters:
-    """Chains of 74HC165. Line i of a chain is bit i to come out; what they hold at power-up is random.
+    """Chains of 74HC165. Line i of a chain is output bit i; power-up contents are random.
 
     The serial output follows an edge after ``delay`` cycles.
     """
@@ -57,7 +57,7 @@ class ColumnRegisters:
         self._outputs = deque([0] * (delay + 1), delay + 1)
 
     def step(self, load_n: int, clock: int, columns: int) -> int:
-        """Levels of the serial outputs in this cycle, bit j is chain j, for those of the columns."""
+        """Levels of the serial outputs in this cycle, bit j is chain j, for these column levels."""
         rises = clock and self._clock == 0
         self._clock = clock
         if not load_n:
@@ -72,7 +72,7 @@ class ColumnRegisters:
 class SheetAtPins:
     """A :class:`Matrix` at the pins of the gateware's top, cycle by cycle.
 
-    ``reads`` names the top's outputs it looks at, ``drives`` the inputs it gives. ``column_delay``: see
+    ``reads`` names the top's outputs it needs, ``drives`` the inputs it sets. ``column_delay``: see
     :class:`ColumnRegisters`; ``row_levels`` are those of the row wires.
     """
 
@@ -98,7 +98,7 @@ class SheetAtPins:
             self.column_registers = ColumnRegisters(skin.column_lines, skin.column_chains, contents, column_delay)
 
     def step(self, pins: Mapping[str, int]) -> tuple[int, ...]:
-        """Levels of ``drives`` in this cycle, for those of ``reads``."""
+        """Levels of ``drives`` in this cycle, given those of ``reads``."""
         if self.row_registers is None:
             self.row_levels = pins["rows"]
         else:

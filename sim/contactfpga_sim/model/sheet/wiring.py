@@ -1,8 +1,7 @@
-"""What a faulty sheet reads: which lines pressed switches join, where diodes, wires and switches have faults.
+"""Readings of a faulty sheet: lines joined by pressed switches, and faulty diodes, wires and switches.
 
-In :class:`Wiring` nothing but the pulls has a resistance; :func:`at_rest` asks :mod:`contactfpga.design.circuit` for
-levels and currents once the columns have settled. Guard lines are one more row and one more column; what they miss is
-a cut.
+In :class:`Wiring` only the pulls have a resistance; :func:`at_rest` uses :mod:`contactfpga.design.circuit` for settled
+levels and currents. Guard lines are one more row and column; their misses are cuts.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ def _none() -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Wiring:
-    """What a board reads that drives one row at a time. Arrays are bool, (rows, columns) or as one value for all.
+    """Readings of a board that drives one row at a time. Arrays are bool, (rows, columns) or one value for all.
 
-    A row selects its columns through pressed switches, a column other rows through pressed switches without a diode.
-    Rows that are not selected are held at the other level, as gateware for a sheet with diodes does, or they float.
-    A broken line is cut off at the board; its switches still join what they join.
+    A row selects its columns through pressed switches; a column selects other rows through pressed switches without a
+    diode. Unselected rows are held at the other level, as for a sheet with diodes, or float. A broken line is cut at
+    the board; its switches still join lines.
     """
 
     bare: np.ndarray = dataclasses.field(default_factory=_none)
@@ -35,15 +34,15 @@ class Wiring:
     dead: np.ndarray = dataclasses.field(default_factory=_none)
     """Switches that never conduct."""
     closed: np.ndarray = dataclasses.field(default_factory=_none)
-    """Switches that always do."""
+    """Switches that always conduct."""
     broken_rows: tuple[int, ...] = ()
     broken_columns: tuple[int, ...] = ()
     floating: bool = False
-    """Rows float while they are not selected."""
+    """Whether unselected rows float."""
 
     def read(self, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(rows, columns) bool for pressed switches: cells that read pressed, and cells whose level is undefined, as a
-        selected row and one that is held meet in their column, or in the lines that it is joined with."""
+        """(rows, columns) bool for pressed switches: cells that read pressed, and cells with undefined levels, because
+        a selected row and a held one meet in their column or its joined lines."""
         conducts = (pressed | self.closed) & ~self.dead
         read, undefined = np.zeros_like(conducts), np.zeros_like(conducts)
         for row in range(len(conducts)):
@@ -70,8 +69,8 @@ class Wiring:
 
 
 def at_rest(circuit: Circuit, cells: np.ndarray, bare: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Of (rows, columns) bool pressed cells, scanned row by row: those that read pressed, those whose level is neither
-    low nor high, and the most that a pin of a row that is not selected carries, in A."""
+    """For (rows, columns) bool pressed cells, scanned row by row: cells that read pressed, cells with undefined levels,
+    and the largest current in A through an unselected row's pin."""
     levels, network = Levels.of(circuit), Network(circuit, cells, bare)
     read, undefined, most = np.zeros_like(cells), np.zeros_like(cells), 0.0
     for row in range(len(cells)):
@@ -85,14 +84,14 @@ def at_rest(circuit: Circuit, cells: np.ndarray, bare: np.ndarray) -> tuple[np.n
 
 
 class LineCuts(NamedTuple):
-    """As :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut` takes them."""
+    """Cuts for :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`."""
 
     rows: dict[int, int]
     columns: dict[int, int]
 
 
 def extended(cells: np.ndarray, guard: bool = True) -> np.ndarray:
-    """(rows + 1, columns + 1) bool: the cells, and as guard switches ``guard``; the corner is open."""
+    """(rows + 1, columns + 1) bool: the cells, and ``guard`` for the guard switches; the corner is open."""
     found = np.full((cells.shape[0] + 1, cells.shape[1] + 1), guard)
     found[:-1, :-1] = cells
     found[-1, -1] = False
@@ -100,7 +99,7 @@ def extended(cells: np.ndarray, guard: bool = True) -> np.ndarray:
 
 
 def missed(read: np.ndarray) -> LineCuts:
-    """Of what an extended sheet reads: lines whose guard switch reads open, as lines that are cut right before it."""
+    """Lines of an extended sheet's reading whose guard switch reads open, as cut right before it."""
     rows, columns = (number - 1 for number in read.shape)
     return LineCuts(
         dict.fromkeys(np.flatnonzero(~read[:rows, columns]).tolist(), columns),

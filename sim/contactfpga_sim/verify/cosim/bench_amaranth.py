@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0, vcd: str | None = None) -> Trace:
     """Simulate ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` seconds.
 
-    ``vcd`` is a file for every signal in every clock, in the time of the board.
+    ``vcd`` is a file for every signal in every clock, in board time.
     """
     top = Top(skin, probes=True)
     simulator = Simulator(top)

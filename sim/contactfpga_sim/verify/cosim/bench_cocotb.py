@@ -33,19 +33,19 @@ _COMMANDS = {"verilator": ("verilator", "perl", "make", "c++"), "icarus": ("iver
 
 
 class SimulatorFailed(RuntimeError):
-    """Build or run of a simulator failed; the message holds the end of its output."""
+    """Build or run of a simulator failed; the message has the end of its output."""
 
 
 def available(simulator: str) -> bool:
-    """Whether ``verilator`` or ``icarus`` can run here."""
+    """Whether ``verilator`` or ``icarus`` is available."""
     return all(shutil.which(command, path=_search_path()) for command in _COMMANDS[simulator])
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, simulator: str = "verilator", limit_s: float = 240.0) -> Trace:
     """Simulate ``cycles`` clocks of the board.
 
-    Raises :class:`OutOfTime` when build and simulation together take more than ``limit_s`` seconds, and
-    :class:`SimulatorFailed` when the simulator does not come to the end.
+    Raises :class:`OutOfTime` if build and simulation need more than ``limit_s`` seconds, and :class:`SimulatorFailed`
+    if the simulator does not finish.
     """
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as folder:
         job = Path(folder) / "job"
@@ -56,7 +56,7 @@ def run(skin: Skin, timeline: Timeline, cycles: int, simulator: str = "verilator
 
 
 def _supervise(job: Path, limit_s: float) -> None:
-    """Build and simulate in a process group of its own, so that all of it can be ended."""
+    """Build and simulate in a process group of its own, to end all of it."""
     python = os.pathsep.join(path for path in sys.path if path)
     environment = os.environ | {"PATH": _search_path(), "PYTHONPATH": python, "CONTACTFPGA_JOB": str(job)}
     log = job.with_name("log")
@@ -83,7 +83,7 @@ def _supervise(job: Path, limit_s: float) -> None:
 
 
 def _search_path() -> str:
-    """PATH with the Verilator of the Python package first: distributions often have one too old for cocotb."""
+    """PATH with the Verilator of the Python package first: distributions' are often too old for cocotb."""
     folders = [Path(sysconfig.get_path("purelib")) / "verilator" / "bin", Path(sys.executable).parent]
     return os.pathsep.join([*map(str, folders), os.environ.get("PATH", "")])
 

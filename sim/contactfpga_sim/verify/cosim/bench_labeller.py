@@ -1,4 +1,4 @@
-"""The labeller alone, compiled: millions of frames in, every record with its cycle out."""
+"""The compiled labeller alone: millions of frames in, every record with its cycle out."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ _TIMING = np.dtype([("first_row", "<u8"), ("last_row", "<u8"), ("end", "<u8")])
 
 @dataclasses.dataclass(frozen=True)
 class LabellerRecords:
-    """What the labeller made of N frames; cycles count from the bench's start."""
+    """Records of N frames; cycles count from the bench's start."""
 
     frame: np.ndarray
-    """(n,) int64: the frame of each record, rising."""
+    """(n,) int64: frame of each record, rising."""
     cycle: np.ndarray
-    """(n,) int64: when the record left."""
+    """(n,) int64: cycle of each record."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each record; where the sheet's ends meet (n, 4), with the cells past the
+    """(n, 3) int64: area, sum x, sum y of each record; for a sheet whose ends meet (n, 4), with the cells past the
     seam."""
     first_row: np.ndarray
-    """(N,) int64: when each frame's first row was handed over."""
+    """(N,) int64: cycle of each frame's first row."""
     last_row: np.ndarray
-    """(N,) int64: when each frame's last row was handed over."""
+    """(N,) int64: cycle of each frame's last row."""
     end: np.ndarray
-    """(N,) int64: when each frame's end mark left."""
+    """(N,) int64: cycle of each frame's end mark."""
 
     def sorted_moments(self) -> np.ndarray:
-        """The moments, sorted by area, sum x, sum y within each frame instead."""
+        """The moments, sorted by area, sum x, sum y within each frame."""
         area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
     @property
     def last_record_clocks(self) -> np.ndarray:
-        """(N,) int64: clocks from a frame's last row to its last record; 0 if none came after that row."""
+        """(N,) int64: clocks from a frame's last row to its last record; 0 without a later record."""
         clocks = np.zeros(len(self.last_row), np.int64)
         np.maximum.at(clocks, self.frame, self.cycle - self.last_row[self.frame])
         return clocks
@@ -50,7 +50,7 @@ class LabellerRecords:
 class LabelBench:
     """The Skin's labeller, compiled, for sheets of its size and connectivity.
 
-    Building it takes some seconds the first time (:mod:`contactfpga_sim.model.board.native`).
+    The first build needs some seconds (:mod:`contactfpga_sim.model.board.native`).
     """
 
     def __init__(self, skin: Skin):
@@ -64,9 +64,9 @@ class LabelBench:
         self._bench = ctypes.c_void_p(library.bench_new())
 
     def run(self, frames: np.ndarray, *, gap: int = 0, stall: int = 0, seed: int = 1) -> LabellerRecords:
-        """Feed (N, R, C) bool frames back to back and take all records.
+        """Feed (N, R, C) bool frames back to back and return all records.
 
-        gap: chance in percent that no row is offered in a clock; stall: that the record port is not ready.
+        gap: percent of clocks without an offered row; stall: percent of clocks in which the record port is not ready.
         Raises RuntimeError if the labeller stops for good.
         """
         count, rows, columns = frames.shape

@@ -1,4 +1,4 @@
-"""Co-simulation through the compiled board: the same events as the golden model predicts."""
+"""Co-simulation through the compiled board: its events, as the golden model predicts them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from contactfpga_sim.model.golden.trace import BOUNDARIES, Timeline, Trace
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, model: native.Model | None = None) -> Trace:
-    """What the compiled board does in cycles 0 to ``cycles`` - 1; ``model`` as in :class:`CompiledBoard`."""
+    """Events of the compiled board in cycles 0 to ``cycles`` - 1; ``model`` as in :class:`CompiledBoard`."""
     with CompiledBoard(skin, BOUNDARIES, model) as board:
         play(board, timeline, cycles)
         return trace({name: board.take(name) for name in BOUNDARIES}, cycles)
 
 
 def play(board: CompiledBoard, timeline: Timeline, until: int) -> None:
-    """Let the board live through the timeline from the cycle it is at up to cycle ``until`` - 1."""
+    """Play the timeline to the board from its current cycle up to cycle ``until`` - 1."""
     changes = {cycle: (cells, stuck) for cycle, cells, stuck in timeline.pieces}
     received, cuts, units = dict(timeline.received), dict(timeline.cuts), dict(timeline.units)
     for now in sorted(cycle for cycle in {*changes, *received, *cuts, *units} if board.cycle <= cycle < until):

@@ -1,4 +1,4 @@
-"""Lockstep comparison: the first place where the gateware does not do what the golden model predicts."""
+"""Lockstep comparison: the first difference between gateware and golden model."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ Event = tuple[Any, ...]
 class Mismatch(AssertionError):
     """The first difference between two traces.
 
-    ``cycle`` is the first cycle in which they differ, at ``boundary``; ``expected`` and ``got`` are the
-    payloads transferred there in that cycle, None where nothing is. Where one side transfers its next payload
-    later, the message tells when.
+    ``cycle`` is the first differing cycle, at ``boundary``; ``expected`` and ``got`` are the payloads there in that
+    cycle, None without one. If one side's next payload is later, the message tells when.
     """
 
     def __init__(self, boundary: str, expected: Event | None, got: Event | None):
@@ -38,10 +37,10 @@ class Mismatch(AssertionError):
 
 
 def compare(expected: Trace, got: Trace) -> int:
-    """Compare two traces over the cycles both cover; raises :class:`Mismatch` for the first difference.
+    """Compare two traces over their common cycles; raises :class:`Mismatch` for the first difference.
 
-    When several boundaries differ in one cycle, the one the data passes first is named. Returns the number of
-    events that agreed, so that a caller can tell a comparison from an empty one.
+    If several boundaries differ in one cycle, the earliest in data order is named. Returns the number of agreeing
+    events, which exposes an empty comparison.
     """
     cycles = min(expected.cycles, got.cycles)
     expected, got = expected.until(cycles), got.until(cycles)

@@ -51,7 +51,7 @@ ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
     "column_chains": (0,),
     "precharge_us": (0.0,),
 }
-"""The same for the adaptive scan, which takes columns on pins of their own only."""
+"""Choices for the adaptive scan, which needs columns on pins of their own."""
 
 REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
     "scan": ("reversal",),
@@ -60,11 +60,11 @@ REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
     "precharge_us": (0.1, 1.2),
     "project_us": (0.1, 1.0, 2.3),
 }
-"""The same for line reversal, which takes rows and columns on pins of their own only."""
+"""Choices for line reversal, which needs rows and columns on pins of their own."""
 
 
 def closed(choices: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
-    """The same for sheets whose ends meet: what such a Skin may choose."""
+    """Choices for sheets whose ends meet."""
     return choices | {
         "surface": ("closed",),
         "sheet": ((4, 3), *(sheet for sheet in choices["sheet"] if sheet[1] >= MIN_AROUND)),
@@ -75,14 +75,14 @@ def closed(choices: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
-    """A small list of assignments in which every pair of values of two choices occurs; the same for a seed."""
+    """A short, reproducible list of assignments that has every pair of values of two choices."""
     rows = _pairwise(tuple(map(len, choices.values())), seed)
     return [{name: choices[name][value] for name, value in zip(choices, row, strict=True)} for row in rows]
 
 
 @cache
 def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
-    """The same as indices. Several test files collect the same rows."""
+    """:func:`pairwise` as indices, cached, since several test files collect the same rows."""
     pick = random.Random(seed)
     open_pairs = _Open(counts)
     rows = []
@@ -94,8 +94,8 @@ def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
 
 
 class _Open:
-    """Pairs that occur in no row yet. Each test process makes hundreds of rows while it collects tests, so they are
-    bits: each value of each choice has a number, and its open partners are the bits of an integer."""
+    """Pairs that are in no row yet, as bits for speed: each value of each choice has a number, and its open partners
+    are the bits of an integer."""
 
     def __init__(self, counts: Sequence[int]):
         self.counts = counts
@@ -105,7 +105,7 @@ class _Open:
         self._partners = [every & ~own[place] for place, count in enumerate(counts) for _ in range(count)]
 
     def pairs(self) -> list[Pair]:
-        """All of them, in order."""
+        """All open pairs in order."""
         return [
             (a, i, b, j)
             for a, count in enumerate(self.counts)
@@ -116,27 +116,27 @@ class _Open:
         ]
 
     def bits(self, row: Mapping[int, int]) -> int:
-        """The values (by place) of a row, or of a part of one."""
+        """The values (by place) of a row, or of part of one."""
         return sum(1 << (self._first[place] + value) for place, value in row.items())
 
     def closed_with(self, bits: int, place: int, value: int) -> int:
-        """How many a value would close beside those of ``bits``."""
+        """Pairs that a value would close with those of ``bits``."""
         return (self._partners[self._first[place] + value] & bits).bit_count()
 
     def closed_by(self, row: Mapping[int, int]) -> int:
-        """Twice as many as a whole row would close."""
+        """Twice the pairs that a whole row would close."""
         bits = self.bits(row)
         return sum(self.closed_with(bits, place, value) for place, value in row.items())
 
     def close(self, row: Mapping[int, int]) -> None:
-        """A row was taken."""
+        """Close the pairs of a chosen row."""
         bits = self.bits(row)
         for place, value in row.items():
             self._partners[self._first[place] + value] &= ~bits
 
 
 def _candidate(open_pairs: _Open, first: Pair, pick: random.Random) -> dict[int, int]:
-    """One open pair, the first, then value by value what closes most of the rest; the value of each choice."""
+    """The first open pair, then value by value what closes most of the rest; the value of each choice."""
     a, i, b, j = first
     row = {a: i, b: j}
     for place in pick.sample(range(len(open_pairs.counts)), len(open_pairs.counts)):
@@ -147,7 +147,7 @@ def _candidate(open_pairs: _Open, first: Pair, pick: random.Random) -> dict[int,
 
 
 def pairs_in(rows: list[list[int]]) -> set[Pair]:
-    """All pairs (choice, value, choice, value), as indices, that occur in the rows of a covering set."""
+    """All pairs (choice, value, choice, value), as indices, in the rows of a covering set."""
     return {(a, row[a], b, row[b]) for row in rows for a, b in itertools.combinations(range(len(row)), 2)}
 
 
@@ -189,7 +189,7 @@ def skin_for(choice: dict[str, Any]) -> Skin:
 
 
 def _registers(choice: dict[str, Any]) -> dict[str, Any]:
-    """Which lines are on shift registers, in as many of the chains as they fill."""
+    """Lines on shift registers, in as many chains as they fill."""
     values: dict[str, Any] = {}
     kinds = (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165"))
     for (kind, wiring, registers), lines in zip(kinds, choice["sheet"], strict=True):
@@ -200,7 +200,7 @@ def _registers(choice: dict[str, Any]) -> dict[str, Any]:
 
 
 def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float, float]:
-    """Settle and release time in us: the shortest that is accepted, one with odd clocks, or a long one."""
+    """Settle and release time in us: the shortest accepted, one with odd clocks, or a long one."""
     release = {"tight": 1, "uneven": 3, "long": 2 * megahertz}[kind]
     for settle in range(1, 10_000):
         exact = (settle / megahertz, release / megahertz)
@@ -216,9 +216,9 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
 
 
 def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
-    """Random cells that come and go at any cycle, stuck columns, requests and other bytes.
+    """Random cells that change at any cycle, stuck columns, requests and other bytes.
 
-    A scan that waits does not drive a column that is stuck, so of its columns only some ever are.
+    A scan that waits does not drive a stuck column, so only some of its columns are ever stuck.
     """
     rng = np.random.default_rng([seed, 7])
     shape = (skin.rows, skin.columns)
@@ -240,8 +240,8 @@ def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
 def traffic(
     skin: Skin, gaps: Iterable[int], start: int, cycles: int, rng: np.random.Generator
 ) -> list[tuple[int, bytes]]:
-    """What a host sends from ``start`` on, with these gaps after each part: requests, on a board that takes them
-    commands, and packets that are none as they are damaged, cut off, of another kind, or any bytes."""
+    """A host's bytes from ``start`` on, with these gaps between parts: requests, supported commands, and invalid
+    packets: damaged, cut off, of another kind, or random bytes."""
     byte = 10 * facts(skin).bit_clocks
     sent = []
     for gap in gaps:
@@ -273,7 +273,7 @@ def _packet(skin: Skin, rng: np.random.Generator) -> bytes:
 
 
 def _order(skin: Skin, rng: np.random.Generator) -> tuple[int, int]:
-    """Number and value of a command: mostly one that the board takes, with a value that changes something."""
+    """Number and value of a command: mostly a supported one, with an effective value."""
     what = rng.choice(np.array([*facts(skin).commands, rng.integers(128)]))
     number = rng.choice(np.array([0, 1, rng.integers(1 << 12), rng.integers(1 << 18)]))
     clock, of_place = rng.integers(facts(skin).settle + 3), rng.integers(8) | number << 3

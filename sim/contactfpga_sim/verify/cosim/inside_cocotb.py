@@ -1,4 +1,4 @@
-"""The test that cocotb runs inside the simulator: drive the pins, record the probes."""
+"""The test that cocotb runs in the simulator: drive the pins, record the probes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, InputDriver, T
 
 @cocotb.test()
 async def record(dut: Any) -> None:
-    """Every cycle is looked at in its second half, when all of the design has settled."""
+    """Record every cycle in its second half, when the design has settled."""
     job = pickle.loads(Path(os.environ["CONTACTFPGA_JOB"]).read_bytes())
     recorder = TraceRecorder(job["cycles"])
     stimulus = InputDriver(job["skin"], job["timeline"])

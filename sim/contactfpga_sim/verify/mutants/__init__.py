@@ -1,1 +1,1 @@
-"""Mutation testing of the gateware: does the comparison with the golden model notice a change of the netlist?"""
+"""Mutation testing of the gateware: does the comparison with the golden model notice netlist changes?"""

@@ -1,4 +1,4 @@
-"""And-inverter graphs, as files in the AIGER format and in memory; and whether ABC finds a way to a bad state in one.
+"""And-inverter graphs in AIGER files and in memory; and reachability of bad states by ABC.
 
 A literal is twice a node's number, plus 1 for its complement; literal 0 is false, 1 is true. All latches start at 0.
 """
@@ -16,23 +16,23 @@ from pathlib import Path
 
 @dataclasses.dataclass(frozen=True)
 class Circuit:
-    """What a file holds. Nodes are numbered inputs first, then latches, then gates, each after its operands."""
+    """The content of a file. Nodes are numbered inputs, latches, gates, each gate after its operands."""
 
     inputs: Sequence[str]
-    """Their names, bits as ``name[3]``."""
+    """Input names, bits as ``name[3]``."""
     latches: Sequence[tuple[str, ...]]
-    """All names of each."""
+    """All names of each latch."""
     outputs: Sequence[str]
     nexts: Sequence[int]
-    """The literal that each latch takes next."""
+    """Next-state literal of each latch."""
     driven: Sequence[int]
-    """The literal of each output."""
+    """Literal of each output."""
     gates: Sequence[tuple[int, int]]
-    """The two literals whose conjunction each is."""
+    """The two operands of each AND gate."""
 
 
 def read(path: Path, names: Path) -> Circuit:
-    """A binary AIGER file, and what Yosys' ``write_aiger -map`` says of it. What has no name there is called ``?``."""
+    """A binary AIGER file with the names of Yosys' ``write_aiger -map``; others are ``?``."""
     header, _, rest = path.read_bytes().partition(b"\n")
     _, inputs, latches, outputs, gates = (int(word) for word in header.split()[1:6])
     lines = rest.split(b"\n", latches + outputs)
@@ -83,7 +83,7 @@ def _encoded(value: int) -> bytes:
 
 
 class Graph:
-    """Nodes that can be added to; a gate that is there already, or that is a constant or an operand, is not added."""
+    """A growing set of nodes without duplicates; trivial gates are simplified."""
 
     def __init__(self, variables: int):
         """Nodes 1 to ``variables`` are variables."""
@@ -256,7 +256,7 @@ def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, fold
 
 
 def _output(path: Path) -> bytes:
-    """The literal of the only output of an AIGER file."""
+    """The literal of an AIGER file's only output."""
     header, _, rest = path.read_bytes().partition(b"\n")
     latches = int(header.split()[3])
     return rest.split(b"\n", latches + 1)[latches]

@@ -1,7 +1,7 @@
-"""Mutants of the gateware, how many of them the comparison with the golden model tells, and the rest.
+"""Mutants of the gateware, the share that the comparison with the golden model detects, and the rest.
 
-For each Skin mutants are drawn at random. Those that short stimuli leave are tried for a proof of equivalence; what is
-left then goes through long stimuli, and through longer trials of a proof. What is alive in the end is listed.
+Mutants are drawn at random for each Skin. Survivors of short stimuli are tried for a proof of equivalence, then in long
+stimuli and longer proofs. The final survivors are listed.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 OBSERVED = (*golden.BOUNDARIES, "driven", "charged")
-"""Where a mutant can be told from the gateware as it should be."""
+"""Boundaries at which a mutant can differ from the gateware."""
 SHARED = ("line", "contact")
-"""The same of several sheets."""
+"""Boundaries at which a mutant of several sheets can differ."""
 
 _FIRST_LOOK = 512
-"""Cycles before the first comparison; each further one comes after twice as many."""
+"""Cycles before the first comparison; each further one doubles the number."""
 
 Events = Mapping[str, np.ndarray]
 
 
 def survivors(design: Design, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus]) -> list[int]:
-    """The mutants that no stimulus tells from the gateware as it should be."""
+    """The mutants that no stimulus distinguishes from the gateware."""
     left = list(numbers)
     with _board(design, model) as board:
         for stimulus in stimuli:
@@ -46,10 +46,10 @@ def survivors(design: Design, model: native.Model, numbers: Iterable[int], stimu
 
 
 def expected(board: CompiledBoard | CompiledSheets, stimulus: Stimulus) -> Events:
-    """What the board without a mutant does, after it was compared with the golden model in every clock, unless lines
-    are joined.
+    """Events of the board without a mutant, after comparison with the golden model in every clock, unless lines are
+    joined.
 
-    Raises :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where they differ.
+    Raises :class:`contactfpga_sim.verify.cosim.compare.Mismatch` if they differ.
     """
     board.restart()
     _play(board, stimulus, stimulus.cycles)
@@ -85,8 +85,8 @@ def _compare_shared(several: Several, stimulus: Stimulus, events: Events) -> Non
 
 
 def killed_at(board: CompiledBoard | CompiledSheets, number: int, stimulus: Stimulus, events: Events) -> str | None:
-    """The first boundary at which mutant ``number`` does something other than ``events``, or "contention" where it
-    drives lines against each other; None where it never does."""
+    """The first boundary at which mutant ``number`` differs from ``events``, or "contention" if it drives lines against
+    each other; None if it never does."""
     board.restart(number)
     while (start := board.cycle) < stimulus.cycles:
         until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)
@@ -115,7 +115,7 @@ def _play(board: CompiledBoard | CompiledSheets, stimulus: Stimulus, until: int)
 
 
 def _play_sheets(board: CompiledSheets, timelines: Sequence[golden.Timeline], until: int) -> None:
-    """Cells of each sheet, and what the first one's timeline says is received."""
+    """Play the cells of each sheet, and the received bytes of the first one's timeline."""
     received = dict(timelines[0].received)
     pressed: dict[int, list[tuple[int, np.ndarray]]] = {}
     for number, timeline in enumerate(timelines):
@@ -131,15 +131,15 @@ def _play_sheets(board: CompiledSheets, timelines: Sequence[golden.Timeline], un
 
 
 BATCH = 500
-"""Mutants in one board: with more of them it runs slower."""
+"""Mutants per board; more slow it down."""
 
 CHECKED = 2
-"""This many of the killed mutants of each Skin are given to the prover too, which must not prove them."""
+"""Killed mutants of each Skin that the prover must not prove equivalent."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """What became of a mutant: ``killed``, ``equivalent`` or ``alive``."""
+    """Fate of a mutant: ``killed``, ``equivalent`` or ``alive``."""
 
     skin: str
     mutant: Mutant
@@ -147,14 +147,14 @@ class Result:
 
 
 def chosen(name: str) -> tuple[Design, tuple[str, ...]]:
-    """The Skin or the sheets of this name, and the stages whose mutants are drawn."""
+    """The Skin or sheets of this name, and the stages to mutate."""
     if name in SKINS:
         return SKINS[name], tuple(STAGES)
     return SEVERAL[name] if name in SEVERAL else OPTIONS[name]
 
 
 def left_by(design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) -> list[Mutant]:
-    """The mutants that behave as the golden model says under every stimulus."""
+    """The mutants that agree with the golden model under every stimulus."""
     given = list(stimuli)
     left: list[Mutant] = []
     for start in range(0, len(mutants), BATCH):
@@ -167,9 +167,9 @@ def left_by(design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulu
 def examine(
     name: str, count: int, seed: int, long_s: int = proof.LONG_S, say: Callable[[str], None] = lambda _: None
 ) -> list[Result]:
-    """The fates of ``count`` mutants of what is :func:`chosen`; ``long_s`` are the seconds of a longer proof.
+    """The fates of ``count`` mutants of the :func:`chosen` design; ``long_s``: seconds of a longer proof.
 
-    Raises :class:`contactfpga_sim.verify.mutants.proof.Contradiction` when a killed mutant is proved equivalent.
+    Raises :class:`contactfpga_sim.verify.mutants.proof.Contradiction` if a killed mutant is proved equivalent.
     """
     design, stages = chosen(name)
     given = sheets if isinstance(design, Several) else stimuli

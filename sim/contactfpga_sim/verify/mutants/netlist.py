@@ -1,4 +1,4 @@
-"""Mutants: small changes of the gateware's netlist, all of them in one compiled board whose input picks one."""
+"""Mutants: small changes of the gateware's netlist, all in one compiled board with a selecting input."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STAGES = {
     "several": ("grants",),
     "top": (),
 }
-"""Stages, and the modules of the design, as Top names them, that hold their registers."""
+"""Stages, and the modules, as named in Top, with their registers."""
 
 # Longest first: a file before its room. What several stages use is of the stage whose module holds it.
 _FILES = {
@@ -72,13 +72,13 @@ _SELECT_BITS = 16
 
 @dataclasses.dataclass(frozen=True)
 class Mutant:
-    """One bit of one port of a cell: inverted, held at a level, or inverted by another bit of the port."""
+    """One bit of a cell's port: inverted, held at a level, or inverted by another bit of the port."""
 
     stage: str
     place: str
-    """Where in the source of the gateware: file and line."""
+    """File and line in the gateware's source."""
     change: str
-    """The options of Yosys' ``mutate``."""
+    """Options of Yosys' ``mutate``."""
 
     def __str__(self) -> str:
         return f"{self.stage} {self.place}: {self.change}"
@@ -101,12 +101,12 @@ def candidates(design: Design) -> list[Mutant]:
 
 
 def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
-    """``count`` of the mutants at random, or all; the same for a seed."""
+    """``count`` of the mutants at random, or all; reproducible."""
     return random.Random(seed).sample(mutants, min(count, len(mutants)))
 
 
 def model(design: Design, mutants: Sequence[Mutant]) -> native.Model:
-    """The board in which ``restart(n)`` picks ``mutants[n - 1]``."""
+    """The board in which ``restart(n)`` selects ``mutants[n - 1]``."""
     found = plain(design)
     return dataclasses.replace(
         found,
@@ -118,14 +118,14 @@ def model(design: Design, mutants: Sequence[Mutant]) -> native.Model:
 
 
 def switches(mutants: Sequence[Mutant]) -> list[str]:
-    """Yosys commands that put the mutants into the prepared design, picked by its new input ``mutant``."""
+    """Yosys commands that insert the mutants into the prepared design, selected by its new input ``mutant``."""
     if len(mutants) >= 1 << _SELECT_BITS:
         raise ValueError(f"{len(mutants)} mutants in one board; at most {(1 << _SELECT_BITS) - 1}")
     return [f"mutate -ctrl mutant {_SELECT_BITS} {n} {mutant.change}" for n, mutant in enumerate(mutants, 1)]
 
 
 def parsed(line: str) -> Mutant | None:
-    """A line of Yosys' list, None for a mutant that is left out."""
+    """A line of Yosys' list; None for an excluded mutant."""
     options = re.findall(r"-(\w+) (\S+)", line)
     values = dict(options)
     if values["port"] in _LEFT_OUT:
@@ -141,7 +141,7 @@ def parsed(line: str) -> Mutant | None:
 
 
 def _stage(place: str, *names: str) -> str | None:
-    """The stage of a source place, else of the cell or wire of these names; None where nothing of it tells one."""
+    """The stage of a source place, else of the cell or wire of these names; None if unknown."""
     for file, stage in _FILES.items():
         if place.startswith(file):
             return stage
@@ -149,19 +149,19 @@ def _stage(place: str, *names: str) -> str | None:
 
 
 def module_of(name: str) -> str:
-    """The module of Top that holds this cell, wire or register of the flattened design, or of one of several sheets.
-    Where a signal of Top has its name, a number follows it."""
+    """The module of Top with this cell, wire or register of the flattened design, or of one of several sheets. A number
+    follows if a signal of Top has its name."""
     inside = in_sheet(name.removeprefix("$flatten").replace("\\", ""))
     return re.sub(r"\$\d+$", "", inside.partition(".")[0])
 
 
 def in_sheet(name: str) -> str:
-    """The name without that of the sheet, among several ones, that it is in."""
+    """The name without that of its sheet among several."""
     return re.sub(r"^sheet_\d+\.", "", name)
 
 
 def _with_places(rtlil: str) -> str:
-    """RTLIL in which the switches of a process have the process' source place: multiplexers are made of them."""
+    """RTLIL in which the switches of a process have its source place, for the multiplexers made of them."""
     lines, place, above = [], "", ""
     for line in rtlil.splitlines():
         word = line.split(maxsplit=1)[:1]

@@ -1,12 +1,11 @@
-"""Which mutants are no change at all: proofs that hold in every clock from power-up.
+"""Which mutants change nothing: proofs that hold in every clock from power-up.
 
-The question is put to a solver as one of reachability. Gateware and mutant run side by side on the same inputs. Only
-those registers of which the mutant may hold something else are there twice; it is asked whether a clock ever comes in
-which an output or any other register would differ. Where the answer is a path to such a clock, the registers that
-differ at its end are doubled too, and it is asked again.
+The question is one of reachability. Gateware and mutant run side by side on the same inputs. Only registers that the
+mutant may affect are doubled; the question is whether an output or any other register can ever differ. If the answer is
+a path to such a clock, the registers that differ at its end are doubled too, and the question is repeated.
 
-To keep the question small, some registers are cut open: they may hold anything in any clock. That allows more than
-ever happens, so what is never reached is never reached with them whole either.
+To keep the problem small, some registers are cut: they may hold anything in any clock. That only adds behavior, so what
+stays unreachable is unreachable in the whole design.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from contactfpga_sim.verify.mutants.aig import reached
 from contactfpga_sim.verify.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
 
 QUICK_S, LONG_S = 4, 45
-"""Seconds of one processor that one question may take."""
+"""CPU seconds for one question."""
 
 # What lies beyond the last word of a memory reads 0, as in the compiled board.
 _GATES = (
@@ -45,11 +44,11 @@ _HANDED = {
 
 
 class Contradiction(ContactFPGAError):
-    """Something is wrong with the proof itself; the message says what."""
+    """The proof itself is wrong; the message has details."""
 
 
 class Prover:
-    """Gateware and some mutants of it, as one circuit whose inputs ``mutant`` pick one."""
+    """Gateware and some mutants as one circuit, selected by its inputs ``mutant``."""
 
     def __init__(self, design: Design, mutants: Sequence[Mutant]):
         self._mutants = list(mutants)
@@ -71,12 +70,12 @@ class Prover:
         self._folder.cleanup()
 
     def equivalent(self, mutant: Mutant, limit_s: int) -> bool:
-        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds of one processor for each question."""
+        """Whether the mutant is proved equivalent; at most ``limit_s`` CPU seconds per question."""
         number = self._mutants.index(mutant) + 1
         return any(self._never_differs(number, cut, limit_s) for cut in self._cuts(mutant))
 
     def _cuts(self, mutant: Mutant) -> Iterator[frozenset[int]]:
-        """Sets of registers that may hold anything, the largest first."""
+        """Sets of cut registers, the largest first."""
         every, store = frozenset(range(len(self._latches))), self._named(_STORE)
         inside = self._inside(STAGES[mutant.stage]) - store
         yield every - inside
@@ -106,7 +105,7 @@ class Prover:
             twins |= {index: self._graph.variable() for index in sorted(found)}
 
     def _placed(self, number: int, latches: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Mutant ``number`` over these latches: what they take next, and the outputs."""
+        """Mutant ``number`` over these latches: their next states, and the outputs."""
         inputs = list(self._inputs)
         for index, name in enumerate(self._circuit.inputs):
             if found := re.fullmatch(r"mutant\[(\d+)\]", name):
@@ -114,12 +113,12 @@ class Prover:
         return self._graph.place(self._circuit, inputs, latches)
 
     def _differing(self, nexts: Sequence[int], twins: Collection[int]) -> dict[int, int]:
-        """For each register that is there once where the mutant's takes something else."""
+        """For each single register whether the mutant's next state differs."""
         pairs = enumerate(zip(self._nexts, nexts))
         return {i: self._graph.differ(one, other) for i, (one, other) in pairs if one != other and i not in twins}
 
     def _seen(self, driven: Sequence[int]) -> Iterable[int]:
-        """Where outputs differ that someone looks at: what is handed over, only while it is."""
+        """Differences of outputs that are observed: payloads only during a transfer."""
         names = self._circuit.outputs
         for name, one, other in zip(names, self._driven, driven):
             when = _HANDED.get(name.partition("[")[0])
@@ -127,7 +126,7 @@ class Prover:
             yield self._graph.both(self._graph.differ(one, other), looked_at)
 
     def _last(self, takes: dict[int, int], path: list[dict[int, int]], roots: list[int]) -> dict[int, int]:
-        """The values of what ``roots`` depend on in the last clock of a path."""
+        """Values of the inputs of ``roots`` in the last clock of a path."""
         state: dict[int, int] = {}
         for inputs in path[:-1]:
             values = self._graph.values({**state, **inputs}, takes.values())
@@ -151,7 +150,7 @@ def _value(values: dict[int, int], literal: int) -> int:
 def equivalent(
     design: Design, mutants: Sequence[Mutant], limit_s: int = QUICK_S, done: Callable[[], None] = lambda: None
 ) -> list[bool]:
-    """For each mutant whether it is proved equivalent; ``done()`` is called after each."""
+    """Whether each mutant is proved equivalent; ``done()`` is called after each."""
     verdicts = []
     if not mutants:
         return []

@@ -1,4 +1,4 @@
-"""What is done to the boards of several sheets."""
+"""Stimuli for the boards of several sheets."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 
 def quick(several: Several) -> Iterator[Stimulus]:
-    """Cells that come and go at any time; requests of each sheet, of one that is not there and of none, damaged ones,
-    and hellos one after the other. Then sheets at rest, and so few hellos that these tell of more frames than a digit
-    can."""
+    """Cells that change at any time; requests of each sheet, of an absent one and of none, damaged ones, and hellos in
+    a row. Then resting sheets, with so few hellos that they report more frames than a digit holds."""
     for seed in range(3):
         yield _random(several, seed, 40_000)
     yield _rare(several, 400_000)
 
 
 def thorough(several: Several) -> Iterator[Stimulus]:
-    """The same for longer: ten seconds, with hellos that come unasked and counters that reach their high digits."""
+    """Longer stimuli of the kind of :func:`quick`: ten seconds, with unrequested hellos and counters that reach their
+    high digits."""
     for seed in range(3, 7):
         yield _random(several, seed, 120_000)
     yield _rare(several, 10 * several.clock_hz)
@@ -43,7 +43,7 @@ def _rare(several: Several, cycles: int) -> Stimulus:
 def _stimulus(
     several: Several, name: str, cycles: int, most: int, gaps: Sequence[int], rng: np.random.Generator
 ) -> Stimulus:
-    """Cells of each sheet change after ``most`` cycles at most, and requests come with these gaps."""
+    """Cells of each sheet change within ``most`` cycles, requests have these gaps."""
     received = _asked(several, gaps, rng, cycles)
     timelines = []
     for skin in several.skins:
@@ -57,7 +57,7 @@ def _stimulus(
 
 
 def _asked(several: Several, gaps: Sequence[int], rng: np.random.Generator, cycles: int) -> list[tuple[int, bytes]]:
-    """Requests of any number at any time after the first hellos, some in a row."""
+    """Requests of any number at any time after the first hellos, some in bursts."""
     sheets, bit_clocks = len(several.skins), facts(several.skins[0]).bit_clocks
     sent: list[tuple[int, bytes]] = []
     start = 600

@@ -1,4 +1,4 @@
-"""Skins in which the logic of every option exists."""
+"""Skins that together contain the logic of every option."""
 
 from typing import Any
 
@@ -245,7 +245,7 @@ OPTIONS: dict[str, tuple[Skin, tuple[str, ...]]] = {
         ("closed", "label"),
     ),
 }
-"""Skins of options, and the stages whose mutants are drawn: those that the option changes."""
+"""Skins of options, and the mutated stages: those that the option changes."""
 
 _CHAINED: dict[str, Any] = {"row_drive": "74hc595", "column_read": "74hc165", "settle_us": 30.0} | _TINY
 
@@ -270,5 +270,4 @@ SEVERAL: dict[str, tuple[Several, tuple[str, ...]]] = {
         ("several", "serial", "link"),
     ),
 }
-"""Sheets at one FPGA, and the stages whose mutants are drawn: which sheet may send, the reader of requests that say
-which sheet they are for, and links that wait until they may."""
+"""Sheets on one FPGA, and the mutated stages: the arbiter, the reader of addressed requests, and waiting links."""

@@ -1,5 +1,5 @@
-"""What is done to the boards of mutants: touches, noise and requests, and to the options of a Skin lines that break,
-lines that touch, readings that change, commands."""
+"""Stimuli for mutants: touches, noise and requests; for options of a Skin broken and joined lines, changing readings,
+commands."""
 
 from __future__ import annotations
 
@@ -25,31 +25,31 @@ from contactfpga_sim.verify.cosim import covering
 _TIME_WRAPS_US = 1 << 24
 _AT_REST = 400_000
 _ALL_FRAMES = 16
-"""Cells of a sheet of which every frame is tried."""
+"""Cells of a sheet whose every frame is tried."""
 _FEW_CELLS = 64
-"""Cells of a sheet of which many more frames are tried, as each of them has fewer places where zones meet."""
+"""Cells of a sheet of which many more frames are tried, as each has fewer meetings of zones."""
 
 
 class Stimulus(NamedTuple):
-    """What is done to a board, and for how many clock cycles."""
+    """Inputs of a board, and their number of clock cycles."""
 
     name: str
     timeline: Timeline
     cycles: int
     noise: Sequence[tuple[int, int]] = ()
-    """At which cycle the receive pin goes low, and for how many: too short for a start bit, or with no stop bit after
-    it, so that no byte is received."""
+    """(cycle, length) of low levels at the receive pin: too short for a start bit, or without a stop bit, so that no
+    byte is received."""
     shorts: Sequence[tuple[int, Shorts]] = ()
-    """From which cycle on which lines are joined. The golden model knows no such sheet: a mutant is compared with the
-    gateware, whose findings ``tests/gateware/test_self_test.py`` holds to the list of faults."""
+    """(cycle, joined lines from then on). The golden model has no joints: a mutant is compared with the gateware, whose
+    findings ``tests/gateware/test_self_test.py`` checks against the faults."""
     others: Sequence[Timeline] = ()
-    """What is done to the sheets after the first one, where there are several. What is received is the first one's."""
+    """Inputs of the sheets after the first. Received bytes are the first one's."""
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:
-    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan, on a
-    closed sheet also shapes around it. With guard lines or a self-test also a sheet at rest with lines that break and
-    touch."""
+    """Cells that change at any time, requests, stuck columns and noise; every adversarial shape for one scan, on a
+    closed sheet also shapes around it. With guard lines or a self-test also a resting sheet with broken and joined
+    lines."""
     for seed in range(3):
         yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, least_cycles(skin)))
     yield from _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
@@ -60,8 +60,8 @@ def quick(skin: Skin) -> Iterator[Stimulus]:
 
 
 def thorough(skin: Skin) -> Iterator[Stimulus]:
-    """For the mutants that :func:`quick` leaves: the same for longer, all frames of a small sheet, random ones of a
-    larger one, and more than half a second of board time, after which a hello comes unasked."""
+    """Stimuli for the survivors of :func:`quick`: longer ones, all frames of a small sheet, random ones of a larger
+    one, and more than half a second of board time, after which a hello is sent unrequested."""
     for seed in range(3, 9):
         yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks, 4 * least_cycles(skin)))
     if skin.units:
@@ -75,12 +75,12 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
 
 
 def until_time_wraps(skin: Skin) -> Stimulus:
-    """Little happens, until the device time has begun again: the only way to its upper bits."""
+    """Few events until the device time wraps, the only way to its upper bits."""
     return _rare(skin, "until the time wraps", _TIME_WRAPS_US + 500_000)
 
 
 def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
-    """Requests come all along, in bursts and one by one."""
+    """Random cells with requests in bursts and one by one."""
     rng = np.random.default_rng([seed, 11])
     known = facts(skin)
     scan = known.scan_clocks
@@ -105,9 +105,9 @@ def _optional(skin: Skin) -> Iterator[Stimulus]:
 
 
 def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
-    """Requests, and between them what is none: a low level of up to half a bit, or until after the stop bit's middle.
+    """Requests, and invalid pulses between them: a low level of up to half a bit, or until after the stop bit's middle.
 
-    Most come so far apart that what each does is seen. A board that takes pulses for bits would take these for some.
+    Most are far enough apart to show each effect. A board with pulse bits would accept these.
     """
     if uart.pulsed(facts(skin).bit_clocks):
         return
@@ -130,7 +130,7 @@ def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
 
 
 def _crowded(skin: Skin, scans: int) -> Stimulus:
-    """Hellos one after the other: more frames are overwritten than the counter of them can count."""
+    """Hellos in a row, so that more frames are overwritten than their counter can hold."""
     known = facts(skin)
     scan = known.scan_clocks
     asked = range(scan, (scans - 5) * scan, 130 * known.bit_clocks)
@@ -139,8 +139,8 @@ def _crowded(skin: Skin, scans: int) -> Stimulus:
 
 
 def _meeting(skin: Skin, chains: int) -> Stimulus:
-    """Chains of hellos, then a frame that waits. Their ends are spread over a hello's time around the next frame's
-    end mark, so that the wire comes free in any clock of it."""
+    """Chains of hellos, then a waiting frame. The chains end at all clocks of a hello's time around the next frame's
+    end mark."""
     known = facts(skin)
     scan, byte = known.scan_clocks, 10 * known.bit_clocks
     hello_clocks = byte * (len(hello(known)) + 1)
@@ -156,7 +156,7 @@ def _meeting(skin: Skin, chains: int) -> Stimulus:
 
 
 def _various_frames(skin: Skin) -> np.ndarray:
-    """(n, R, C) bool: every frame of a sheet that is small enough, else random ones of all densities."""
+    """(n, R, C) bool: every frame of a small sheet, else random ones of all densities."""
     cells = skin.rows * skin.columns
     if cells <= _ALL_FRAMES:
         numbers = np.arange(1 << cells)
@@ -174,7 +174,7 @@ def _frames(skin: Skin, name: str, frames: np.ndarray) -> Stimulus:
 
 
 def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
-    """Other cells every 0.3 s, and stuck columns with some of them."""
+    """New cells every 0.3 s, with occasional stuck columns."""
     rng = np.random.default_rng(13)
     clocks = skin.clock_hz // 1_000_000
     shape = (skin.rows, skin.columns)
@@ -187,13 +187,13 @@ def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
 
 
 def least_cycles(skin: Skin) -> int:
-    """Cycles in which each option has been at work: sweeps of the units, slots of a few self-tests."""
+    """Cycles by which each option has worked: unit sweeps, some self-tests."""
     sweeps = 40 * skin.derived.units.sweep_clocks if skin.units else 0
     return max(sweeps, 5 * test_clocks(skin) if skin.self_test else 0)
 
 
 def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
-    """A timeline in which lines break, the guard column is stuck and units read something now and then."""
+    """The timeline with occasional broken lines, a stuck guard column and unit readings."""
     rng = np.random.default_rng([seed, 23])
     pieces, cuts, units = list(timeline.pieces), [], []
     if skin.guard:
@@ -207,7 +207,7 @@ def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
 
 
 def at_rest(skin: Skin, cycles: int) -> Timeline:
-    """Hardly a touch; lines are cut for so long that what is told of them is renewed, and self-tests come to an end."""
+    """Few touches; lines are cut long enough for renewed reports, and self-tests end."""
     rng = np.random.default_rng(37)
     pieces: list[tuple[int, np.ndarray, None]] = []
     for start in range(100, cycles, 30_000):
@@ -218,8 +218,7 @@ def at_rest(skin: Skin, cycles: int) -> Timeline:
 
 
 def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
-    """One zero and one threshold after the other, of readings about them and on either side of the zero; nothing else
-    touches the sheet."""
+    """One zero and threshold after the other, with readings around them and on either side of the zero; no touches."""
     rng = np.random.default_rng(41)
     units, bits = skin.derived.units, facts(skin).bit_clocks
     most = 2**units.converter.bits - 1
@@ -249,7 +248,7 @@ def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
 
 
 def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int], int]:
-    """Whose threshold is next, a unit's or a sum's: command, place, weights, and in steps of 2 to which power."""
+    """The next threshold, of a unit or a sum: command, place, weights, and exponent of its steps."""
     units, of_sum = skin.derived.units, bool(rng.random() < 0.5)
     if of_sum:
         place = int(rng.integers(len(skin.unit_sums)))
@@ -260,7 +259,7 @@ def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int],
 
 
 def _number(reached: int, rng: np.random.Generator) -> int:
-    """A threshold that is reached, or missed by one step; or far above that, in one more bit."""
+    """A threshold that is reached, or missed by one step, or far above in one more bit."""
     number = reached + int(rng.integers(2))
     if rng.random() < 0.25:
         number |= 1 << int(rng.integers(min(reached.bit_length(), NUMBER_BITS - 1), NUMBER_BITS))
@@ -268,14 +267,14 @@ def _number(reached: int, rng: np.random.Generator) -> int:
 
 
 def _of_bits(most: int, rng: np.random.Generator) -> int:
-    """A number of up to ``most`` bits: any of them, or each count of bits as likely as another."""
+    """A number of up to ``most`` bits, uniform, or with uniform bit count."""
     return int(rng.integers(1 << (most if rng.random() < 0.5 else int(rng.integers(most + 1)))))
 
 
 def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
     """Each pair of rows and of columns joined, each row joined with the supply and each column with a strong pull,
-    alone and joined with another one; a whole sheet after each of them, and a self-test in either. Timeline, what is
-    joined from which cycle on, and for how many cycles."""
+    alone and with another one; each followed by a whole sheet, both with a self-test. Returns the timeline, joints by
+    starting cycle, and the number of cycles."""
     shorts = [Shorts(rows=(pair,)) for pair in itertools.combinations(range(skin.rows), 2)]
     shorts += [Shorts(columns=(pair,)) for pair in itertools.combinations(range(skin.columns), 2)]
     shorts += [Shorts(supplied=(row,)) for row in range(skin.rows)]
@@ -290,8 +289,8 @@ def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
 
 
 def bridged(skin: Skin) -> Iterator[tuple[Timeline, list[tuple[int, Shorts]], int]]:
-    """Likewise each diode bridged at power-up, its switch pressed for the self-test: a frame would drive the row
-    against the column."""
+    """Each diode bridged at power-up, its switch pressed for the self-test: a frame would drive the row against the
+    column. Returns as :func:`joined`."""
     first = (1 + skin.rows + skin.columns) * (2 * facts(skin).project + facts(skin).settle + 8)
     for place in itertools.product(range(skin.rows), range(skin.columns)):
         cells = np.zeros((skin.rows, skin.columns), bool)
@@ -301,7 +300,7 @@ def bridged(skin: Skin) -> Iterator[tuple[Timeline, list[tuple[int, Shorts]], in
 
 
 def test_clocks(skin: Skin) -> int:
-    """More than a self-test takes whose slots go out."""
+    """An upper bound on the clocks of a self-test whose slots are sent."""
     slots = 1 + skin.rows + skin.columns
     packet = 10 * facts(skin).bit_clocks * (12 + (skin.rows + skin.columns) // 7)
     return slots * (3 * packet + facts(skin).scan_clocks)
@@ -326,7 +325,7 @@ def _with_guard(skin: Skin, stuck: np.ndarray | None, rng: np.random.Generator) 
 
 
 def _cuts(skin: Skin, rng: np.random.Generator) -> Cuts:
-    """None, some, or half of the lines, each at any place."""
+    """None, some, or half of the lines cut, each at a random place."""
     share = rng.choice([0, 0, 0.2, 0.5])
     ends = (
         {line: int(rng.integers(across + 1)) for line in range(lines) if rng.random() < share}

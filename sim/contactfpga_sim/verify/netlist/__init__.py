@@ -1,1 +1,1 @@
-"""What a built bitstream holds, simulated."""
+"""Simulation of built bitstreams."""

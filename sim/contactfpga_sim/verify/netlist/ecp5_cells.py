@@ -1,6 +1,6 @@
-"""Verilog for the ECP5 cells that Yosys has no model of, or none that it can compile, as far as the gateware uses them.
+"""Verilog of ECP5 cells without a usable Yosys model, as far as the gateware needs them.
 
-A use beyond that names a module that does not exist, so that reading the netlist fails.
+Any other use names a missing module, so that reading the netlist fails.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ _GLOBAL_RESET = "module SGSR(input CLK, GSR); endmodule\n"
 
 
 def _block_ram() -> str:
-    """Two ports of 9 or 18 bits that read what was there before a write, without output registers.
+    """Two ports of 9 or 18 bits that read before write, without output registers.
 
-    9 bits are a byte with its parity bit; an 18-bit address counts them in pairs, its two lowest bits enable them.
+    9 bits are a byte with its parity bit; an 18-bit address counts them in pairs, its two lowest bits are their
+    enables.
     """
     ports, parameters, bodies = [], [], []
     for side in "AB":

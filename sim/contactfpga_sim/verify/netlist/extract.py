@@ -1,6 +1,6 @@
-"""The netlist of a built board: taken back out of an iCE40's bitstream, or as synthesized for an ECP5.
+"""The netlist of a built board: extracted from an iCE40's bitstream, or as synthesized for an ECP5.
 
-A pin that the netlist drives and reads becomes what it reads, what it drives, and whether it does.
+A bidirectional pin becomes its input, its output, and its output enable.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from contactfpga_sim.verify.netlist import ecp5_cells
 
 
 class WrongPins(ContactFPGAError):
-    """The netlist has not one buffer with an output enable for each line."""
+    """The netlist does not have one buffer with an output enable for each line."""
 
 
 def lines(skin: Skin) -> dict[str, int]:
-    """How many lines there are under each name of a Skin's pins that are driven and read."""
+    """Number of lines by name of a Skin's bidirectional pins."""
     sheet = row_pins(skin) | column_pins(skin)
     return {name: sheet[f"{name}_drive"].shape for name in ("rows", "columns") if f"{name}_drive" in sheet}
 
@@ -37,7 +37,7 @@ def lines(skin: Skin) -> dict[str, int]:
 def of_icebox(chip: str, skin: Skin) -> str:
     """The Verilog of ``icebox_vlog`` with an input ``NAME_0__io`` and outputs ``NAME_0__o`` and ``NAME_0__oe``.
 
-    Where a line of a port is never read, as a guard row is not, ``icebox_vlog`` makes the port an output.
+    If a line of a port is never read, such as a guard row, ``icebox_vlog`` makes the port an output.
     """
     for name, width in lines(skin).items():
         port = rf"\{name}_0__io " if width > 1 else f"{name}_0__io"
@@ -53,7 +53,7 @@ def of_icebox(chip: str, skin: Skin) -> str:
 
 
 def of_ecp5(chip: str, skin: Skin) -> str:
-    """The same with the Verilog of a synthesis for an ECP5."""
+    """:func:`of_icebox` for the Verilog of an ECP5 synthesis."""
     for name, width in lines(skin).items():
         port, size = f"{name}_0__io", _size(width)
         declared = f"input {size}{port};\n  output {size}{name}_0__o;\n  output {size}{name}_0__oe;"
@@ -82,10 +82,10 @@ def _driven(name: str, line: int, width: int, level: str, enable: str) -> str:
 
 
 def wrapper(skin: Skin) -> tuple[dict[str, str], str]:
-    """For each port of the chip that this module makes what it is connected to, and the Verilog that this needs.
+    """Connections of the chip's ports that this module adds, and the needed Verilog.
 
-    A column counts as driven only if it is driven to the level that it should have: the released one, or where columns
-    are driven both ways that of the first column, and the guard column the other one.
+    A column counts as driven only at its proper level: the released one, or with two drive levels the first column's,
+    and the other one for the guard column.
     """
     ports: dict[str, str] = {}
     text = ""
@@ -120,7 +120,7 @@ def _bit(name: str, line: int, width: int) -> str:
 
 
 def _once(text: str, pattern: str) -> re.Match[str]:
-    """The one place of a pattern."""
+    """The only match of a pattern."""
     hits = list(re.finditer(pattern, text, re.DOTALL))
     if len(hits) != 1:
         raise WrongPins(f"the netlist has {len(hits)} places like {pattern}; expected is one")
@@ -132,11 +132,11 @@ def _put(text: str, hit: re.Match[str], new: str) -> str:
 
 
 class WrongBitstream(ContactFPGAError):
-    """A bitstream that has other bytes when unpacked and packed again, or that sets its PLL otherwise than asked."""
+    """A bitstream that differs after unpacking and packing, or whose PLL is not set as requested."""
 
 
 def from_bitstream(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
-    """Build the iCE40 bitstream in ``folder`` and take the netlist back out of its bytes.
+    """Build the iCE40 bitstream in ``folder`` and extract its netlist.
 
     Raises :class:`MissingTool` without ``icebox_vlog`` and :class:`WrongBitstream`.
     """
@@ -170,7 +170,7 @@ def _check(skin: Skin) -> None:
 
 
 def _without_pll(chip: str, board: BoardSpec, skin: Skin) -> str:
-    """The netlist with the PLL's output net on the crystal's pin, and always locked; its dividers are compared."""
+    """The netlist with the PLL's output on the crystal's pin, always locked; its dividers are checked."""
     cell = re.search(r"^SB_PLL40_\w+ #\((.*?)\) \S+ \((.*?)^\);", chip, re.MULTILINE | re.DOTALL)
     if cell is None:
         raise WrongBitstream(f"{board.title}: there is no PLL in the bitstream")
@@ -184,7 +184,7 @@ def _without_pll(chip: str, board: BoardSpec, skin: Skin) -> str:
 
 
 def synthesized(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
-    """Synthesize for an ECP5: the cells that place and route starts from, without their places."""
+    """Synthesize for an ECP5: the input of place and route."""
     _check(skin)
     build.plan_for(board, skin).extract(str(folder))
     native.yosys(f"read_rtlil {NAME}.il; {synthesis.script(board.fpga, NAME)}; write_verilog -noattr chip.v", folder)
@@ -197,7 +197,7 @@ def synthesized(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
 
 
 def _pins(board: BoardSpec, skin: Skin) -> str:
-    """Verilog that gives the pins, which are named after the platform's resources, the names of the gateware's."""
+    """Verilog that maps the platform's pin names to the gateware's."""
     sheet = row_pins(skin) | column_pins(skin)
     wires = {_crystal(board): "clk", "uart_0__rx__io": "rx", "uart_0__tx__io": "tx"}
     wires |= {f"{name}_0__io": name for name in ("contact", *board.pins(skin))}

@@ -1,7 +1,8 @@
-"""What ``make bitstream-replay`` runs: frames through the netlist of a built board, compared with the golden model.
+"""The program of ``make bitstream-replay``: frames through the netlist of a built board, compared with the golden
+model.
 
-The iCE40 boards' netlists are taken back out of the bitstream; the ULX3S's is the synthesized one. Compared are the
-transmit and the contact pin in every clock after the power-up reset, hence every byte.
+The iCE40 boards' netlists are extracted from the bitstream; the ULX3S's is the synthesized one. Transmit and contact
+pin are compared in every clock after the power-up reset, hence every byte.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ from contactfpga_sim.verify.netlist import extract
 FOLDER = Path("build/replay")
 
 BATCH = 500
-"""Frames from one power-up."""
+"""Frames per power-up."""
 
 RESET_US = 20
-"""The platform holds reset for no longer than this after power-up."""
+"""Longest reset of the platform after power-up."""
 
 _STICK = BOARDS["icestick"].skin
 _REVERSAL = Skin(scan="reversal", precharge_us=0.25, settle_us=0.5, release_us=0.05)
@@ -52,22 +53,22 @@ RUNS: tuple[tuple[str, Skin], ...] = (
     ("icebreaker", _REVERSAL.replace(rows=8, columns=8, guard=True, clock_hz=24_000_000, baud=12_000_000)),
     ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, self_test=True, clock_hz=30_000_000, baud=3_000_000)),
 )
-"""Boards and sheets that are replayed when no board is named. The first one sends every frame, the others overwrite
-some; the second one has its rows on shift registers, the fourth its clock from the PLL, and the last four drive and
-read their pins; of these the third has guard lines, and the last one a self-test."""
+"""Default boards and sheets. The first sends every frame, the others overwrite some; the second has rows on shift
+registers, the fourth its clock from the PLL, the last four bidirectional pins, the third of these guard lines, and the
+last a self-test."""
 
 
 @dataclasses.dataclass(frozen=True)
 class NetlistReplay:
-    """A netlist that did what the golden model predicts."""
+    """A netlist that agrees with the golden model."""
 
     frames: int
-    """Held at the pins, each for one scan."""
+    """Frames held at the pins, each for one scan."""
     packets: int
-    """That came over the line, hellos among them."""
+    """Packets on the line, with hellos."""
     clocks: int
     changes: int
-    """Of the transmit and the contact pin."""
+    """Changes of the transmit and contact pin."""
 
     def __add__(self, other: NetlistReplay) -> NetlistReplay:
         pairs = zip(dataclasses.astuple(self), dataclasses.astuple(other), strict=True)
@@ -97,7 +98,7 @@ def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> 
 
 
 def reset_clocks(skin: Skin, model: native.Model) -> int:
-    """Clocks from power-up to cycle 0 of docs/timing.md, from when the first hello begins."""
+    """Clocks from power-up to cycle 0 of docs/timing.md, by the start of the first hello."""
     limit = RESET_US * skin.derived.clocks_per_us
     untouched = Timeline([])
     hello = predict(skin, untouched, limit).line[0][0]
@@ -130,7 +131,7 @@ def _random(skin: Skin, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def _windows(skin: Skin, frames: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """The part around a pressed cell of frames with any, drawn by chance; larger sheets are filled up with nothing."""
+    """Windows around a pressed cell of random nonempty frames; larger sheets are padded."""
     touched = np.flatnonzero(frames.any(axis=(1, 2)))
     while True:
         cells = frames[rng.choice(touched)]
@@ -145,7 +146,7 @@ def _windows(skin: Skin, frames: np.ndarray, rng: np.random.Generator) -> Iterat
 
 
 def main() -> int:
-    """Replay and print what came of it; 1 if a netlist differs from the golden model or its bitstream does not pack."""
+    """Replay and print the result; 1 if a netlist differs from the golden model or its bitstream does not pack."""
     parser = argparse.ArgumentParser(prog="make bitstream-replay", description=__doc__)
     parser.add_argument("board", nargs="?", choices=list(BOARDS), help="default: 8x8 on one of each FPGA")
     parser.add_argument("--skin", type=Path, help="the board's sheet; default: the one it is built with")

@@ -1,1 +1,1 @@
-"""Proofs about the gateware, one file per stage, with the solver inside Yosys; docs/formal.md says what they show."""
+"""Proofs about the gateware, one file per stage, with Yosys' solver; docs/formal.md describes them."""

@@ -59,7 +59,7 @@ _WIDTHS = (34, 32, 16, 8, 16, 10)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run them and print a line each; returns 1 if one does not hold or does not find its bugs."""
+    """Run all proofs, a line each; returns 1 if one fails or misses its bugs."""
     parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.verify.proofs", description=__doc__)
     parser.add_argument("words", nargs="*", help="only proofs whose claim or size holds one of these")
     parser.add_argument("--quick", action="store_true", help="leave out what takes more than a minute")
@@ -78,7 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _report(case: ProofCase, number: str) -> bool:
-    """One line of the table, with what is done shown before on a terminal."""
+    """Print one line of the table, preceded by progress on a terminal."""
     _progress(f"{number}: {case.name}")
     verdict = case.run()
     found = 0

@@ -1,4 +1,4 @@
-"""The adaptive scan: which rows it chooses, and that rows driven together never meet others that are driven."""
+"""The adaptive scan: its choice of rows, and that rows driven together never meet other driven ones."""
 
 from functools import partial
 
@@ -19,8 +19,8 @@ ALL = (1 << ROWS) - 1
 def released_between(proof: Proof) -> None:
     """Free: the columns in each clock, and when rows are taken.
 
-    Claimed: the rows that are driven are all or one, and change to none first; none are driven for the release time at
-    least, others for the settle time.
+    Claimed: all rows or one are driven, and change by way of none; none are driven for at least the release time,
+    others for the settle time.
     """
     dut = AdaptiveScanner(Skin(scan="adaptive", rows=ROWS, columns=1, settle_us=1, zone_capacity=1))
     inside = proof.put(dut)
@@ -65,7 +65,7 @@ def _seek_lemmas(proof: Proof, inside: Inside) -> None:
 
 
 def _slot_lemmas(proof: Proof, inside: Inside, settled: int, off, driven, since) -> None:
-    """When in a slot rows are chosen: after its strobe, or where idle rows hit, from the release on."""
+    """Lemmas on when a slot chooses rows: after its strobe, or with hits of idle rows, from the release on."""
     clock, state = inside["clock"], inside["seek.choice_state"]
     pattern, idle, watches = inside["seek.pattern"], inside["seek.idle"], inside["watches"]
     todo, due = inside["seek.todo"], inside["row_due"]
@@ -108,10 +108,10 @@ WAIT, PICK, SEARCH, START = range(4)  # in the order in which the source names t
 def frames(proof: Proof, rows: int) -> None:
     """Free: whether a slot hits, and whether its row is busy, each time; when a strobe comes once rows are chosen.
 
-    Assumed: a frame's rows are handed on before the next one's first strobe, as the Skin's limits see to.
+    Assumed: a frame's rows are handed on before the next one's first strobe, by the Skin's limits.
 
-    Claimed: each slot drives rows that are not known yet, one if alone; these come in ascending order; after the last
-    slot of a frame every row is known; a frame has at most ``2 rows - 1`` slots, and ``rows + 2 ceil(log2 rows) + 2``.
+    Claimed: each slot drives rows not known yet, one if alone; these are in ascending order; after the last slot of a
+    frame every row is known; a frame has at most ``2 rows - 1`` slots, and ``rows + 2 ceil(log2 rows) + 2``.
     """
     m = proof.m
     dut = Seek(Skin(scan="adaptive", rows=rows, columns=1, settle_us=20))

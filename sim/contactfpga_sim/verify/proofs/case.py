@@ -1,9 +1,8 @@
-"""What is proved, the bugs that a proof must find, and the solver inside Yosys: by induction, forever, or by search
-through all inputs for some clocks from power-up.
+"""Claims, bugs that a proof must find, and Yosys' solver: by induction, forever, or by search through all inputs for
+some clocks from power-up.
 
-The gateware knows nothing of the bugs that are planted in it. A bug names a class and a signal driven in it, and
-says what this gets instead of the right value. It is planted in the elaborated design, so the source can be written in
-any way that drives a signal of that name.
+Bugs are planted in the elaborated design, independent of the source: a bug names a class and a signal driven in it, and
+gives a wrong value.
 """
 
 import dataclasses
@@ -27,20 +26,20 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 @dataclasses.dataclass(frozen=True)
 class Bug:
-    """A signal that gets a wrong value, in every component of a class."""
+    """A signal with a wrong value, in every component of a class."""
 
     name: str
     owner: type
     signal: str
-    """Its name in the component that drives it; of a bundle with the field: ``join.place``."""
+    """Name in the driving component; of a bundle with the field: ``join.place``."""
     wrong: Callable[[Value, Inside], object]
-    """What it gets, from the right value and what else is in the component; of a register, in the next clock."""
+    """The wrong value, from the right one and the component's signals; of a register, in the next clock."""
 
 
 def plant(bug: Bug, design: Fragment) -> None:
-    """Change the elaborated design so that it has the bug.
+    """Plant the bug in the elaborated design.
 
-    Raises LookupError when the design has no component of the class, or the class drives no signal of that name.
+    Raises LookupError if the design has no component of the class, or the class drives no such signal.
     """
     owners = [part for part in fragments(design) if isinstance((part.origins or (None,))[0], bug.owner)]
     if not owners:
@@ -50,7 +49,7 @@ def plant(bug: Bug, design: Fragment) -> None:
 
 
 def _change(bug: Bug, part: Fragment) -> None:
-    """A new signal takes over the statements that drive the old one, which gets the wrong value."""
+    """Move the drivers of the old signal to a new one, and give the old one the wrong value."""
     inside = Inside(part)
     name, *fields = bug.signal.split(".")
     domain, signal = inside.driven(name)
@@ -70,7 +69,7 @@ def _change(bug: Bug, part: Fragment) -> None:
 
 
 class _Redirected(StatementTransformer):
-    """Statements that assign to other signals under the same conditions; what they read stays."""
+    """Statements that assign to other signals under the same conditions; their inputs stay."""
 
     def __init__(self, targets: dict[int, Signal]):
         self._target = _Target(targets)
@@ -101,20 +100,20 @@ _PREPARE = (
 
 
 class ProofFailed(ContactFPGAError):
-    """Yosys did not get as far as an answer; the message carries what it said."""
+    """Yosys gave no answer; the message has its output."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What came of it."""
+    """Result of a proof or search."""
 
     outcome: str
-    """``proved``, ``counterexample``, or ``open`` when depth or time did not suffice."""
+    """``proved``, ``counterexample``, or ``open`` if depth or time was too short."""
     clocks: int
-    """Clocks that the induction looked at together, that were searched, or after which the counterexample shows."""
+    """Clocks of the induction or search, or of the counterexample."""
     seconds: float
     said: str
-    """What the solver said, with the counterexample if there is one."""
+    """The solver's output, with any counterexample."""
 
 
 def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
@@ -123,10 +122,8 @@ def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> 
 
 
 def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600, bug: Bug | None = None) -> Verdict:
-    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up.
-
-    With ``bug`` in the gateware that has it.
-    """
+    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up, with
+    ``bug`` in the gateware if given."""
     return _solve(build, Proof(claims_alone=True), f"-tempinduct-baseonly -maxsteps {clocks}", limit_s, bug)
 
 
@@ -182,13 +179,13 @@ class ProofCase:
     size: str
     build: Callable[[Proof], None]
     clocks: int
-    """That the induction may look at together; with ``bounded`` those that are searched."""
+    """Largest depth of the induction; with ``bounded``, of the search."""
     bugs: tuple[Bug, ...] = ()
     bug_clocks: int = 12
-    """From power-up, in which a planted bug must break a claim."""
+    """Clocks from power-up within which a planted bug must break a claim."""
     bounded: bool = False
     campaign: bool = False
-    """Takes too long for ``make test``."""
+    """Whether it is too slow for ``make test``."""
 
     @property
     def name(self) -> str:
@@ -199,5 +196,5 @@ class ProofCase:
         return solve(self.build, self.clocks, limit_s)
 
     def run_with(self, bug: Bug, limit_s: float = 3600) -> Verdict:
-        """Look for a counterexample to the claims, without the lemmas, in the gateware with the bug."""
+        """Search for a counterexample to the claims, without the lemmas, in the gateware with the bug."""
         return search(self.build, self.bug_clocks, limit_s, bug)

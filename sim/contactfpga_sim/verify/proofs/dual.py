@@ -1,4 +1,4 @@
-"""Two copies that differ are stopped before the byte is over."""
+"""Two differing copies are stopped before the byte is over."""
 
 from functools import partial
 
@@ -13,7 +13,7 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 
 class _Core(wiring.Component):
-    """Any gateware at all: what it says is free. ``runs`` is low in the clock after one in which it is reset."""
+    """Any gateware: its outputs are free. ``runs`` is low in the clock after a reset."""
 
     def __init__(self, said: Value):
         self.said = said
@@ -28,13 +28,12 @@ class _Core(wiring.Component):
 
 
 def differences_stop_the_line(proof: Proof, fail_safe: bool) -> None:
-    """Free: what both copies say in each clock, and the level of ``rx``.
+    """Free: outputs of both copies in each clock, and the level of ``rx``.
 
-    Claimed: until the second first says something else than the first did a clock before, all outputs are those of the
-    first, ``contact`` with ``fail_safe`` a clock later. Such a difference makes ``tx`` low from the next clock on, for
-    longer than a byte takes; ``contact`` is high with ``fail_safe``, until a scan after the restart. Both are then
-    reset until the line was high for as long, the second always a clock after the first, and gets each level of ``rx``
-    a clock after the first.
+    Claimed: until the second's output differs from the first's a clock before, all outputs are the first's, ``contact``
+    with ``fail_safe`` a clock later. A difference makes ``tx`` low from the next clock on, for longer than a byte;
+    ``contact`` is high with ``fail_safe``, until a scan after the restart. Both are then reset until the line was high
+    as long, the second always a clock after the first, and receives ``rx`` a clock after the first.
     """
     m = proof.m
     skin = Skin(rows=1, columns=1, dual=True, fail_safe=fail_safe)

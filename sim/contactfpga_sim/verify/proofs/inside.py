@@ -1,4 +1,4 @@
-"""What is in an elaborated component: its parts, and the signals that are driven there."""
+"""Contents of an elaborated component: its parts, and the signals driven there."""
 
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
@@ -12,18 +12,17 @@ _Found = TypeVar("_Found")
 
 
 class Inside:
-    """Signals and parts of an elaborated component by their names.
+    """Signals and parts of an elaborated component by name.
 
-    Everything raises LookupError for a name that nothing has, or two signals of a part.
+    All methods raise LookupError for an unknown name, or for two signals of a part.
     """
 
     def __init__(self, fragment: Fragment):
         self._fragment = fragment
 
     def __getitem__(self, path: str) -> Value:
-        """The signal that is driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else
-        one that only is read, as it keeps its initial value.
-        """
+        """The signal driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else a signal
+        that is only read, which keeps its initial value."""
         names = path.split(".")
         fragment = self._fragment
         while len(names) > 1 and (sub := _sub(fragment, names[0])) is not None:
@@ -40,7 +39,7 @@ class Inside:
         return self._fragment.origins[0]
 
     def driven(self, name: str) -> tuple[str, Signal]:
-        """The signal of that name that is driven in the component itself, and its domain."""
+        """The signal of that name driven in the component itself, and its domain."""
         return self._only(self._all_driven(name), "drives", name)
 
     def part(self, path: str):
@@ -48,7 +47,7 @@ class Inside:
         return self._part(path).origins[0]
 
     def word(self, path: str, address) -> Signal:
-        """What the memory holds at an address in this clock: seen through a read port that is added for it."""
+        """The memory's word at an address in this clock, through an added read port."""
         (memory,) = (part for part in fragments(self._part(path)) if isinstance(part, MemoryInstance))
         data = memory._data
         word = Signal(Shape.cast(data.shape).width, name=f"{path.replace('.', '_')}_word")
@@ -57,11 +56,11 @@ class Inside:
         return word
 
     def registers_here(self) -> list[Signal]:
-        """Signals that change with the clock, without those of the component's parts."""
+        """Registers of the component without those of its parts."""
         return _driven(self._fragment, "sync")
 
     def registers(self) -> Iterator[Signal]:
-        """All signals of the component and what is in it that change with the clock."""
+        """All registers of the component and its parts."""
         for fragment in fragments(self._fragment):
             yield from _driven(fragment, "sync")
 
@@ -96,14 +95,14 @@ class Inside:
 
 
 def fragments(fragment: Fragment) -> Iterator[Fragment]:
-    """A fragment and all that are in it."""
+    """A fragment and all its descendants."""
     yield fragment
     for sub, _, _ in fragment.subfragments:
         yield from fragments(sub)
 
 
 def fields_of(signal: Signal, names: Sequence[str]) -> tuple[int, int]:
-    """First bit of a bundle's field, and the one after its last; of the whole signal for no names."""
+    """First bit of a bundle's field, and the one after its last; of the whole signal without names."""
     start, stop, described = 0, len(signal), signal._format
     for name in names:
         fields = described._fields if isinstance(described, Format.Struct) else {}

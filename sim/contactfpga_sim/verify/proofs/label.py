@@ -1,4 +1,4 @@
-"""The labeller: nothing runs over or empty, nothing is left over, and no stall changes what it does."""
+"""The labeller: no overflow or underflow, nothing left over, and stalls change nothing."""
 
 from functools import partial
 
@@ -20,7 +20,7 @@ def skin_of(rows: int, columns: int, connectivity: int, closed: bool = False) ->
 
 
 def rows_into(proof: Proof, dut: RunLabeller):
-    """Any rows, whenever they come; returns ``valid``, ``cells`` and ``last``."""
+    """Rows at any time; returns ``valid``, ``cells`` and ``last``."""
     valid, last = proof.free(1, "valid"), proof.free(1, "last")
     cells = proof.free(dut.derived.skin.columns, "cells")
     proof.m.d.comb += [
@@ -32,12 +32,12 @@ def rows_into(proof: Proof, dut: RunLabeller):
 
 
 def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken as they come; ``stalls_change_nothing`` shows that this
-    is no restriction.
+    """Free: any rows at any time. Assumed: records are taken at once; ``stalls_change_nothing`` shows that this is no
+    restriction.
 
-    Claimed: the stacks neither overflow nor run empty; no place of the table is written while an open zone lies there,
-    or read while none does or in the clock in which it is written; after a frame's last row no zone is open, in the
-    table or on a stack.
+    Claimed: the stacks neither overflow nor underflow; no place of the table is written while it holds an open zone, or
+    read while it holds none or in the clock of its write; after a frame's last row no zone is open, in the table or on
+    a stack.
     """
     m = proof.m
     dut = RunLabeller(skin_of(2, columns, connectivity, closed))
@@ -103,13 +103,13 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
 
 
 def mask_of_first_cluster(labeller: Inside):
-    """Whether the walk's mask is a run of ones from column 0 on, with the other clusters' ends after it."""
+    """Whether the walk's mask is a run of ones from column 0 on, followed by the other clusters' ends."""
     inside, ends = labeller["walk.inside"], labeller["walk.ends"]
     return ((inside & (inside + 1)) == 0) & ((ends & inside) == 0) & (inside[0] | (ends == 0))
 
 
 def _brackets(m, row, earlier, later):
-    """Whether a row's brackets nest, and for each column whether the first run of a zone starts there."""
+    """Whether a row's brackets nest, and for each column whether a zone's first run starts there."""
     starts = Signal(len(row))
     m.d.comb += starts.eq(row & ~(row << 1))
     runs = sum(starts[1:], starts[0])
@@ -127,8 +127,8 @@ def _brackets(m, row, earlier, later):
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
     """Free: any rows at any time, and when records are taken.
 
-    Claimed: while a record waits it stays as it is, no row is taken and nothing changes inside. So the records are
-    those that would come without the stall.
+    Claimed: while a record waits it is unchanged, no row is taken and nothing changes inside. So the records are those
+    without the stall.
     """
     m = proof.m
     dut = RunLabeller(skin_of(4, columns, connectivity, closed))
@@ -147,7 +147,7 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed:
 def an_end_mark_a_frame(proof: Proof, columns: int, connectivity: int) -> None:
     """Free: any rows at any time, and when records are taken.
 
-    Claimed: the end marks that came are the last rows that were taken, but for those still inside: three at most.
+    Claimed: the end marks are the last rows taken, except those still inside, at most three.
     """
     m = proof.m
     dut = RunLabeller(skin_of(4, columns, connectivity))

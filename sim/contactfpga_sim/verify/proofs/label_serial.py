@@ -1,4 +1,4 @@
-"""The labeller that takes one cell per clock: its records are the zones, its memories neither overflow nor collide."""
+"""The labeller with one cell per clock: its records are the zones, its memories neither overflow nor collide."""
 
 from functools import partial
 
@@ -28,11 +28,10 @@ def _skin(rows: int, columns: int, connectivity: int, closed: bool) -> Skin:
 
 
 def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free and assumed: as below.
+    """Free and assumed: as in :func:`records_are_the_zones`.
 
-    Claimed: what is wanted of the memory is there, nothing is written to a place in use or outside the table, no word
-    is used that was read while it was written, the brackets nest no deeper than there is room, and after a frame no
-    place is in use.
+    Claimed: wanted memory data are available, nothing is written to a place in use or outside the table, no word is
+    used that was read during its write, the brackets' nesting fits, and after a frame no place is in use.
     """
     dut, inside, open_row = _labeller(proof, columns, connectivity, rows, closed, proof.lemma)
     m, places = proof.m, dut.derived.open_zones
@@ -71,10 +70,10 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken as they come.
+    """Free: any rows at any time. Assumed: records are taken at once.
 
-    Claimed: when a row can be taken, the zones that end with the one before have left, each once, and after a last row
-    one end mark; that is so after C + e + 2 clocks at most, or where the ends meet after two more.
+    Claimed: when a row can be taken, the zones that end with the previous row have left, each once, and after a last
+    row one end mark; that is so after at most C + e + 2 clocks, or two more for a sheet whose ends meet.
     """
     _labeller(proof, columns, connectivity, rows, closed, proof.claim)
 
@@ -82,7 +81,7 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
 def _labeller(
     proof: Proof, columns: int, connectivity: int, rows: int, closed: bool, claim
 ) -> tuple[SerialLabeller, Inside, OpenRow]:
-    """The labeller beside the specification, and what is said of both."""
+    """The labeller beside the specification, with claims on both."""
     m = proof.m
     dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
     inside = proof.put(dut)
@@ -121,7 +120,7 @@ def _labeller(
 
 
 def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRow) -> None:
-    """Between two rows brackets and table say of the open row what the specification knows of it."""
+    """Lemmas between two rows: brackets and table agree with the specification's open row."""
     derived, columns = dut.derived, range(dut.derived.skin.columns)
     starts = Signal(len(columns), name="run_starts")
     proof.m.d.comb += starts.eq(open_row.cells & ~(open_row.cells << 1))
@@ -170,7 +169,7 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: i
 
 
 def _clusters_end_early(closes, inside: Inside):
-    """At a column that is empty in the row before."""
+    """Whether clusters end early, at a column that is empty in the row before."""
     return (inside["cell_left"] | inside["before_left"]) & ~inside["before"][0]
 
 

@@ -1,5 +1,5 @@
-"""The link after the packer: which frame is sent, and that its bytes are those that were packed; what it sends unasked;
-and that the odometer's digits are the counts."""
+"""The link after the packer: which frame is sent, that its bytes are the packed ones, unrequested packets, and that the
+odometer's digits are the counts."""
 
 from functools import partial
 from typing import Any
@@ -25,16 +25,15 @@ _STATES = ("IDLE", "FETCH", "BYTE", "TAIL")
 
 
 def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
-    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are taken
-    and one place of a frame and one of the hello that are followed. Assumed: a complete frame was written as far as its
-    end, as ``frames_are_packed`` shows.
+    """Free: items at any time, tag and summary, wishes for a hello, its numbers, when bytes are taken, and one followed
+    place of a frame and of the hello. Assumed: a complete frame was written up to its end, as ``frames_are_packed``
+    shows.
 
-    Claimed: what is sent of a frame at that place is what the packer wrote there. What is sent of a hello is what the
-    protocol says, but for the digits of its state; each of these is a digit, and the first two are those of the frames
-    sent. After as many bytes as a packet has come the check bytes and one delimiter, and only then the next packet
-    begins. A byte stays until it is taken; the next one is offered two clocks later. Each complete frame is sent or
-    counted as overwritten, and sequence numbers have no gap. The packer is told these numbers from the clock after
-    ``decide`` until ``commit``. The link never asks for a restart.
+    Claimed: a sent frame has at that place what the packer wrote there; a sent hello follows the protocol, except for
+    the digits of its state, of which each is a digit, and the first two are the frames sent. After a packet's bytes
+    come the check bytes and one delimiter, and only then the next packet. A byte stays until it is taken; the next is
+    offered two clocks later. Each complete frame is sent or counted as overwritten, and sequence numbers have no gap.
+    The packer gets these numbers from the clock after ``decide`` until ``commit``. The link never asks for a restart.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
@@ -84,7 +83,7 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
 
 
 class _PackerAndLink(wiring.Component):
-    """As the top joins them."""
+    """Packer and link, joined as in the top."""
 
     def __init__(self) -> None:
         self.packer, self.link = Packer(_SKIN, offset_bits(_SKIN)), Link(_SKIN)
@@ -105,10 +104,8 @@ class _PackerAndLink(wiring.Component):
 
 
 class _Frames:
-    """Frames in their order: one is packed, one may wait, one is on the wire; how many were sent, how many were not.
-
-    Of each, what was written at the followed place.
-    """
+    """Frames in order: one being packed, one possibly waiting, one on the wire; numbers of sent and unsent ones; the
+    written byte of each at the followed place."""
 
     def __init__(self, m: Module, packed, take_frame, place):
         write = packed.write
@@ -142,7 +139,7 @@ class _Frames:
 
 
 class _Wire:
-    """How many bytes of the frame or hello on the wire were taken."""
+    """Number of bytes taken of the frame or hello on the wire."""
 
     def __init__(self, m: Module, dut: _PackerAndLink, inside: Inside, frames: _Frames, hello_length: int):
         self.busy, self.is_hello = Signal(name="busy"), Signal(name="is_hello")
@@ -184,7 +181,8 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
 
 
 def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
-    """The odometer has cleared its digits and carried before the first is fetched, and the digit on offer stands."""
+    """Lemmas: the odometer has cleared its digits and carried before the first is fetched, and the offered digit is
+    stable."""
     m, state, at = proof.m, inside["link.odometer.carry_state"], inside["link.odometer.at"]
     carries, clears = (state == 1) | (state == 2), state == 3
     proof.lemma(~carries | (at >= LIVE_DIGITS) & (at <= 10))
@@ -234,11 +232,11 @@ _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search
 
 
 def first_is_sent(proof: Proof, **changes: Any) -> None:
-    """Free: when it is decided about frames, and what these say. Given: each took a row time or more.
+    """Free: decisions about frames, and frames' contents. Given: each frame needed a row time or more.
 
-    Claimed: no frame is left out before one was sent. So from a restart on, which begins with all registers of the link
-    as at power-up, a frame is packed before any is left out: where ``contact`` waits for the first frame, it can wait
-    for its ``commit``.
+    Claimed: no frame is dropped before one was sent. So after a restart, which begins with all link registers as at
+    power-up, a frame is packed before any is dropped: where ``contact`` waits for the first frame, it can wait for its
+    ``commit``.
     """
     dut = Link(Skin(rows=2, columns=2, send="on_change", **changes))
     inside = proof.put(dut)
@@ -266,12 +264,11 @@ _REST, _READ, _WRITE, _CLEAR = range(4)
 
 
 def digits_are_the_counts(proof: Proof, counter: str) -> None:
-    """Free: pulses of both counters at any time, hold, and the place that is read. Assumed: no pulse comes while one of
-    its kind waits.
+    """Free: pulses of both counters at any time, hold, and the read place. Assumed: no pulse comes while one of its
+    kind waits.
 
-    Claimed: once the digits were cleared, and with no carry under way or waiting, the digits of the counter make up how
-    many pulses there were, modulo what they can hold; ``digit`` is that of the place a clock before; other places hold
-    0.
+    Claimed: once the digits were cleared, without a carry under way or waiting, the counter's digits are the number of
+    pulses, modulo their range; ``digit`` is that of the place a clock before; other places hold 0.
     """
     m = proof.m
     dut = Odometer()

@@ -16,14 +16,13 @@ _STATES = ("ITEMS", "TRAILER", "CLOSE")
 
 
 def frames_are_packed(proof: Proof, skin: Skin) -> None:
-    """Free: items at any time, what tag, summary and verdict say, and one place of the frame that is followed.
-    Assumed: no more items per frame than it can carry, as the audit sees to; from the clock of ``decide`` to that of
-    ``commit`` the tag stays as it is, and from the clock after ``decide`` on the summary and the verdict's numbers.
+    """Free: items at any time, tag, summary and verdict, and one followed place of the frame. Assumed: no more items
+    per frame than it can carry, by the audit; the tag is stable from ``decide`` to ``commit``, the summary and the
+    verdict's numbers from the clock after ``decide`` on.
 
-    Claimed: when a frame closes, that place was written and holds what COBS puts there for the bytes of all items,
-    lowest first, and of the trailer; the frame ends after its last byte; nothing is written outside of it. An item is
-    taken with its last byte. The frame closes as soon as its bytes are written, and one that is not sent leaves
-    nothing.
+    Claimed: when a frame closes, that place was written and holds the COBS byte for the bytes of all items, lowest
+    first, and of the trailer; the frame ends after its last byte; nothing is written outside of it. An item is taken
+    with its last byte. The frame closes once its bytes are written, and an unsent one leaves nothing.
     """
     m = proof.m
     derived = skin.derived
@@ -60,7 +59,7 @@ def _described_until_commit(proof: Proof, dut: Packer, plain: "_PlainBytes") -> 
 
 
 class _PlainBytes:
-    """The bytes of items and trailer in their order, one per clock, from the clock after the one they come in."""
+    """The bytes of items and trailer in order, one per clock, from the clock after their arrival."""
 
     def __init__(self, m: Module, dut: Packer):
         derived, items, send = dut.derived, dut.items, dut.frames.verdict.send
@@ -90,7 +89,7 @@ class _PlainBytes:
 
 
 def _trailer(derived: Derived, dut: Packer):
-    """As docs/protocol.md has it."""
+    """The trailer by docs/protocol.md."""
     summary, verdict = dut.summary, dut.frames.verdict
     kind = {"moments": 5, "cells": 6}[derived.skin.report]
     return Cat(
@@ -109,10 +108,10 @@ def _trailer(derived: Derived, dut: Packer):
 
 
 class _Followed:
-    """One place of a stuffed frame: what must come there, ``expected``, and what was written there last, ``found``.
+    """One place of a stuffed frame: the ``expected`` byte, and the last written one, ``found``.
 
-    Every zero byte, and one that is thought in front of the frame, is the place of the distance to the next one or to
-    the end; all other bytes are in their own place.
+    Every zero byte, and an imagined one before the frame, is the place of the distance to the next or to the end; all
+    other bytes keep their place.
     """
 
     def __init__(self, m: Module, dut: Packer, plain: _PlainBytes, place):
@@ -161,7 +160,7 @@ def _lemmas(proof: Proof, dut: Packer, inside: Inside, plain: _PlainBytes, frame
 
 
 def _lemmas_on_reading(proof: Proof, dut: Packer, index, plain: _PlainBytes) -> None:
-    """What is still to be read lies at the ports."""
+    """Lemmas: unread data are at the ports."""
     m, left, payload = proof.m, plain.left, dut.items.payload
     item_bytes, trailer_bytes = dut.derived.item_bytes, dut.derived.trailer_bytes
     proof.lemma(~plain.decided | plain.closing & (left == trailer_bytes))

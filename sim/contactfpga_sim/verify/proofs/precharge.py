@@ -1,4 +1,4 @@
-"""Columns that are driven: never while a row is selected, and none that something else holds."""
+"""Driven columns: never while a row is selected, and none held by something else."""
 
 from functools import partial
 from typing import Literal
@@ -18,7 +18,7 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def at_settle_time(proof: Proof, inside: Inside, derived: Derived, slot: Value | None = None) -> None:
-    """Samples stay at the end of the settle time; ``slot``: the clock within a slot of a raster scan."""
+    """Lemmas: samples are at the end of the settle time; ``slot``: the clock within a slot of a raster scan."""
     if not moves_sample(derived):
         return
     settle = derived.settle_clocks
@@ -48,7 +48,7 @@ def reversal_of(diodes: Diodes) -> Skin:
 
 
 def apart(proof: Proof, columns: Value, selected: Value) -> None:
-    """Claimed: no column is driven while a row is selected, and a clock without either lies between the two."""
+    """Claimed: no column is driven while a row is selected, and a clock without either is between the two."""
     any_column, any_row = Signal(), Signal()
     proof.m.d.comb += [any_column.eq(columns.any()), any_row.eq(selected.any())]
     proof.claim(~(any_column & any_row))
@@ -57,8 +57,7 @@ def apart(proof: Proof, columns: Value, selected: Value) -> None:
 
 
 def raster(proof: Proof, diodes: Diodes) -> None:
-    """Free: the columns. Claimed: columns and rows are never driven in the same clock nor in clocks next to each
-    other."""
+    """Free: the columns. Claimed: columns and rows are never driven in the same or adjacent clocks."""
     dut = Scanner(raster_of(diodes))
     inside = proof.put(dut)
     proof.m.d.comb += [
@@ -80,12 +79,12 @@ def raster(proof: Proof, diodes: Diodes) -> None:
 
 
 def let_go(proof: Proof) -> None:
-    """Free: when columns are driven, what they read, when that is a sample, and when they are retried.
+    """Free: when columns are driven, their readings, when these are samples, and when they are retried.
 
-    Claimed: columns are driven a clock after they shall be, but for those that are masked in every row, and those that
-    are stuck: they read pressed in each sample of a window, of four that are two clocks apart and all between them. A
-    stuck column is driven throughout the first window that begins after a toggle, and then it is stuck if it read
-    pressed throughout that, too. A guard column that reads pressed in a check is not driven until a toggle.
+    Claimed: columns are driven a clock after the request, except those masked in every row, and stuck ones, which read
+    pressed in each sample of a window, of four that are two clocks apart and all between them. A stuck column is driven
+    throughout the first window that begins after a toggle, and stays stuck if it read pressed throughout that, too. A
+    guard column that reads pressed in a check is not driven until a toggle.
     """
     m = proof.m
     skin = reversal_of("col2row").replace(columns=3, guard=True)
@@ -126,11 +125,12 @@ def let_go(proof: Proof) -> None:
 
 
 MISREAD = 8
-"""Clocks."""
+"""Clocks for which a column may misread."""
 
 
 def kept(proof: Proof) -> None:
-    """Free: as above. Assumed: column 0 reads pressed for at most 8 clocks on end, and not again in a window.
+    """Free: as in :func:`let_go`. Assumed: column 0 reads pressed for at most 8 clocks on end, and not again in a
+    window.
 
     Claimed: it is driven whenever the others are.
     """
@@ -153,9 +153,9 @@ def kept(proof: Proof) -> None:
 def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
-    Claimed: the columns that are driven are those that the rule above leaves; a sample is what they read two clocks
-    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16
-    toggles at least every 2^16 us. Column 1 is never driven.
+    Claimed: the driven columns follow :func:`let_go`; a sample is their reading two clocks before, in the last clock of
+    a release, as a frame begins, or while the sheet rests; and the clock's bit 16 toggles at least every 2^16 us.
+    Column 1 is never driven.
     """
     m, skin = proof.m, dut.skin
     inside = proof.put(dut)
@@ -193,14 +193,14 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
 
 
 def level_lemmas(proof: Proof, inside: Inside, columns, released: int) -> None:
-    """What is in the columns' synchronizer."""
+    """Lemmas on the columns' synchronizer."""
     first = proof.before(columns, init=released)
     proof.lemma(inside["reader.sync.stage0"] == first)
     proof.lemma(inside["reader.sync.stage1"] == proof.before(first, init=released))
 
 
 def _raster_lemmas(proof: Proof, inside: Inside, dut: Scanner, late) -> None:
-    """When a sample is on its way, and of what."""
+    """Lemmas on when a sample is on its way, and of what."""
     clock, settled, slot = inside["clock"], dut.derived.settle_clocks, dut.derived.row_clocks
     ended = proof.before((clock == slot - 1) & inside["scans"])
     proof.lemma((clock < slot) & inside["scans"])

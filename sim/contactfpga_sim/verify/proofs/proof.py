@@ -1,4 +1,4 @@
-"""A component with the solver's choices around it: what is free, what is assumed, what is claimed."""
+"""A component with the solver's choices around it: free values, assumptions, claims."""
 
 from amaranth.hdl import Assert, Assume, ClockDomain, Fragment, Module, Signal, Value
 
@@ -6,7 +6,7 @@ from contactfpga_sim.verify.proofs.inside import Inside
 
 
 class Proof:
-    """One component under proof, in one clock domain that starts from power-up and has no reset."""
+    """One component under proof, in one clock domain from power-up without reset."""
 
     def __init__(self, claims_alone: bool = False) -> None:
         self.m = Module()
@@ -18,7 +18,7 @@ class Proof:
         self._names = 0
 
     def put(self, component) -> Inside:
-        """Elaborate the component and make it the one under proof."""
+        """Elaborate the component and put it under proof."""
         self.m.submodules.dut = fragment = Fragment.get(component, None)
         return Inside(fragment)
 
@@ -48,14 +48,14 @@ class Proof:
         return kept
 
     def given(self, condition) -> None:
-        """Assume it: only runs in which it holds in each clock are looked at."""
+        """Assume the condition in each clock."""
         self.m.d.comb += Assume(condition)
 
     def claim(self, condition) -> None:
-        """What is to be shown."""
+        """Add a condition to be shown."""
         self.m.d.comb += Assert(condition)
 
     def lemma(self, condition) -> None:
-        """What is proved beside the claims because their induction stands on it; no part of what is claimed."""
+        """Add a condition that is proved to support the induction of the claims."""
         if not self._claims_alone:
             self.m.d.comb += Assert(condition)

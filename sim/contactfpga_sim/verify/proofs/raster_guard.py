@@ -1,4 +1,4 @@
-"""Guard lines in a raster scan: a line that does not answer is told in that frame, one that does is not."""
+"""Guard lines in a raster scan: a line that does not answer is reported in that frame, one that does is not."""
 
 from functools import partial
 from typing import Literal
@@ -19,7 +19,7 @@ ROWS, COLUMNS = 3, 2
 
 
 def skin_of(diodes: Diodes) -> Skin:
-    """Row 2 is masked whole."""
+    """A Skin whose row 2 is fully masked."""
     return Skin(
         rows=ROWS, columns=COLUMNS, guard=True, diodes=diodes, clock_hz=1_000_000, baud=500_000, settle_us=8,
         release_us=2, zone_capacity=1, report="cells", mask=((2, 0), (2, 1)),
@@ -29,10 +29,10 @@ def skin_of(diodes: Diodes) -> Skin:
 def lines_told(proof: Proof, diodes: Diodes) -> None:
     """Free: the columns, and when rows are taken.
 
-    Claimed: a row that did not read the guard column in its slot is told one clock after its strobe, a column that the
-    guard row did not read likewise, and the frame's tag says so two clocks after its last strobe. It stays told until
-    it answers in a round that renews. A line that answered in all of its slots is never told; neither is a row that is
-    masked whole.
+    Claimed: a row that did not read the guard column in its slot is reported one clock after its strobe, likewise a
+    column that the guard row did not read, and the frame's tag has it two clocks after its last strobe. It stays
+    reported until it answers in a round that renews. A line that answered in all of its slots is never reported; nor is
+    a fully masked row.
     """
     m, skin = proof.m, skin_of(diodes)
     dut = Scanner(skin)
@@ -57,8 +57,8 @@ def lines_told(proof: Proof, diodes: Diodes) -> None:
 
 
 def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Value) -> None:
-    """A line that is silent when it is checked is told in the next clock, and stays so until it answers in a round that
-    renews; one that never was silent is not told."""
+    """Claims: a line that is silent when checked is reported from the next clock until it answers in a round that
+    renews; one that never was silent is not."""
     ever = Signal(name="ever_silent")
     with proof.m.If(checked & silent):
         proof.m.d.sync += ever.eq(1)
@@ -68,7 +68,7 @@ def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Val
 
 
 def _slots(m, dut: Scanner) -> tuple[Signal, Signal]:
-    """The clock within its slot, and the line whose slot it is, counted apart from the scanner."""
+    """The clock within its slot, and the slot's line, counted independently of the scanner."""
     slot = Signal(range(dut.derived.row_clocks))
     line = Signal(range(ROWS + 1), init=ROWS)
     ends = slot == dut.derived.row_clocks - 1

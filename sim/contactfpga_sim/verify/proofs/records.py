@@ -28,10 +28,10 @@ from contactfpga_sim.verify.proofs.zones import (
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken as they come.
+    """Free: any rows at any time. Assumed: records are taken at once.
 
-    Claimed: what comes from the second clock after a row to the second clock after the next one are the zones that
-    end with it, each once, and after a last row one end mark.
+    Claimed: from the second clock after a row to the second clock after the next one, exactly the zones that end with
+    it leave, each once, and after a last row one end mark.
     """
     m = proof.m
     dut = RunLabeller(skin_of(rows, columns, connectivity, closed))
@@ -81,7 +81,7 @@ def _split(value):
 
 
 def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, rest, idle) -> None:
-    """Between two rows the brackets and the table say of the open row what the specification knows of it."""
+    """Lemmas between two rows: brackets and table agree with the specification's open row."""
     m, columns = proof.m, range(dut.derived.skin.columns)
     join = inside.part("join")
     starts = Signal(len(columns))
@@ -120,7 +120,7 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
 
 
 def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:
-    """In the clock after the one in which a row was handed over the walk has it all before it."""
+    """Lemmas in the clock after a row's handover, when the walk has all of it ahead."""
     walk = inside.part("walk")
     proof.lemma(inside["walk.befores"] == (before & ~(before << 1)))
     proof.lemma((inside["walk.last"] == last) & (inside["walk.y"] == y))
@@ -142,7 +142,7 @@ def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y
 def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int, closed: bool = False) -> None:
     """The specification itself, without the labeller. Free: a frame and a zone's record.
 
-    Claimed: row by row as many zones with this record end as a flood fill of the whole frame finds.
+    Claimed: row by row as many zones with this record end as a flood fill of the frame finds.
     """
     m = proof.m
     derived = skin_of(rows, columns, connectivity, closed).derived
@@ -160,7 +160,7 @@ def _takes(inside: Inside):
 
 
 def _clusters_end_early(columns, inside: Inside):
-    """With the first run of the row before, or of the new row if that one has none."""
+    """Whether clusters end early, with the first run of the row before, or else of the new row."""
     before, row = inside["before"], inside.component.rows.payload.cells
     ends = (before & ~(before >> 1))[: len(before)]
     return Mux(_takes(inside), Mux(ends == 0, row | before, ends ^ ends - 1), columns)

@@ -1,4 +1,4 @@
-"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and each lets a waiting frame pass."""
+"""Fault reports: they equal the scan's knowledge, none is withheld, and each lets a waiting frame pass."""
 
 from functools import partial
 from unittest import mock
@@ -21,11 +21,11 @@ _IDLE, _FETCH, _BYTE, _TAIL = range(4)
 def reports_are_true(proof: Proof, skin: Skin) -> None:
     """Free: the word in each clock, frames, wishes for a hello, when bytes are taken, one place of a report.
 
-    Claimed: the byte at that place is what the word made it in the clock after the byte before was taken, and stays
-    so. A report is as long as it has to be. Where none was on the wire and the word stood for as many clocks as there
-    are places, and two more, it is the word that was sent last, or a report is due; after a hello one is due as well,
-    and what is due stays so until it is taken. Of two reports without a hello between them the second does not go
-    before a frame that waited while the first was taken.
+    Claimed: the byte at that place follows the word in the clock after the byte before was taken, and is stable. A
+    report has the right length. Without one on the wire, after the word was stable for as many clocks as places, and
+    two more, it is the last sent word, or a report is due; after a hello one is due as well, and stays due until it is
+    taken. Of two reports without a hello between them the second does not precede a frame that waited while the first
+    was taken.
     """
     m = proof.m
     hello = protocol.encode_hello(skin)

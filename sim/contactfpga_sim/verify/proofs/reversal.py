@@ -1,4 +1,4 @@
-"""Line reversal: pins never meet, each touched row is driven and handed on once, and no closed switch is missed."""
+"""Line reversal: no contention, each touched row is driven and handed on once, and no closed switch is missed."""
 
 from functools import partial
 from typing import Any
@@ -29,7 +29,7 @@ def skin_of(rows: int, columns: int, **changes: Any) -> Skin:
 
 
 class Sheet:
-    """The scan with a free sheet around it, and what one sees at its pins."""
+    """The scan with a free sheet, and observations at its pins."""
 
     def __init__(self, proof: Proof, skin: Skin):
         m = proof.m
@@ -72,10 +72,10 @@ class Sheet:
 
 
 def pins(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and what the stages after do in each clock.
+    """Free: the sheet, and the later stages in each clock.
 
-    Claimed: at most one row is selected, and none while rows are let go; no column is driven then nor in the clock
-    before or after; rows are let go together. In the first clock nothing is driven.
+    Claimed: at most one row is selected, and none while rows are released; no column is driven then nor in the clock
+    before or after; rows are released together. In the first clock nothing is driven.
     """
     sheet = Sheet(proof, skin_of(**changes))
     drive, columns = sheet.dut.pins.rows_drive, sheet.dut.pins.columns_drive
@@ -90,7 +90,7 @@ def pins(proof: Proof, **changes: Any) -> None:
 
 
 def pin_lemmas(sheet: Sheet) -> None:
-    """What a state does to the sheet is seen a clock later."""
+    """Lemmas: a state's effect on the sheet is visible a clock later."""
     proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
     derived = sheet.dut.derived
     before = proof.before(state, init=LISTEN)
@@ -110,7 +110,7 @@ def pin_lemmas(sheet: Sheet) -> None:
 
 
 def _clock_lemmas(sheet: Sheet) -> None:
-    """How far a state is, and what is on its way through the synchronizer then."""
+    """Lemmas on a state's progress, and on data in the synchronizer."""
     proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
     derived, due = sheet.dut.derived, inside["cycle.due"]
     charge, settled = derived.release_clocks - 2, derived.project_clocks + 2
@@ -125,7 +125,7 @@ def _clock_lemmas(sheet: Sheet) -> None:
 
 
 def synchronizer_lemmas(sheet: Sheet) -> None:
-    """What is in the synchronizers of columns and rows."""
+    """Lemmas on the synchronizers of columns and rows."""
     inside, flip = sheet.inside, 0 if sheet.skin.selects_low else -1
     for stage, seen in enumerate((sheet.read_1, sheet.read_2)):
         sheet.proof.lemma(inside[f"rows.stage{stage}"] == (seen ^ flip)[: sheet.skin.rows])
@@ -133,10 +133,10 @@ def synchronizer_lemmas(sheet: Sheet) -> None:
 
 
 def lasts(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and what the stages after do in each clock. Assumed: column 0 reads released where it is driven.
+    """Free: the sheet, and the later stages in each clock. Assumed: column 0 reads released where it is driven.
 
-    Claimed: a row is selected for the settle time; before that column 0 was driven for the precharge time; where
-    rows count, it had been driven, with rows let go, for the projection time.
+    Claimed: a row is selected for the settle time; before that column 0 was driven for the precharge time; where rows
+    count, it had been driven, with rows released, for the projection time.
     """
     m, sheet = proof.m, Sheet(proof, skin_of(**changes))
     derived, driven = sheet.dut.derived, sheet.dut.pins.columns_drive[0]
@@ -161,7 +161,7 @@ def _more(count: Signal, one, most: int):
 
 
 def _reached(count, most: int, least):
-    """At least that, as far as the count goes."""
+    """Whether the count is at least that, up to its range."""
     return (count == most) | (count >= least)
 
 

@@ -18,7 +18,7 @@ Say = Callable[[Value], None]
 
 
 class Frames:
-    """What the rows that are offered should be, counted apart."""
+    """The expected rows, counted independently."""
 
     def __init__(self, sheet: Sheet):
         proof, dut, skin = sheet.proof, sheet.dut, sheet.skin
@@ -47,7 +47,7 @@ class Frames:
         proof.given(~sheet.packed | self.packing)
 
     def _go_on(self, sheet: Sheet) -> None:
-        """Which row comes after the one that is taken."""
+        """Lemmas on the row after the one taken."""
         m, dut = sheet.proof.m, sheet.dut
         if not dut.derived.skips:
             with m.If(self.taken):
@@ -72,8 +72,8 @@ def frames(proof: Proof, **changes: Any) -> None:
 
     Claimed: a frame begins when the one before is packed, not earlier. Its rows are those that read touched then, or
     are busy. They are selected in ascending order, none while a row is offered. Each is offered once, as its columns
-    were in the last clock in which it was selected, without masked ones; an offer stays until it is taken. The last row
-    says so, and no other.
+    were in the last clock of its selection, without masked ones; an offer stays until it is taken. Only the last row is
+    marked as such.
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
@@ -83,13 +83,13 @@ def frames(proof: Proof, **changes: Any) -> None:
 
 
 def keep_frames(sheet: Sheet, spec: Frames) -> None:
-    """The same as lemmas, for other claims."""
+    """The claims of :func:`frames` as lemmas for others."""
     _say(sheet, spec, sheet.proof.lemma)
     _frame_lemmas(sheet, spec)
 
 
 def waits_to_be_taken(sheet: Sheet) -> Value:
-    """A row that was selected was sampled and is not taken."""
+    """Whether a selected row was sampled and is not yet taken."""
     if sheet.dut.derived.skips:
         return sheet.dut.rows.valid & sheet.dut.alone
     return sheet.inside["offer.driven"]
@@ -118,7 +118,8 @@ def _say_of_frames(sheet: Sheet, spec: Frames, say: Say) -> None:
 
 
 def _say_of_driven_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
-    """Those that were selected, with an empty one after each whose neighbor was not; an empty one for none."""
+    """Claim the selected rows, each followed by an empty one unless its neighbor was selected; an empty one for
+    none."""
     proof, row = sheet.proof, sheet.dut.rows.payload
     here = (Const(1, sheet.skin.rows + 1) << row.y)[: sheet.skin.rows + 1]
     with proof.m.If(sheet.dut.rows.valid & sheet.dut.alone):
@@ -129,7 +130,7 @@ def _say_of_driven_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
 
 
 def _say_of_all_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
-    """Each row of the sheet, and those that were not selected are empty."""
+    """Claim every row of the sheet, unselected ones empty."""
     proof, row = sheet.proof, sheet.dut.rows.payload
     with proof.m.If(sheet.dut.rows.valid):
         say(row.last == (spec.place == sheet.skin.rows - 1))

@@ -1,4 +1,4 @@
-"""Line reversal with guard lines: pins never meet, no line that is whole is told, and checks are made."""
+"""Line reversal with guard lines: no contention, no false reports, and checks are made."""
 
 from functools import partial
 from typing import Any
@@ -17,17 +17,16 @@ LISTEN, ANSWER, GAP, CHARGE, SELECT = range(5)  # in the order in which the sour
 
 
 def _inverted(sheet: Sheet) -> Value:
-    """The pins drive columns to the selecting level, and the guard column to the released one."""
+    """Whether the pins drive columns to the selecting level, and the guard column to the released one."""
     return sheet.dut.pins.columns_level != int(sheet.skin.selects_low)
 
 
 def pins(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and what the stages after do in each clock.
+    """Free: the sheet, and the later stages in each clock.
 
-    Claimed: at most one row is selected, the guard row counted, and none while rows are let go; no column is driven
-    then nor in the clock before or after; rows are let go together, but for the guard row, which is held at the
-    released level. Columns are driven to the selecting level while rows are let go, only. In the first clock nothing is
-    driven.
+    Claimed: at most one row is selected, including the guard row, and none while rows are released; no column is driven
+    then nor in the clock before or after; rows are released together, except the guard row, held at the released level.
+    Columns are driven to the selecting level only while rows are released. In the first clock nothing is driven.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     drive, columns, every = sheet.dut.pins.rows_drive, sheet.dut.pins.columns_drive, (1 << sheet.skin.rows) - 1
@@ -46,7 +45,7 @@ def pins(proof: Proof, **changes: Any) -> None:
 
 
 def pin_lemmas(sheet: Sheet) -> None:
-    """What a state does to the sheet is seen a clock later."""
+    """Lemmas: a state's effect on the sheet is visible a clock later."""
     proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
     derived, rows = sheet.dut.derived, sheet.skin.rows
     before, started = proof.before(state, init=LISTEN), proof.before(1)
@@ -70,8 +69,8 @@ def pin_lemmas(sheet: Sheet) -> None:
 
 
 class Lines:
-    """A row and a column that are whole, which the solver chooses: within the settle time the row answers the guard
-    column, and the column the guard row. The guard column may be stuck, and then feeds no row."""
+    """A whole row and a whole column, chosen by the solver: within the settle time the row answers the guard column,
+    and the column the guard row. The guard column may be stuck, and then feeds no row."""
 
     def __init__(self, sheet: Sheet):
         proof, skin, settle = sheet.proof, sheet.skin, sheet.dut.derived.settle_clocks
@@ -89,9 +88,9 @@ class Lines:
 
 
 def whole(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, but for one row and one column that are whole, see ``Lines``; and what the stages after do.
+    """Free: the sheet, except one whole row and one whole column, see ``Lines``; and the later stages.
 
-    Claimed: these two are never told as open. After the last row of a frame there is a check before the next frame
+    Claimed: these two are never reported as open. After the last row of a frame there is a check before the next frame
     begins, and checks of columns and rows alternate.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
@@ -112,7 +111,7 @@ def whole(proof: Proof, **changes: Any) -> None:
 
 
 def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> None:
-    """How far a check is, and what the pins have shown of the two lines."""
+    """Lemmas on a check's progress, and the pins' readings of the two lines."""
     proof, state, clock, inside, told = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.dut.faults
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)

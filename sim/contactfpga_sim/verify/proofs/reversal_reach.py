@@ -1,4 +1,4 @@
-"""Line reversal misses no switch that stays closed: it is in its frame, and the next frame comes in time."""
+"""Line reversal misses no switch that stays closed: it is in its frame, and the next frame is in time."""
 
 from functools import partial
 from typing import Any
@@ -14,10 +14,10 @@ from contactfpga_sim.verify.proofs.reversal_frames import Frames, keep_frames, w
 
 
 class Switch:
-    """One switch that is not masked, which the solver chooses, and closes and opens as it likes.
+    """One unmasked switch, chosen by the solver, which closes and opens freely.
 
-    Where it is closed, a driven column is read by its row while rows are let go, and a selected row by its column. A
-    driven column reads released.
+    While closed, a driven column is read by its row if rows are released, and a selected row by its column. A driven
+    column reads released.
     """
 
     def __init__(self, sheet: Sheet):
@@ -63,10 +63,10 @@ class Report:
 
 
 def closed(proof: Proof, **changes: Any) -> None:
-    """Free: one switch, and all that the pins read but for what it sees to; when rows are taken. Assumed: no frame is
-    packed before its last row is taken.
+    """Free: one switch, and all other pin readings; when rows are taken. Assumed: no frame is packed before its last
+    row is taken.
 
-    Claimed: its row is in a frame if it is closed two clocks before the frame begins; and its cell is, if it stays
+    Claimed: its row is in a frame if it is closed two clocks before the frame begins; and so is its cell, if it stays
     closed until its row is sampled.
     """
     sheet = Sheet(proof, skin_of(**changes))
@@ -80,7 +80,7 @@ def closed(proof: Proof, **changes: Any) -> None:
 
 
 def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) -> None:
-    """What the pins have shown of the switch, and what became of it."""
+    """Lemmas on the pins' readings of the switch, and their fate."""
     proof, inside, state, due = sheet.proof, sheet.inside, sheet.state, sheet.inside["cycle.due"]
     before, row = proof.before(state, init=LISTEN), switch.row
     driven = switch.of_column(sheet.dut.pins.columns_drive)

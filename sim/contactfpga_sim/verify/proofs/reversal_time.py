@@ -1,4 +1,4 @@
-"""How long line reversal takes at most: from a frame to the next, and from a touch of an untouched sheet."""
+"""Longest times of line reversal: from frame to frame, and from a touch of an untouched sheet."""
 
 from functools import partial
 from typing import Any
@@ -17,13 +17,13 @@ from contactfpga_sim.verify.proofs.reversal_frames import Frames, keep_frames
 from contactfpga_sim.verify.proofs.reversal_reach import Report, Switch, closed_lemmas
 
 PACKED = 6
-"""Clocks from when a frame's last row is taken until it is packed, at most."""
+"""Most clocks from taking a frame's last row until it is packed."""
 HANDED = 5
-"""Clocks from a row's sample until it is taken, and an empty one after it, with that clock."""
+"""Clocks from a row's sample until it, and an empty row after it, are taken, inclusive."""
 
 
 class Prompt:
-    """Each row is taken at once, and each frame is packed ``PACKED`` clocks after its last row at the latest."""
+    """Stages that take each row at once, and pack each frame within ``PACKED`` clocks of its last row."""
 
     def __init__(self, sheet: Sheet, spec: Frames):
         proof, derived = sheet.proof, sheet.dut.derived
@@ -41,12 +41,12 @@ class Prompt:
         self.longest: int = self.frame(sheet.skin.rows)
 
     def frame(self, rows):
-        """The most clocks from where a frame of ``rows`` rows, at least one, begins to where the next one does."""
+        """Most clocks between the beginnings of a frame of ``rows`` rows, at least one, and the next."""
         return self.first + (rows - 1) * self.slot + self.end
 
 
 def _frame_time(sheet: Sheet, prompt: Prompt) -> tuple[Signal, Signal]:
-    """Clocks since the last frame began, and the most there can be; 0 if it has no row."""
+    """Clocks since the last frame began, and their bound; 0 without rows."""
     m, longest = sheet.proof.m, prompt.longest
     since, bound = Signal(range(longest + 2)), Signal(range(longest + 1))
     count = popcount(sheet.wanted)
@@ -61,9 +61,9 @@ def _frame_time(sheet: Sheet, prompt: Prompt) -> tuple[Signal, Signal]:
 def next_frame(proof: Proof, **changes: Any) -> None:
     """Free: the sheet. Assumed: rows are taken at once, and frames packed soon; see ``Prompt``.
 
-    Claimed: the frame after one with n rows, n > 0, begins ``Prompt.frame(n)`` clocks after it at the latest. When
-    nothing was touched, and a row reads touched, a frame that includes what the pins read then begins
-    ``2 + project`` clocks later at the latest, or, if another was under way or began before, ``3 + PACKED``.
+    Claimed: the frame after one with n rows, n > 0, begins at most ``Prompt.frame(n)`` clocks after it. When nothing
+    was touched, and a row reads touched, a frame that includes the pins' readings then begins at most ``2 + project``
+    clocks later, or, if another was under way or began before, ``3 + PACKED``.
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
@@ -92,7 +92,7 @@ def next_frame(proof: Proof, **changes: Any) -> None:
 
 
 def _packing(sheet: Sheet, spec: Frames, prompt: Prompt) -> Value:
-    """Clocks until a frame may begin, as far as packing goes, once the last row was sampled."""
+    """Clocks of packing until a frame may begin, once the last row was sampled."""
     m, due = sheet.proof.m, sheet.inside["cycle.due"]
     packing = Signal(range(PACKED + 8))
     with m.If(due != 0):
@@ -118,7 +118,7 @@ def _handing(sheet: Sheet) -> Value:
 
 
 def _frame_time_lemmas(sheet: Sheet, prompt: Prompt, packing, since, bound) -> None:
-    """What is left of the frame, in each state."""
+    """Lemmas on the remaining time of the frame, in each state."""
     m, proof, derived, inside = sheet.proof.m, sheet.proof, sheet.dut.derived, sheet.inside
     clock, handing = sheet.clock, _handing(sheet)
     after = popcount(inside["cycle.todo"]) * prompt.slot + prompt.end
@@ -152,10 +152,9 @@ def _awake_lemmas(sheet: Sheet, spec: Frames, packing, awake, alone, since) -> N
 
 
 def in_two_frames(proof: Proof, **changes: Any) -> None:
-    """Free: one switch and all that the pins read but for what it sees to. Assumed: see ``Prompt`` and ``Switch``.
+    """Free: one switch and all other pin readings. Assumed: see ``Prompt`` and ``Switch``.
 
-    Claimed: a switch that stays closed is offered before two frames of all rows are over, less ``PACKED``; and then
-    again and again.
+    Claimed: a switch that stays closed is offered within two frames of all rows, less ``PACKED``; and again and again.
     """
     m = proof.m
     sheet = Sheet(proof, skin_of(**changes))
@@ -196,8 +195,7 @@ def _age_lemmas(
 def rises(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and when rows are taken. Assumed: no frame is packed before its last row is taken.
 
-    Claimed: when a row reads touched at the pins while an untouched sheet is watched, ``contact`` is high three clocks
-    later.
+    Claimed: when a row of a watched untouched sheet reads touched at the pins, ``contact`` is high three clocks later.
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)

@@ -1,4 +1,4 @@
-"""The scanner: which row is driven when, and that each sample is offered once."""
+"""The scanner: the driven row in each clock, and that each sample is offered once."""
 
 from functools import partial
 from typing import Literal
@@ -18,7 +18,7 @@ def skin_of(diodes: Literal["col2row", "row2col"]) -> Skin:
 
 
 def one_row_at_a_time(proof: Proof, diodes: Literal["col2row", "row2col"]) -> None:
-    """Claimed: in each clock the row whose slot it is, alone, is driven, or in the release none."""
+    """Claimed: in each clock only the slot's row is driven, or in the release none."""
     skin = skin_of(diodes)
     dut = Scanner(skin)
     inside = proof.put(dut)
@@ -32,9 +32,9 @@ def one_row_at_a_time(proof: Proof, diodes: Literal["col2row", "row2col"]) -> No
 
 
 def each_sample_once(proof: Proof, diodes: Literal["col2row", "row2col"]) -> None:
-    """Free: the columns. Assumed: a row is taken before the next one comes, as the Skin's limits see to.
+    """Free: the columns. Assumed: a row is taken before the next one, by the Skin's limits.
 
-    Claimed: a row is offered from the clock after its strobe until it is taken, unchanged, as the pins were two clocks
+    Claimed: a row is offered unchanged from the clock after its strobe until it is taken, as the pins were two clocks
     before the strobe.
     """
     m, skin = proof.m, skin_of(diodes)
@@ -77,7 +77,7 @@ def _slot_lemmas(proof: Proof, inside: Inside, dut: Scanner, slot, row) -> None:
 
 
 def _slots(proof: Proof, derived):
-    """The clock within its slot, and the row whose slot it is, counted apart from the scanner."""
+    """The clock within its slot, and the slot's row, counted independently of the scanner."""
     slot = Signal(range(derived.row_clocks))
     row = Signal(range(derived.skin.rows))
     ends = slot == derived.row_clocks - 1

@@ -1,4 +1,4 @@
-"""Several sheets share a line: packets come one after the other, whole, and only the sheet with the grant sends."""
+"""Several sheets share a line: packets are whole and in sequence, and only the sheet with the grant sends."""
 
 from functools import partial
 from unittest import mock
@@ -20,9 +20,9 @@ _PLACE = SheetPlace(1, 2)
 def grants_go_round(proof: Proof, sheets: int) -> None:
     """Free: which sheets hold the grant in each clock.
 
-    Claimed: in each clock one sheet has the grant, at first the first one. It keeps the grant while it holds it; then
-    the next sheet has it, after the last sheet the first one. So between two grants of a sheet each other sheet has
-    one, and a sheet that does not hold the grant delays no other.
+    Claimed: in each clock one sheet has the grant, initially the first. It keeps the grant while it holds it; then the
+    next sheet has it, cyclically. So between two grants of a sheet each other sheet has one, and a sheet that does not
+    hold the grant delays no other.
     """
     m = proof.m
     dut = RoundRobin(sheets)
@@ -37,12 +37,12 @@ def grants_go_round(proof: Proof, sheets: int) -> None:
 
 
 def packets_are_whole(proof: Proof, hello: bytes) -> None:
-    """Free: all that reaches the link of a sheet in each clock, and how long it waits for the grant. Assumed: the
-    grant stays while it is held, as ``grants_go_round`` shows.
+    """Free: all inputs of a sheet's link in each clock, and its waits for the grant. Assumed: the grant stays while it
+    is held, as ``grants_go_round`` shows.
 
-    Claimed: it offers bytes only with the grant, and gives it up only when the last byte that it sent, if any, was a
-    delimiter. Without the grant it takes nothing. When it gives the grant up after a byte it has nothing in hand, so
-    it sends one packet with each grant.
+    Claimed: it offers bytes only with the grant, and releases it only when the last byte sent, if any, was a delimiter.
+    Without the grant it takes nothing. When it releases the grant after a byte it has nothing in hand, so it sends one
+    packet per grant.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):

@@ -1,5 +1,5 @@
-"""Stages that hand on what they take: an offer stays until it is taken, nothing is lost, nothing comes twice; and the
-divider, whose every barycenter is the nearest step to sum / area."""
+"""Stages that pass on their inputs: an offer stays until it is taken, nothing is lost or repeated; and the divider,
+whose every barycenter is the nearest step to sum / area."""
 
 from functools import partial
 
@@ -19,7 +19,7 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def feed(proof: Proof, port, name: str):
-    """Offers to a stream at any time; assumed is that each stays until it is taken, as it was."""
+    """Free offers to a stream; assumed is that each stays unchanged until it is taken."""
     payload = Value.cast(port.payload)
     valid, value = proof.free(1, f"{name}_valid"), proof.free(len(payload), name)
     proof.m.d.comb += [port.valid.eq(valid), payload.eq(value)]
@@ -28,7 +28,7 @@ def feed(proof: Proof, port, name: str):
 
 
 def drain(proof: Proof, port, name: str):
-    """Takes from a stream at any time; claimed is that each offer stays until then, as it was."""
+    """Free reads of a stream; claimed is that each offer stays unchanged until then."""
     proof.m.d.comb += port.ready.eq(proof.free(1, f"{name}_ready"))
     offers_stay(proof, port)
 
@@ -42,7 +42,7 @@ def offers_stay(proof: Proof, port) -> None:
 def debounce(proof: Proof, method: DebounceName) -> None:
     """Free: rows at any time, and when they are taken. Without a debounce time the stage changes nothing.
 
-    Claimed: each row is offered once, ``columns + 3`` clocks after it was taken, as it was, until it is taken.
+    Claimed: each row is offered once, ``columns + 3`` clocks after it was taken, unchanged, until it is taken.
     """
     m = proof.m
     skin = Skin(rows=4, columns=3, debounce=method, debounce_press_us=0, debounce_release_us=0, settle_us=20)
@@ -71,10 +71,10 @@ def debounce(proof: Proof, method: DebounceName) -> None:
 
 
 def audit(proof: Proof, capacity: int = 2) -> None:
-    """Free: records at any time, and when items are taken. Assumed: no more zones per frame than there can be.
+    """Free: records at any time, and when items are taken. Assumed: no more zones per frame than possible.
 
     Claimed: of each frame the first ``capacity`` zones and the end mark pass, each in the clock in which it is taken;
-    the others are taken and go no further. The summary counts them all and says whether some are missing.
+    the others are taken and dropped. The summary counts all and flags missing ones.
     """
     m = proof.m
     dut = Audit(Skin(rows=3, columns=4, connectivity=4, zone_capacity=capacity, settle_us=20))
@@ -107,7 +107,7 @@ def audit(proof: Proof, capacity: int = 2) -> None:
 def bitmap(proof: Proof) -> None:
     """Free: rows at any time, and when items are taken.
 
-    Claimed: a row is taken in the clock in which it passes on, as it is. Three clocks after a last one an end mark is
+    Claimed: a row is taken in the clock in which it passes on, unchanged. Three clocks after a last one an end mark is
     offered, once, and no row is taken before that is.
     """
     m = proof.m
@@ -134,10 +134,10 @@ def bitmap(proof: Proof) -> None:
 
 
 def backlog(proof: Proof, depth: int) -> None:
-    """The queue in front of the packer. Free: items at any time, when they are taken, and one item that is followed.
+    """The queue in front of the packer. Free: items at any time, when they are taken, and one followed item.
 
-    Claimed: the item comes out as it was, after those that were in before it and no others; an item that is inside for
-    two clocks is offered; no room is wanting before all but one place are taken. So it always knows how full it is.
+    Claimed: the item leaves unchanged, after exactly those in before it; an item inside for two clocks is offered;
+    there is room until all but one place are taken. So its fill level is always right.
     """
     m = proof.m
     dut = Queue(width=4, depth=depth)
@@ -201,12 +201,11 @@ _BACKLOG_BUGS = (
 
 
 def zones_are_divided(proof: Proof, rows: int, columns: int, bits: int) -> None:
-    """Free: records at any time, and when items are taken. Assumed: zones lie on the sheet.
+    """Free: records at any time, and when items are taken. Assumed: zones are on the sheet.
 
     Claimed: a zone is taken Q clocks after it is offered, or later if an item waits then, and is offered as an item
-    from the next clock on until that is taken; its area is the zone's, and x and y satisfy
-    2 area x <= 2^(k + 1) sum + area < 2 area (x + 1). An end mark passes in the clock in which it is taken, if no item
-    waits.
+    from the next clock on until that is taken; its area is the zone's, and x and y satisfy 2 area x <= 2^(k + 1) sum +
+    area < 2 area (x + 1). An end mark passes in the clock in which it is taken, if no item waits.
     """
     m = proof.m
     dut = Divider(Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=bits, settle_us=20))
@@ -255,7 +254,8 @@ def _claim_nearest(proof: Proof, dut: Divider, kept, bits: int) -> None:
 
 
 def _divide_lemmas(proof: Proof, dut: Divider, inside: Inside, age, full, kept) -> None:
-    """After i steps quotient and remainder are those of the sum's first bits, the others are still to be divided."""
+    """Lemmas: after i steps quotient and remainder are those of the sum's first bits, the others are still to be
+    divided."""
     m = proof.m
     record, clocks = dut.records.payload, dut.derived.quotient_bits
     area = record.zone.area

@@ -1,4 +1,4 @@
-"""The UART's framing, and pulses that are read by their length."""
+"""The UART's framing, and pulses read by their length."""
 
 from functools import partial
 
@@ -16,7 +16,7 @@ def framing(proof: Proof, bit_clocks: int) -> None:
 
     Claimed: after a byte is taken there is a start bit, its bits, lowest first, and a stop bit, ``bit_clocks`` each;
     else the line is high. The next byte is taken in the last clock of the stop bit or whenever nothing is sent, and in
-    no other clock, so that no byte is lost or sent twice.
+    no other clock, so that no byte is lost or repeated.
     """
     m = proof.m
     dut = Transmitter(bit_clocks)
@@ -60,9 +60,9 @@ _BUGS = (
 def read_by_length(proof: Proof, bit_clocks: int) -> None:
     """Free: the level of the pin.
 
-    Claimed: a bit or a mark comes where the level, two clocks late, rises, and in no other clock. The low level before
-    is up to 3 bits long for a one, over 7 for a zero, and between for a mark. ``good`` comes a clock after the eighth
-    bit since a byte or a mark, at once for a mark between bytes, and a clock after ``bad`` for one in a byte.
+    Claimed: a bit or a mark comes exactly where the level, two clocks late, rises. The low level before is up to 3 bits
+    long for a one, over 7 for a zero, and between for a mark. ``good`` comes a clock after the eighth bit since a byte
+    or a mark, at once for a mark between bytes, and a clock after ``bad`` for one in a byte.
     """
     m = proof.m
     dut = PulseReceiver(bit_clocks)

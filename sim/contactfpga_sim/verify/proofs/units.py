@@ -1,4 +1,4 @@
-"""Pressure units: each converter is driven as its data sheet wants it and read rightly, and thresholds are compared."""
+"""Pressure units: each converter is driven by its data sheet and read correctly, and thresholds are compared."""
 
 from functools import partial
 
@@ -16,13 +16,13 @@ _SLOWEST = Skin(units=2, clock_hz=1_000_000, baud=250_000, settle_us=100)
 
 
 def conversions(proof: Proof, skin: Skin) -> None:
-    """Free: what the converter answers.
+    """Free: the converter's answers.
 
-    Claimed: one conversion follows the other, of unit after unit, each with 19 clocks while the converter is selected
-    and none while it is not, which lasts two levels. No level of the clock is shorter than it has to be, nor is the
-    pause between selection and clock. Start, single-ended and channel bits are there a level before each rising edge,
-    and do not change while the clock is high. A reading is what the pin was in the clock before the last twelve rising
-    edges, and is there three clocks after the last one.
+    Claimed: conversions follow one another, unit after unit, each with 19 clocks while the converter is selected and
+    none in the two levels while it is not. No level of the clock is too short, nor is the pause between selection and
+    clock. Start, single-ended and channel bits are set a level before each rising edge, and stable while the clock is
+    high. A reading is the pin's level in the clock before the last twelve rising edges, available three clocks after
+    the last one.
     """
     m = proof.m
     dut = Mcp3208(skin)
@@ -61,7 +61,7 @@ def conversions(proof: Proof, skin: Skin) -> None:
 
 
 def _readings(proof: Proof, dut: Mcp3208, rises: Value, edges: Value, miso: Value, unit: Value) -> None:
-    """The pin in the clock before an edge, shifted in as it comes."""
+    """The pin in the clock before each edge, shifted in."""
     taken = Signal(12, name="taken")
     with proof.m.If(rises):
         proof.m.d.sync += taken.eq(Cat(proof.before(miso), taken))
@@ -75,7 +75,7 @@ def _readings(proof: Proof, dut: Mcp3208, rises: Value, edges: Value, miso: Valu
 
 
 def _tie(proof: Proof, inside, least: int, edges: Value, unit: Value, begun: Value, since: dict[str, Signal]) -> None:
-    """What is watched from outside, by the counters inside, to which the pins are a clock late."""
+    """Lemmas that tie the observer's counters to the inner ones, which precede the pins by a clock."""
     dut, level, clock, its_unit = inside.component, inside["level"], inside["clock"], inside["unit"]
     last_unit = dut.skin.units - 1
     late, phase = proof.before(level, init=38), proof.before(clock)
@@ -118,12 +118,12 @@ def _tie(proof: Proof, inside, least: int, edges: Value, unit: Value, begun: Val
 
 
 def thresholds(proof: Proof, skin: Skin) -> None:
-    """Free: readings of any unit, commands in any clock; a unit is chosen. Given: readings of one unit are no closer
-    than two clocks.
+    """Free: readings of any unit, commands in any clock; a unit is chosen. Given: readings of one unit are at least two
+    clocks apart.
 
-    Claimed: two clocks after a reading of the unit its bit is whether a threshold is set, and the reading that far or
-    farther from the zero; until its next reading it stays so. Before a threshold is set nothing is over or armed, and
-    the unit's makes it so.
+    Claimed: two clocks after a reading of the unit its bit is whether a threshold is set and the reading at least that
+    far from the zero; it stays until the next reading. Before a threshold is set nothing is over or armed, and the
+    unit's makes it so.
     """
     m = proof.m
     dut = Watch(skin)
@@ -193,12 +193,12 @@ _PACED_FAST = Skin(units=3, converter="ads131m08", clock_hz=48_000_000, baud=12_
 
 
 def frames(proof: Proof, skin: Skin) -> None:
-    """Free: what the converter answers, and when a conversion is ready.
+    """Free: the converter's answers, and when a conversion is ready.
 
-    Claimed: the converter's own clock has no level that is shorter than it has to be, nor has the SPI clock, nor the
-    pause between selection and clock. The SPI clock runs while the converter is selected, and each selection has 240
-    clocks. A reading is what the pin was in the clocks before the last 24 falling edges, with its highest bit
-    inverted, and is there three clocks after the last one.
+    Claimed: no level of the converter's own clock or of the SPI clock is too short, nor the pause between selection and
+    clock. The SPI clock runs while the converter is selected, and each selection has 240 clocks. A reading is the pin's
+    level in the clocks before the last 24 falling edges, with its highest bit inverted, available three clocks after
+    the last one.
     """
     m = proof.m
     dut = Ads131m08(skin)
@@ -245,7 +245,7 @@ def _paced_readings(proof: Proof, dut: Ads131m08, falls: Value, miso: Value) -> 
 
 
 def _tie_paced(proof: Proof, inside, dut: Ads131m08, edges: Value, since: dict[str, Signal]) -> None:
-    """What is watched from outside, by the counters inside, to which the pins are a clock late."""
+    """Lemmas that tie the observer's counters to the inner ones, which precede the pins by a clock."""
     least, paces = dut.level_clocks, dut.pace_clocks
     level, clock, busy, count = inside["level"], inside["clock"], inside["busy"], inside["count"]
     late, phase, was_busy = proof.before(level), proof.before(clock), proof.before(busy)

@@ -1,4 +1,4 @@
-"""What looks for registers that flipped by themselves finds none while none does."""
+"""The check for spontaneously flipped registers finds none while none flips."""
 
 from functools import partial
 

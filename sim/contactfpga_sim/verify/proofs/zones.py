@@ -1,9 +1,10 @@
-"""What the labeller's records are held against: the zones of a frame, found row by row with all their cells.
+"""The reference for the labeller's records: the zones of a frame, found row by row with all their cells.
 
-No runs, clusters, brackets or places here: the cells of two adjacent rows are the nodes of a graph, and what belongs
-together is its closure. :func:`rows_find_the_zones` shows that these are the zones of a flood fill over the frame.
-Where a sheet's ends meet, offsets along the ways of that graph say on which turns a zone's cells lie: a way over the
-seam adds a turn or takes one away, and two ways between two cells that differ make a ring."""
+There are no runs, clusters, brackets or places: the cells of two adjacent rows are the nodes of a graph, and zones are
+its closure. :func:`rows_find_the_zones` shows that these are the zones of a flood fill over the frame. For a sheet
+whose ends meet, offsets along the graph's paths give the turns of a zone's cells: a path over the seam adds or removes
+a turn, and two different paths between two cells make a ring.
+"""
 
 import itertools
 from collections.abc import Iterable
@@ -21,7 +22,7 @@ FIELDS = ("area", "sum_x", "sum_y")
 
 
 class OpenRow:
-    """A row and the zones it belongs to: for each column the columns of the same zone, and that zone's moments."""
+    """A row and its zones: for each column the columns of the same zone, and that zone's moments."""
 
     def __init__(self, derived: Derived, name: str):
         columns = range(derived.skin.columns)
@@ -31,31 +32,31 @@ class OpenRow:
         self.moments = [Signal(moments_layout(derived), name=f"{name}_moments_{x}") for x in columns]
 
     def another(self, name: str) -> "OpenRow":
-        """An empty one of its kind."""
+        """An empty row of its kind."""
         return type(self)(self.derived, name)
 
     def copy(self, other: "OpenRow", when=1) -> list:
-        """Statements that take over another row, or with ``when`` 0 an empty one."""
+        """Statements that copy another row, or with ``when`` 0 an empty one."""
         return [mine.eq(Mux(when, theirs, 0)) for mine, theirs in zip(self.state(), other.state(), strict=True)]
 
     def state(self) -> list:
-        """All that it holds."""
+        """All its state."""
         return [self.cells, *self.reach, *(moments.as_value() for moments in self.moments)]
 
     def record(self, x: int) -> Value:
-        """What a labeller says of the zone of column x if it ends here."""
+        """A labeller's record of the zone of column x if it ends here."""
         return self.moments[x].as_value()
 
     def leaders(self) -> list:
-        """For each column whether it is the first one of its zone."""
+        """For each column whether it is the first of its zone."""
         return [cell & ~self.reach[x][:x].any() if x else cell for x, cell in enumerate(self.cells)]
 
 
 class RowStep(Elaboratable):
-    """From a row to the next one.
+    """A step from a row to the next.
 
-    ``after`` is the open row after ``cells``, ``ended`` how many zones with the record ``wanted`` end there: those
-    that have no cell in the new row, and in the last row all others, too.
+    ``after`` is the open row after ``cells``, ``ended`` the number of zones with the record ``wanted`` that end there:
+    those without a cell in the new row, and in the last row all others, too.
     """
 
     def __init__(self, derived: Derived, before: OpenRow, cells, last, y, wanted):
@@ -87,7 +88,7 @@ class RowStep(Elaboratable):
 
 
 def _closure(m: Module, before: OpenRow, cells, skin: Skin) -> list:
-    """For each cell of two rows, first those of the row before, the cells of both rows that belong to its zone."""
+    """For each cell of two rows, first those of the row before, the cells of both rows in its zone."""
     count = len(cells)
     pressed = [*before.cells, *cells]
 
@@ -111,13 +112,13 @@ def _closure(m: Module, before: OpenRow, cells, skin: Skin) -> list:
 
 
 def columns_apart(x: int, other: int, skin: Skin) -> int:
-    """Columns from one to the other, around the cylinder if that is shorter and the ends meet."""
+    """Columns from one to the other, the shorter way around a cylinder."""
     apart = abs(x - other)
     return min(apart, skin.columns - apart) if skin.closed else apart
 
 
 def flood_fill(m: Module, derived: Derived, frame, wanted):
-    """How many zones of a frame have the moments ``wanted``: every pressed cell spreads over the whole frame."""
+    """Number of zones of a frame with the moments ``wanted``: every pressed cell spreads over the frame."""
     reach = spread(m, derived.skin, frame, turns=0)
     count = 0
     for i, zone in enumerate(reach):
@@ -154,7 +155,7 @@ def spread(m: Module, skin: Skin, frame, turns: int) -> list[Signal]:
 
 
 def moments_of(m: Module, derived: Derived, zone, number: int) -> data.View:
-    """Moments of the cells of a frame that are set."""
+    """Moments of the set cells of a frame."""
     found, columns = Signal(moments_layout(derived), name=f"zone_moments_{number}"), derived.skin.columns
     for field, weight in zip(FIELDS, (lambda _: 1, lambda i: i % columns, lambda i: i // columns)):
         m.d.comb += found[field].eq(sum(Mux(cell, weight(i), 0) for i, cell in enumerate(zone)))
@@ -162,7 +163,7 @@ def moments_of(m: Module, derived: Derived, zone, number: int) -> data.View:
 
 
 def open_rows_agree(proof: Proof, open_row: OpenRow) -> None:
-    """Lemmas: what the registers of an :class:`OpenRow` can hold."""
+    """Lemmas: possible register contents of an :class:`OpenRow`."""
     columns = range(len(open_row.cells))
     for x in columns:
         reach, moments = open_row.reach[x], open_row.moments[x].as_value()
@@ -177,17 +178,17 @@ def open_rows_agree(proof: Proof, open_row: OpenRow) -> None:
 
 
 Way = tuple[int, int, Value, Value | int]
-"""From node to node, whether there is one, and by how many turns the second then lies further on. The first nodes are
-the cells of the row before."""
+"""By pair of nodes, whether there is a path, and by how many turns the second is further on. The first nodes are the
+cells of the row before."""
 
 TURN = signed(4)
-"""As far as two cells of two rows can lie apart."""
+"""Largest distance in turns of two cells of two rows."""
 
 
 class TurnedRow(OpenRow):
-    """In addition, for each column whether it lies a turn back from the first one of its zone, and how that zone's
-    cells lie on turns, as in the gateware: ``turned`` on the upper one of ``two``, the lower of which is the first
-    column's or, with ``back``, the one before it."""
+    """Also, for each column, whether it is a turn behind the first of its zone, and the turns of that zone's cells, as
+    in the gateware: ``turned`` on the upper one of ``two``, the lower of which is the first column's or, with ``back``,
+    the one before it."""
 
     def __init__(self, derived: Derived, name: str):
         super().__init__(derived, name)
@@ -227,7 +228,7 @@ class TurnedStep(RowStep):
         return m
 
     def _ways(self) -> list[Way]:
-        """Between neighbors, and between cells of the row before that are of one zone."""
+        """Paths between neighbors, and between cells of the row before in one zone."""
         before, cells, skin = self.before, self.cells, self.derived.skin
         count = skin.columns
         over_the_seam = {(count - 1, 0): 1, (0, count - 1): -1}
@@ -244,7 +245,7 @@ class TurnedStep(RowStep):
         return found
 
     def _turns_from(self, m: Module, first: int, ways: list[Way], reach: list, offsets: list) -> data.View:
-        """How the zone's cells lie, seen from a column of the new row."""
+        """Turns of the zone's cells, relative to a column of the new row."""
         before, columns = self.before, range(self.derived.skin.columns)
         zones = [leader & reach[j] for j, leader in enumerate(before.leaders())]
         low = [offsets[j] - before.turns[j].back for j in columns]
@@ -272,18 +273,18 @@ class TurnedStep(RowStep):
 
 
 def empty_row(derived: Derived) -> OpenRow:
-    """What the specification knows before a frame: turns only where the ends meet."""
+    """The specification's state before a frame: with turns only for a sheet whose ends meet."""
     return (TurnedRow if derived.skin.closed else OpenRow)(derived, "open")
 
 
 def next_row(m: Module, derived: Derived, before: OpenRow, *given) -> tuple[OpenRow, Signal]:
-    """The result of a :class:`RowStep`, or where the ends meet of a :class:`TurnedStep`."""
+    """The result of a :class:`RowStep`, or of a :class:`TurnedStep` for a sheet whose ends meet."""
     m.submodules += (step := (TurnedStep if derived.skin.closed else RowStep)(derived, before, *given))
     return step.after, step.ended
 
 
 def _followed(m: Module, ways: list[Way], nodes: int) -> tuple[list[list], list[list]]:
-    """For each node whether there is a way to each other one, and by how many turns that lies further on."""
+    """For each pair of nodes whether there is a path, and by how many turns the second is further on."""
     reach = [[_any(way for a, b, way, _ in ways if (a, b) == (i, j)) for j in range(nodes)] for i in range(nodes)]
     turns = {(a, b): turn for a, b, _, turn in ways}
     offsets = [[turns.get((i, j), 0) for j in range(nodes)] for i in range(nodes)]
@@ -305,8 +306,8 @@ def _any(bits: Iterable) -> Value:
 
 
 def flood_around(m: Module, derived: Derived, frame, wanted):
-    """How many zones of a frame have the record ``wanted``: every pressed cell spreads over turns of the frame that lie
-    side by side. What is no ring takes two rows for each turn."""
+    """Number of zones of a frame with the record ``wanted``: every pressed cell spreads over turns of the frame side by
+    side. Without a ring, two rows per turn are needed."""
     cells = derived.skin.rows * derived.skin.columns
     turns = derived.skin.rows // 2 + 1
     count = 0
@@ -331,7 +332,7 @@ def flood_around(m: Module, derived: Derived, frame, wanted):
 
 
 def turned_rows_agree(proof: Proof, open_row: TurnedRow) -> None:
-    """Lemmas: what its registers can hold."""
+    """Lemmas: possible register contents of a :class:`TurnedRow`."""
     columns = range(len(open_row.cells))
     starts, ends = open_row.cells[0], open_row.cells[-1]
     for x in columns:
@@ -350,9 +351,9 @@ def turned_rows_agree(proof: Proof, open_row: TurnedRow) -> None:
 
 
 def turns_are_known(proof: Proof, open_row: TurnedRow, x: int, word, linked) -> None:
-    """Lemmas, where a run starts at column x: ``word`` in the table and ``linked`` say what the specification knows.
+    """Lemmas at a run that starts at column x: ``word`` in the table and ``linked`` agree with the specification.
 
-    Of a ring nothing else counts, and of a wound zone only where its runs lie.
+    Of a ring nothing else counts, and of a wound zone only the places of its runs.
     """
     turns, layout = open_row.turns[x], kept_layout(open_row.derived)
     kept = data.View(layout, word[: layout.size])
@@ -368,7 +369,7 @@ def turns_are_known(proof: Proof, open_row: TurnedRow, x: int, word, linked) -> 
 
 
 def _last(bits, values) -> Value:
-    """The value at the highest bit that is set."""
+    """The value at the highest set bit."""
     found: Value = Const(0)
     for x in range(len(bits)):
         found = Mux(bits[x], values[x], found)

@@ -11,7 +11,7 @@ TOPICS = {
     "surface": "Lay a sheet on a mesh: a table of point and normal per cell.",
 }
 USUAL = "show", "ROBOT.toml"
-"""What `contactfpga body ROBOT.toml` is short for."""
+"""Topic of `contactfpga body ROBOT.toml`."""
 
 
 def run(topic: Callable[[], int]) -> int:

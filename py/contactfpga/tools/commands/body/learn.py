@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(body: Body, plan: Plan, joint: str) -> None:
-    """Before anybody moves the robot. Raises ValueError."""
+    """Check before anybody moves the robot. Raises ValueError."""
     names = None if body.kinematics is None else body.kinematics.joint_names
     if names is not None and joint not in names:
         raise ValueError(f"joint {shown(joint)} is no joint of the URDF; it has {', '.join(names)}")
@@ -78,8 +78,7 @@ def _check(body: Body, plan: Plan, joint: str) -> None:
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
-    """Each angle with a frame that was scanned after it came. A link without data ends it: what is not seen is not
-    learned to be free."""
+    """Each angle with a frame scanned after it. A link without data ends it: unseen is not learned as free."""
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue

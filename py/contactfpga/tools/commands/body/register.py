@@ -1,4 +1,4 @@
-"""`contactfpga body register`: where a sheet sits on its link, by pressing known points."""
+"""`contactfpga body register`: the place of a sheet on its link, by pressing known points."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from contactfpga.tools.console import numbers
 EXTRA = None
 
 READINGS_S = 0.03
-"""After a frame: its readings of pressure units come when the next ones do."""
+"""Delay after a frame by which its readings of pressure units arrive."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -34,7 +34,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def angle(text: str) -> tuple[str, float]:
-    """NAME=RAD."""
+    """Parse NAME=RAD."""
     name, _, value = text.partition("=")
     found = number_in(value)
     if not name or not math.isfinite(found):
@@ -43,7 +43,7 @@ def angle(text: str) -> tuple[str, float]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the topic; its status is 1 where a link has no data."""
+    """Run the topic; returns 1 if a link has no data."""
     body = Body.load(args.robot)
     angles = _angles(body, dict(args.joint))
     frame = args.frame or (LINK if body.kinematics is None else BASE)

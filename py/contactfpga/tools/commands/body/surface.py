@@ -1,4 +1,4 @@
-"""`contactfpga body surface`: where the cells of a sheet lie on a link of any shape."""
+"""`contactfpga body surface`: the places of a sheet's cells on a link of any shape."""
 
 from __future__ import annotations
 

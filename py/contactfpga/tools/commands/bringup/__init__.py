@@ -1,4 +1,4 @@
-"""`contactfpga bringup`: leads through the first power-up of a kit, and writes what was found into one file."""
+"""`contactfpga bringup`: leads through the first power-up of a kit, and writes the findings into one file."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ from contactfpga.tools.console import flags, interrupt, numbers, outputs
 EXTRA = None
 
 CLOSING = re.compile(r"closing_\w+_n")
-"""Names of predictions that are forces at which a switch closes."""
+"""Names of predicted closing forces."""
 SECONDS = 300.0
-"""That each step which asks for a touch lasts at most, where the user names no time."""
+"""Default longest duration of each step that asks for a touch."""
 COUNTED_S = 2.0
-"""Over which frames of an untouched sheet are counted."""
+"""Time for counting frames of an untouched sheet."""
 STUCK_S, REST_S = 10.0, 1.0
-"""Of a person, see :class:`Person`."""
+"""Times of a :class:`Person`."""
 REHEARSAL = "sim://"
-"""This port is a virtual board of the kit that a hand touches as the steps ask."""
+"""Port name of a virtual board of the kit with a simulated hand."""
 REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
-"""Simulated: at most, for what the hand keeps doing, and over which frames are counted."""
+"""Simulated times: longest constant action of the hand, and counting of frames."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -78,7 +78,7 @@ def _measured(text: str) -> tuple[str, float]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; status 1 when a fault was found."""
+    """Run the command; returns 1 if a fault was found."""
     if not args.kit:
         raise ContactFPGAError(f"name a kit: --kit {' or '.join(kits.names())}")
     kit = kits.kit(args.kit)
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def bring_up_skin(kit: Kit) -> Skin:
-    """The kit's Skin, but each frame has all cells, and nothing hides how they bounce."""
+    """The kit's Skin with all cells in each frame, and no debounce."""
     return kit.skin.replace(report="cells", debounce="none", send="always")
 
 
@@ -143,7 +143,7 @@ def _closing(measured: list[tuple[str, float]]) -> list[tuple[str, float]]:
 def _force(
     kit: Kit, predicted: dict[str, predictions.Prediction], measured: list[tuple[str, float]]
 ) -> FittedForce | None:
-    """What closing forces that somebody measured say of the switches; None where there are none, or no cover."""
+    """The switches' force from measured closing forces; None without any, or without a cover."""
     cover, closing = load_cover(kit.skin_path), _closing(measured)
     if cover is None or not closing:
         return None
@@ -152,7 +152,7 @@ def _force(
 
 
 def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
-    """Through all steps that can be made."""
+    """Lead through all possible steps."""
     try:
         board, person = _opened(args, kit, report.skin)
     except (ContactFPGAError, OSError) as error:
@@ -182,7 +182,7 @@ def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
 
 
 def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
-    """The steps up to one that the board or its sheet breaks off."""
+    """The steps up to a broken-off one."""
     try:
         yield from found
     except ContactFPGAError as error:
@@ -190,7 +190,7 @@ def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
 
 
 def _opened(args: argparse.Namespace, kit: Kit, skin: Skin) -> tuple[Board, Person]:
-    """The board, built from the Skin of the bring-up or else from the kit's own, and who touches it."""
+    """The board, built from the bring-up's Skin or else from the kit's own, and the person."""
     person: Person = _Reader(args)
     port: str | SimulatedPort | None = args.port
     if port == REHEARSAL:
@@ -211,7 +211,7 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
 
 
 class _Hand:
-    """Does on a virtual board what the steps ask."""
+    """Does the steps' requests on a virtual board."""
 
     stuck_s, rest_s = 0.1, 0.02
 
@@ -224,7 +224,7 @@ class _Hand:
 
 
 class _Reader:
-    """Somebody who reads what to do."""
+    """A person who reads the requests."""
 
     stuck_s, rest_s = STUCK_S, REST_S
 
@@ -242,7 +242,7 @@ class _Reader:
 
 
 def _add(args: argparse.Namespace, report: BringUpReport, step: Step, port: str) -> None:
-    """Take down a step, without the port's name, and show it."""
+    """Record and show a step, without the port's name."""
     if not args.json:
         terminal.say(f"{len(report.steps) + 1}. {step.name}")
         for finding in step.findings:

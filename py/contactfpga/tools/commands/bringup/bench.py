@@ -1,4 +1,4 @@
-"""A board on the bench: what the steps of a bring-up share."""
+"""A board on the bench: common state of a bring-up's steps."""
 
 from __future__ import annotations
 
@@ -14,39 +14,39 @@ from contactfpga.skin import Skin
 
 
 class Person(Protocol):
-    """Who touches the sheet."""
+    """The person or hand that touches the sheet."""
 
     stuck_s: float
-    """A switch that stays pressed for so long while others come and go is stuck."""
+    """Time for which a switch must stay pressed, while others change, to count as stuck."""
 
     rest_s: float
-    """Without anything new a step ends after so long, once it has what it needs."""
+    """Time without news after which a complete step ends."""
 
     def asked(self, does: str, words: str) -> float:
-        """Ask for something, and return once it has begun, with the seconds that it may take at most. ``does``:
-        nothing, finger, ruler, card or plate; ``words``: the same for a person."""
+        """Request an action, and return once it has begun, with its longest duration in s. ``does``: nothing, finger,
+        ruler, card or plate; ``words``: the request for a person."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """What one step showed."""
+    """Result of one step."""
 
     name: str
     findings: tuple[Finding, ...]
     measured: dict[str, float] = dataclasses.field(default_factory=dict)
-    """Numbers by their names, which end in their units."""
+    """Numbers by name, which ends in the unit."""
     stop: str = ""
-    """Why later steps would tell nothing, and what to do; "" where they would."""
+    """Reason why later steps are pointless, and the remedy; "" if they are not."""
 
     @property
     def faults(self) -> int:
-        """Findings that are faults."""
+        """Number of faults found."""
         return sum(finding.verdict == "fault" for finding in self.findings)
 
 
 @dataclasses.dataclass
 class Bench:
-    """A board on the bench with who touches it, and what later steps need of earlier ones."""
+    """A board on the bench with its person, and results that later steps need."""
 
     board: Board
     skin: Skin
@@ -54,10 +54,10 @@ class Bench:
     stated: Circuit | None = None
     """The circuit that the kit states."""
     seconds: float = 1.0
-    """Over which frames are counted."""
+    """Time for counting frames."""
     timeout: float = 1.0
-    """Of each frame, in s."""
+    """Timeout of each frame, in s."""
     probability: float = PROBABILITY
-    """With which the intervals of the circuit hold, all at once."""
+    """Probability that all intervals of the circuit hold."""
     images: dict[str, Settling] = dataclasses.field(default_factory=dict)
     fitted: FittedCircuit | None = None

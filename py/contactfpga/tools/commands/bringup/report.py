@@ -1,4 +1,4 @@
-"""The report of a first power-up: one Markdown file for an issue, with nothing in it that says who made it."""
+"""The report of a first power-up: one Markdown file for an issue, without personal data."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ NOT_FITTED = (
 
 
 class Graded(NamedTuple):
-    """A prediction and what was measured."""
+    """A prediction and its measurement."""
 
     prediction: Prediction
     measured: float
     within: float
-    """By how much the measured value may be off, either way, as a clock rounds it."""
+    """Tolerance of the measured value either way, from rounding to clocks."""
 
     @property
     def holds(self) -> bool:
-        """Whether it was predicted so."""
+        """Whether the measurement agrees with the prediction."""
         one = self.prediction
         return one.low - self.within <= self.measured <= one.high + self.within
 
     @property
     def verdict(self) -> str:
-        """In words; names the model that was wrong."""
+        """The verdict in words; names the wrong model."""
         return "as predicted" if self.holds else f"not as predicted: the model of the {self.prediction.model} is wrong"
 
 
 def graded(predictions: Mapping[str, Prediction], measured: Mapping[str, float]) -> list[Graded]:
-    """Those that were measured. A value ``NAME_step`` says by what a value NAME is rounded."""
+    """The measured predictions. A value ``NAME_step`` is the rounding step of NAME."""
     return [
         Graded(one, measured[name], measured.get(f"{name}_step", 0.0) / 2)
         for name, one in predictions.items()
@@ -52,13 +52,13 @@ def graded(predictions: Mapping[str, Prediction], measured: Mapping[str, float])
 
 
 class BringUpReport:
-    """What was found so far."""
+    """The findings so far."""
 
     def __init__(self, kit: Kit, skin: Skin, when: datetime.date):
         self.kit, self.skin, self.when = kit, skin, when
         self.steps: list[Step] = []
         self.left_out: list[str] = []
-        """What was not done, and why."""
+        """Omitted steps, with reasons."""
         self.grades: list[Graded] = []
         self.not_measured: list[Prediction] = []
         self.fitted: FittedCircuit | None = None
@@ -66,11 +66,11 @@ class BringUpReport:
 
     @property
     def faults(self) -> int:
-        """Findings that are faults."""
+        """Number of faults found."""
         return sum(step.faults for step in self.steps)
 
     def to_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """The report for JSON."""
         return {
             "kit": self.kit.name,
             "fingerprint": self.skin.fingerprint.hex(),
@@ -107,7 +107,7 @@ class BringUpReport:
         return [one for one in self.fitted.values if one.told] if self.fitted is not None else []
 
     def to_markdown(self) -> str:
-        """The file."""
+        """The text of the file."""
         parts = [f"# Bring-up of the {self.kit.name} kit, {self.when.isoformat()}\n", *self._head()]
         for step in self.steps:
             parts.append(f"\n## {step.name[0].upper()}{step.name[1:]}\n")

@@ -1,4 +1,4 @@
-"""The steps of a first power-up, each a function of a board on the bench that measures and judges, and their order."""
+"""The steps of a first power-up in order, each a function of a board on the bench that measures and judges."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from contactfpga.tools.console import interrupt
 from contactfpga.zones.zone import Zones
 
 READS = 50
-"""Frames that are asked for to see how long an answer takes."""
+"""Frames requested to measure the response time."""
 MOST_LOST = 0.1
-"""Share of the frames from which on the link is too bad to measure anything else."""
+"""Share of lost frames from which the link is too bad for other measurements."""
 RULER = "Press a ruler's edge along each column, one after the other, half a second each."
-"""What a person is asked to do for the diodes and for bounce."""
+"""Request to the person for diodes and bounce."""
 WATCHED_S = 0.1
-"""At least, of the untouched sheet."""
+"""Least time for the untouched sheet."""
 
 
 # ---- nothing touches
 
 
 def link(bench: Bench) -> Step:
-    """Supply and link: hello, frames, losses, and how long an answer takes."""
+    """Supply and link: hello, frames, losses, and response time."""
     board = bench.board
     bench.person.asked("nothing", "Touch nothing, and let nothing lie on the sheet.")
     found = [*health.hello(board), *_counted(bench)]
@@ -56,7 +56,7 @@ def link(bench: Bench) -> Step:
 
 
 def _counted(bench: Bench) -> Iterator[Finding]:
-    """Without the faults of lines, which have a step of their own."""
+    """Findings without line faults, which have their own step."""
     lines = {finding.sentence for finding in health.lines(bench.board, bench.board.next(bench.timeout))}
     for finding in health.count(bench.board, bench.seconds, bench.timeout):
         is_line = any(finding.sentence.startswith(f"{name}: ") for name in _faults(bench.board))
@@ -75,7 +75,7 @@ def _faults(board: Board) -> tuple[str, ...]:
 
 
 def lines(bench: Bench) -> Step:
-    """Lines of the untouched sheet: guard lines, self-test, and what reads pressed."""
+    """Lines of the untouched sheet: guard lines, self-test, and pressed readings."""
     board, skin = bench.board, bench.skin
     pressed, zones = np.ones((skin.rows, skin.columns), bool), board.next(bench.timeout)
     first_us = zones.time_us
@@ -136,8 +136,8 @@ def switches(bench: Bench) -> Step:
 
 
 class _Alike:
-    """Lines that never read otherwise than another one, in frames that are as the one before: a switch that moves
-    between two rows of a scan shows in one of them first."""
+    """Lines that always read like another, in frames equal to the previous one, since a switch that moves between two
+    rows of a scan shows in one of them first."""
 
     def __init__(self) -> None:
         self._last: np.ndarray | None = None
@@ -146,7 +146,7 @@ class _Alike:
         self._seen: list[np.ndarray] | None = None
 
     def take(self, zones: Zones) -> None:
-        """One more frame."""
+        """Add a frame."""
         assert zones.cells is not None
         before, rested = self._last, self._rests
         self._last = zones.cells
@@ -160,7 +160,7 @@ class _Alike:
         self._seen = [before | now for before, now in zip(self._seen or seen, seen, strict=True)]
 
     def sentences(self) -> Iterator[str]:
-        """What to say of them."""
+        """Sentences on the equal lines."""
         for name, differ, seen in zip(("rows", "columns"), self._differ or (), self._seen or ()):
             same = np.triu(~differ & seen[:, None] & seen[None], 1)
             for one, other in np.argwhere(same).tolist():
@@ -168,7 +168,7 @@ class _Alike:
 
 
 def diodes(bench: Bench) -> Step:
-    """The self-test while switches are pressed, which shows bridged diodes."""
+    """The self-test with pressed switches, which shows bridged diodes."""
     seconds = bench.person.asked("ruler", RULER)
     last = bench.board.self_test(max(2.0, bench.timeout))
     known: dict[LineFinding, None] = dict.fromkeys(last.findings)
@@ -194,7 +194,7 @@ def diodes(bench: Bench) -> Step:
 
 
 def bounce(bench: Bench) -> Step:
-    """How long switches bounce, pressed column by column."""
+    """Bounce times of switches, pressed column by column."""
     seconds = bench.person.asked("ruler", RULER)
     seen = Bounce(bench.board.hello.send == "on_change")
     _follow(bench, seen.update, seconds, lambda: len(seen.longest()) == bench.skin.rows * bench.skin.columns)
@@ -220,7 +220,8 @@ def bounce(bench: Bench) -> Step:
 
 
 def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: Callable[[], bool]) -> None:
-    """Give frames for these seconds of device time, until Ctrl-C, or until all that is wanted was seen and rests."""
+    """Yield frames for these seconds of device time, until Ctrl-C, or until everything wanted was seen and is at
+    rest."""
     zones = bench.board.latest(bench.timeout)
     first_us = rest_us = zones.time_us
     with interrupt.usual_end():
@@ -237,7 +238,7 @@ def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: 
 
 
 def steps_for(skin: Skin) -> list[Callable[[Bench], Step]]:
-    """Those that a board of this Skin can take."""
+    """Steps possible with a board of this Skin."""
     if skin.report != "cells":
         return [link, lines]
     return [link, lines, switches, *[diodes] * skin.self_test, bounce, times.settling, times.circuit]

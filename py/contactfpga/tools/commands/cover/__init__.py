@@ -1,7 +1,6 @@
 """`contactfpga cover`: the soft cover's impact, sensitivity and design; a file per topic.
 
-Here is what topics share: the numbers that they read, in SI units, and how they print: tables in mm and kPa, JSON in SI
-units.
+Common code of the topics: numbers are read in SI units, tables are in mm and kPa, JSON is in SI units.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ def _plain(value: object) -> object:
 
 
 def unsolved(answer: NoSolution, as_json: bool) -> int:
-    """Print why there is no answer."""
+    """Print the reason for the missing answer."""
     if as_json:
         say({"no_solution": answer.reason})
     else:
@@ -69,7 +68,7 @@ def table(*lines: tuple[str, str]) -> None:
 
 
 def notes(found: list[str]) -> int:
-    """Print where a model is rough."""
+    """Print the limits of a model."""
     for note in found:
         print(f"note: {note}")
     return 0
@@ -77,7 +76,7 @@ def notes(found: list[str]) -> int:
 
 LENGTH, LENGTH_FROM_0 = numbers.length(MAX_LENGTH_M), numbers.length(MAX_LENGTH_M, 0.0)
 ALONG = numbers.length(10.0)
-"""Along an arm."""
+"""Places along an arm."""
 KG = numbers.number(1e-6, 1e6, "kg")
 SPEED = numbers.number(0, 1000, "m/s")
 TORQUE = numbers.number(-1e6, 1e6, "Nm")
@@ -91,5 +90,5 @@ NEWTON = numbers.number(1e-6, 1e6, "N")
 
 
 def json_flag(parser: argparse.ArgumentParser) -> None:
-    """Of every topic."""
+    """Add the JSON flag of every topic."""
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")

@@ -115,7 +115,7 @@ def region_row(one: RegionLimits) -> tuple[str, ...]:
 
 
 def region_plain(one: RegionLimits) -> dict[str, Any]:
-    """The same for JSON; null: no such speed, or any reaction time."""
+    """A body region for JSON; null: no such speed, or any reaction time."""
     return {
         "region": one.region.name,
         "transient_n": one.transient_n,
@@ -144,7 +144,7 @@ def _thin_row(one: Thin) -> tuple[str, ...]:
 
 
 def columns(rows: list[tuple[str, ...]]) -> None:
-    """Print rows of text as columns, the first one to the left."""
+    """Print rows of text as columns, the first left-aligned."""
     wide = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     for row in rows:
         print("  ".join(f"{cell:<{w}}" if not i else f"{cell:>{w}}" for i, (cell, w) in enumerate(zip(row, wide))))

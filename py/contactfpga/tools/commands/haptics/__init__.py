@@ -9,7 +9,7 @@ from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.tools.console import interrupt
 
 BAD_INPUT = 2
-"""Exit status: scripts tell a file that cannot be used from a failure."""
+"""Exit status that distinguishes unusable files from failures."""
 
 TOPICS = {
     "contacts": "Compute the force at each contact from a wrench.",
@@ -22,7 +22,7 @@ USUAL = None
 
 
 def run(topic: Callable[[], int]) -> int:
-    """Run a topic; the status is :data:`BAD_INPUT` for a file or a number that cannot be used."""
+    """Run a topic; returns :data:`BAD_INPUT` for an unusable file or number."""
     try:
         return topic()
     except (HapticsError, OSError) as error:

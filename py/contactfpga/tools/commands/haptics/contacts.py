@@ -1,4 +1,4 @@
-"""`contactfpga haptics contacts`: the force at each contact, or the center of pressure where none is given."""
+"""`contactfpga haptics contacts`: the force at each contact, or without contacts the center of pressure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics place`: where to put the units under a bumper."""
+"""`contactfpga haptics place`: positions of the units under a bumper."""
 
 from __future__ import annotations
 

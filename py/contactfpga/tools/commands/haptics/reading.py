@@ -1,4 +1,4 @@
-"""JSON files of `contactfpga haptics`: what they say, refused with a sentence where it cannot be used."""
+"""JSON files of `contactfpga haptics`, and one-sentence refusals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_UNITS = 64
 
 
 def load(path: str | Path, keys: tuple[str, ...]) -> dict[str, Any]:
-    """The object in a file, with none but these keys. Raises :class:`HapticsError`."""
+    """The object in a file, with only these keys. Raises :class:`HapticsError`."""
     try:
         values = json.loads(read_small(path, MAX_BYTES, "a JSON file", HapticsError))
     except OSError as error:

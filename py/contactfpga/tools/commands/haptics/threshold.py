@@ -1,4 +1,4 @@
-"""`contactfpga haptics threshold`: from which deviation on units and sums of a board raise `contact`."""
+"""`contactfpga haptics threshold`: the deviation from which units and sums of a board raise `contact`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics wrench`: what contacts exert on the link, from the readings of its units."""
+"""`contactfpga haptics wrench`: the contacts' wrench on the link, from the readings of its units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics zero`: read what the units of a board read without load, and tell it to the board."""
+"""`contactfpga haptics zero`: read the unloaded units of a board, and send it these zeros."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from contactfpga.tools.console.forces import cells_of
 EXTRA = "haptics"
 
 LEAST = 10
-"""Readings for a zero."""
+"""Least number of readings for a zero."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _readings(board: Board, seconds: float) -> Floats:
-    """(m, n): those of frames without a zone; raises :class:`HapticsError` where something touches."""
+    """(m, n) readings of frames without a zone; raises :class:`HapticsError` if something touches."""
     if board.hello.units is None:
         raise ContactFPGAError(f"{board.port}: this board has no pressure units; build its Skin with units")
     found: list[tuple[float, ...]] = []

@@ -1,4 +1,4 @@
-"""`contactfpga study`: what the project found out, computed again; a file per topic."""
+"""`contactfpga study`: the project's results, computed again; a file per topic."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 EXTRA = "sim"
 
 PLACES = 60
-"""Touches anywhere where the user does not say how many."""
+"""Default number of touches anywhere."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -164,7 +164,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
 
 
 def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
-    """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
+    """Save the finished runs in a separate file, keeping an earlier whole table; returns its place."""
     from contactfpga_sim.lab.arm import pictures
 
     again = "run the same command again to go on from there"

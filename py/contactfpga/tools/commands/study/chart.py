@@ -77,14 +77,14 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
 
 
 def _own(args: argparse.Namespace) -> dict[str, Method]:
-    """The methods of the labellers that are not built in."""
+    """The methods of labellers that are not built in."""
     from contactfpga_sim.lab.chart.methods import by
 
     return {name: method for one in args.labeller or () for name, method in by(labellers.find(one)).items()}
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
-    """Where the points are that were finished, in a file of their own: a whole chart from before stays."""
+    """Save the finished points in a separate file, keeping an earlier whole chart; returns its place."""
     from contactfpga_sim.lab.chart import numbers as table
 
     again = "run the same command again to go on from there"

@@ -50,7 +50,7 @@ def _write(sweeps: Mapping[str, Mapping[str, Sweep]], path: Path) -> Path:
 
 
 def _kept(sweeps: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
-    """Where what was finished is, in a file of its own: a whole table from before stays."""
+    """Save the finished sweeps in a separate file, keeping an earlier whole table; returns its place."""
     done = sum(map(len, sweeps.values()))
     if not done:
         return "interrupted before the first knob was turned"

@@ -1,4 +1,4 @@
-"""`contactfpga study flips`: flips bits of the running gateware, and says what the host notices."""
+"""`contactfpga study flips`: flips bits of the running gateware, and reports the host's reaction."""
 
 from __future__ import annotations
 

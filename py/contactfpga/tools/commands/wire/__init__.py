@@ -1,4 +1,4 @@
-"""`contactfpga wire`: the pressed cells, live, to see that every switch sits where it should, and how it behaves."""
+"""`contactfpga wire`: the pressed cells, live, to check position and behavior of every switch."""
 
 from __future__ import annotations
 

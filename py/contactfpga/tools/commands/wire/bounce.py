@@ -1,4 +1,4 @@
-"""`contactfpga wire --bounce`: how long the switches of a board bounce, and which debounce hides it."""
+"""`contactfpga wire --bounce`: bounce times of a board's switches, and the debounce that hides them."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from contactfpga.tools.console import flags, live
 from contactfpga.zones.zone import Zones
 
 SHARES = (50, 90, 99, 100)
-"""Percent of the presses, or releases, that took no longer."""
+"""Percentiles of the durations of presses, or releases."""
 
 MANY = 0.05
-"""Share of frames overwritten from which on it is said."""
+"""Share of overwritten frames that is reported."""
 
 NAMED = 8
-"""Slow switches that are named."""
+"""Number of slow switches to name."""
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
-    """Measure for ``args.seconds`` or until Ctrl-C; status 1 when nothing was measured."""
+    """Measure for ``args.seconds`` or until Ctrl-C; returns 1 if nothing was measured."""
     skin = bare_skin(board, "the bounce")
     bounce = Bounce(board.hello.send == "on_change")
     if not args.json:
@@ -52,7 +52,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def bare_skin(board: Board, hidden: str) -> Skin:
-    """The board's Skin, in which no debounce hides something."""
+    """The board's Skin without debounce."""
     skin = flags.known_skin(board)
     if skin is None:
         raise ContactFPGAError(
@@ -68,7 +68,7 @@ def bare_skin(board: Board, hidden: str) -> Skin:
 
 
 def _overwritten(board: Board) -> list[Finding]:
-    """What happened between the frames that came is not known."""
+    """Findings about gaps between frames, whose events are unknown."""
     stats = board.stats
     share = stats.overwritten / max(1, stats.overwritten + stats.frames)
     if share < MANY:

@@ -1,4 +1,4 @@
-"""`contactfpga wire --settle`: how long each cell of a board takes to read pressed, and which settle time is enough."""
+"""`contactfpga wire --settle`: the time of each cell to read pressed, and a sufficient settle time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STEPS = 10
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
-    """Measure for ``args.seconds`` of device time or until Ctrl-C; status 1 when nothing was measured."""
+    """Measure for ``args.seconds`` of device time or until Ctrl-C; returns 1 if nothing was measured."""
     skin = bare_skin(board, "what one frame shows")
     found = settling(board, skin)
     board.sample_at(0, args.timeout)  # refuses what cannot be measured before anything is asked of the user
@@ -48,7 +48,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def settling(board: Board, skin: Skin) -> Settling:
-    """What frames of this board are given to; raises :class:`ContactFPGAError` for a Skin that leaves nothing to
+    """The receiver of this board's frames; raises :class:`ContactFPGAError` for a Skin that leaves nothing to
     measure."""
     derived = skin.derived
     first, settle = derived.first_sample_clocks, derived.settle_clocks
@@ -68,8 +68,8 @@ def follow(
     render: live.Render | None = None,
     enough: Callable[[], bool] = lambda: False,
 ) -> tuple[float, list[Finding]]:
-    """Measure for these seconds of device time, until it is ``enough`` or until Ctrl-C, and leave the board as it was;
-    returns the seconds that it took and what is to be said of the end. ``timeout`` in s, of each frame."""
+    """Measure for these seconds of device time, until it is ``enough`` or until Ctrl-C, and restore the board; returns
+    the seconds taken and findings about the end. ``timeout`` in s, of each frame."""
     findings: list[Finding] = []
     zones, past_us = board.sample_at(0, timeout), 0
     found.start(_cells(zones))
@@ -100,7 +100,7 @@ def _cells(zones: Zones) -> np.ndarray:
 
 
 def _restored(board: Board, timeout: float) -> list[Finding]:
-    """The board samples at the end of its settle time again; what is to be said where it does not."""
+    """Restore sampling at the end of the settle time; returns a finding on failure."""
     for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
         try:
             board.sample_at(0, timeout)
@@ -182,7 +182,7 @@ def _show_slow(found: Settling, per_us: int) -> None:
 
 
 def _show_back(found: Settling, per_us: int) -> None:
-    """Columns that still read pressed where the next row's does not."""
+    """Show columns that still read pressed in the next row."""
     late = np.flatnonzero(found.back_clocks > found.first).tolist()
     if late:
         named = [f"{column} ({found.back_clocks[column] / per_us:.2f} us)" for column in late[:NAMED]]
@@ -208,7 +208,7 @@ def _propose(found: Settling, skin: Skin) -> None:
 
 
 def _view(found: Settling, skin: Skin, room: live.Room) -> RenderableType:
-    """What was found up to now."""
+    """The results so far."""
     from rich.console import Group
     from rich.text import Text
 
@@ -226,8 +226,9 @@ def drawn(
 ) -> SheetDrawing:
     """The sheet, row 0 on top, with a digit for each cell.
 
-    The digit d: a cell reads pressed after d to d + 1 tenths of the settle time. Slow ones have the kind STUCK.
-    ``wide``: with a space between cells."""
+    Digit d: the cell reads pressed after d to d + 1 tenths of the settle time. Slow ones have the kind STUCK. ``wide``:
+    with a space between cells.
+    """
     clocks, free = found.clocks, "·" if unicode else "."
     digits = np.array([str(digit) for digit in range(STEPS)])
     shown = np.where(clocks > 0, digits[np.maximum(clocks - 1, 0) * STEPS // found.settle], free)
