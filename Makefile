@@ -125,7 +125,7 @@ try: $(VENV)/.stamp-docs ## write the page that runs a board in the browser into
 docs: $(VENV)/.stamp-docs ## build the pages into build/docs
 	$(PY) -m sphinx -W --keep-going -b html docs build/docs
 
-release-check: $(VENV)/.stamp-boards $(VENV)/.stamp-test $(VENV)/.stamp-docs ## build what a release publishes and use it with no compiler [ARGS="--tag v0.1.0"]
+release-check: $(VENV)/.stamp-boards $(VENV)/.stamp-test $(VENV)/.stamp-docs $(if $(findstring --tag,$(ARGS)),$(VENV)/.stamp-release) ## build what a release publishes and use it with no compiler [ARGS="--tag v0.1.0"]
 	$(PY) scripts/release.py make $(ARGS)
 	$(PY) scripts/release.py try build/release/dist --offline
 
@@ -176,6 +176,9 @@ $(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | co
 
 $(VENV)/.stamp-lint: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,cli$(,)lint,downloads about 45 MB unless installed or cached)
+
+$(VENV)/.stamp-release: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
+	$(call install,release,downloads about 500 MB unless installed or cached)
 
 $(VENV)/.stamp-docs: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,cli$(,)docs,downloads about 40 MB unless installed or cached)

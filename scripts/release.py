@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import importlib.util
 import io
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -56,9 +58,9 @@ def make(tag: str | None) -> None:
     run("from contactfpga_sim import carried; carried.check()", tree)
     bitstreams(tree, RELEASE / "kits")
     dist = RELEASE / "dist"
-    command("-m", "hatchling", "build", "--directory", dist, cwd=tree)
+    wheels(tree, dist, needed=tag is not None)
     command("-m", "sphinx", "-W", "-q", "-b", "html", tree / "docs", RELEASE / "docs", tree=tree)
-    (wheel,) = dist.glob("*.whl")
+    (wheel,) = dist.glob("*-any.whl")
     pip = ("-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--constraint", CONSTRAINTS)
     command(*pip, "--dest", RELEASE / "wheels", f"{wheel}[{FIRST}]")
     (RELEASE / "wheels" / wheel.name).unlink()
@@ -75,6 +77,32 @@ def exported(folder: Path) -> Path:
     with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
         archive.extractall(folder, filter="data")
     return folder
+
+
+PLATFORMS = {
+    "manylinux2014_x86_64": "x86_64-linux-gnu.2.17",
+    "manylinux2014_aarch64": "aarch64-linux-gnu.2.17",
+    "macosx_11_0_x86_64": "x86_64-macos.11.0",
+    "macosx_11_0_arm64": "aarch64-macos.11.0",
+}
+"""Wheels with the reader in C, and what Zig calls their systems. On others the wheel is pure Python."""
+
+
+def wheels(tree: Path, dist: Path, needed: bool) -> None:
+    """The source distribution, a wheel for any system, and those of :data:`PLATFORMS`, which one compiler makes;
+    without it they are left out unless they are ``needed``."""
+    command("-m", "hatchling", "build", "--directory", dist, cwd=tree, CONTACTFPGA_CC="none")
+    if importlib.util.find_spec("ziglang") is None:
+        if needed:
+            sys.exit("Zig compiles the reader in C for all systems; install the extra release")
+        print("without Zig, of the extra release, there is only the wheel in pure Python")
+        return
+    for platform, target in PLATFORMS.items():
+        compiler = f"{shlex.quote(sys.executable)} -m ziglang cc -target {target}"
+        told = {"CONTACTFPGA_CC": compiler, "CONTACTFPGA_PLATFORM": platform}
+        command("-m", "hatchling", "build", "--target", "wheel", "--directory", dist, cwd=tree, **told)
+        if not list(dist.glob(f"*-{platform}.whl")):
+            sys.exit(f"the reader in C could not be compiled for {platform}; what the compiler said is above")
 
 
 def bitstreams(tree: Path, folder: Path) -> None:
@@ -97,10 +125,9 @@ def build(tree: Path, kit: str, folder: Path) -> Path:
 
 def first_minute(dist: Path, offline: bool) -> None:
     """Install the wheel into a new environment; with no compiler on the PATH, read zones from a virtual board."""
-    (wheel,) = dist.resolve().glob("*.whl")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        scripts = environment(folder / "venv", wheel, offline)
+        scripts = environment(folder / "venv", dist.resolve(), offline)
         (folder / "bin").mkdir()
         clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "PIP_"))}
         alone = clean | {"PATH": str(folder / "bin"), "CONTACTFPGA_CACHE": str(folder / "cache")}
@@ -112,16 +139,26 @@ def first_minute(dist: Path, offline: bool) -> None:
         print(found.stdout[-2000:], found.stderr[-2000:], sep="\n")
         if found.returncode or "mm" not in found.stdout:
             sys.exit(f"contactfpga zones sim:// ended with status {found.returncode} and showed no zone")
-        print(f"zones of a virtual board from {wheel.name}, with no compiler: {time.monotonic() - started:.1f} s")
+        print(f"zones of a virtual board, with no compiler: {time.monotonic() - started:.1f} s")
+        missing = "from contactfpga.driver import native; print(native.missing())"
+        why = subprocess.run([scripts / "python", "-c", missing], env=clean, text=True, capture_output=True, check=True)
+        print(f"reader in C: {why.stdout.strip() or 'yes'}")
+        if why.stdout.strip() and os.name == "posix" and len(list(dist.glob("*.whl"))) > 1:
+            sys.exit("no wheel had a reader in C that this system loads")
 
 
-def environment(folder: Path, wheel: Path, offline: bool) -> Path:
-    """A new environment with the wheel and the extras :data:`FIRST`; returns the folder of its commands."""
+def environment(folder: Path, dist: Path, offline: bool) -> Path:
+    """A new environment with the wheel of this system and the extras :data:`FIRST`; returns the folder of its
+    commands."""
     venv.create(folder, with_pip=True)
     scripts = folder / ("Scripts" if os.name == "nt" else "bin")
-    source = ["--no-index", "--find-links", wheel.parents[1] / "wheels"] if offline else []
-    pip = [scripts / "python", "-m", "pip", "--isolated", "install", "--quiet", "--constraint", CONSTRAINTS, *source]
-    subprocess.run([*pip, f"{wheel}[{FIRST}]"], check=True)
+    pip = [scripts / "python", "-m", "pip", "--isolated"]
+    chosen = [*pip, "download", "--quiet", "--no-deps", "--no-index", "--find-links", dist, "--only-binary", ":all:"]
+    subprocess.run([*chosen, "--dest", folder / "chosen", "contactfpga"], check=True)
+    (wheel,) = (folder / "chosen").glob("*.whl")
+    source = ["--no-index", "--find-links", dist.parent / "wheels"] if offline else []
+    installed = [*pip, "install", "--quiet", "--constraint", CONSTRAINTS, *source]
+    subprocess.run([*installed, f"{wheel}[{FIRST}]"], check=True)
     return scripts
 
 
@@ -130,10 +167,11 @@ def run(program: str, tree: Path) -> str:
     return command("-c", program, tree=tree).strip()
 
 
-def command(*words: object, tree: Path | None = None, cwd: Path | None = None) -> str:
-    """What this Python prints when it is called with these arguments, with the packages of ``tree`` if one is given."""
+def command(*words: object, tree: Path | None = None, cwd: Path | None = None, **more: str) -> str:
+    """What this Python prints when it is called with these arguments, with the packages of ``tree`` if one is given.
+    ``more``: in its environment."""
     paths = os.pathsep.join(str(tree / name) for name in ("py", "hdl", "sim")) if tree else ""
-    env = os.environ | ({"PYTHONPATH": paths} if tree else {})
+    env = os.environ | ({"PYTHONPATH": paths} if tree else {}) | more
     call = [sys.executable, *map(str, words)]
     return subprocess.run(call, cwd=cwd or ROOT, env=env, check=True, text=True, stdout=subprocess.PIPE).stdout
 

@@ -41,7 +41,7 @@ SKINS = [
 ]
 
 
-@pytest.fixture(scope="session", params=sample(COMPILERS, quick=["gcc"], slow=["clang"]))
+@pytest.fixture(scope="session", params=sample(COMPILERS, quick=["gcc"], slow=["clang", "gcc with the table"]))
 def decoder(request, tmp_path_factory):
     """The example program, compiled."""
     command = COMPILERS[request.param]

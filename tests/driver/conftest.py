@@ -2,7 +2,7 @@
 
 import pytest
 
-from contactfpga.driver import driver, remote
+from contactfpga.driver import driver, native
 
 WITH_EITHER = ("test_driver", "test_driver_frames", "test_silence", "test_recording")
 
@@ -10,9 +10,10 @@ WITH_EITHER = ("test_driver", "test_driver_frames", "test_silence", "test_record
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if metafunc.module.__name__.rpartition(".")[2] in WITH_EITHER and "board" in metafunc.fixturenames:
         metafunc.fixturenames.append("default_reader")
-        readers = ["thread"]
-        if not remote.unavailable():
-            readers.append(pytest.param("process", marks=pytest.mark.slow))
+        readers = [
+            "native" if not native.missing() else pytest.param("native", marks=pytest.mark.skip(native.missing()))
+        ]
+        readers.append(pytest.param("thread", marks=pytest.mark.slow))
         metafunc.parametrize("default_reader", readers, indirect=True)
 
 

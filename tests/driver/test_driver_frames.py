@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 import pytest
-from child_processes import reader_processes
 from fake_board import ZONE, FakeBoard, background, wait_until
 from model_board import SCAN_US
 
@@ -304,9 +303,8 @@ def test_close_wakes_a_call_that_waits_in_another_thread(board, call):
 
 
 def readers_of(board):
-    """Threads and processes that read its port."""
-    threads = [thread for thread in threading.enumerate() if board.path in thread.name]
-    return threads + reader_processes(board.path)
+    """Threads that read its port."""
+    return [thread for thread in threading.enumerate() if board.path in thread.name]
 
 
 def test_a_board_that_nobody_holds_gives_its_port_back(board):

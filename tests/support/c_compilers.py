@@ -7,6 +7,7 @@ WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werr
 SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 COMPILERS = {
     "gcc": ["gcc", "-std=c99", *WARNINGS, *SANITIZED],
+    "gcc with the table": ["gcc", "-std=c99", "-DCONTACTFPGA_FAST", *WARNINGS, *SANITIZED],
     "clang": ["clang", "-std=c99", *WARNINGS],
     "g++": ["g++", "-x", "c++", "-std=c++11", *WARNINGS],
     "clang++": ["clang++", "-x", "c++", "-std=c++11", *WARNINGS],

@@ -32,11 +32,6 @@ def descendants(number):
     return {child: " ".join(every[child][1]) for child in below - {number}}
 
 
-def reader_processes(port, parent=None):
-    """Those that read this port for the process."""
-    return [number for number, words in children(parent) if f"reader of {port}" in words]
-
-
 def alive(number):
     """Whether there is such a process, and it has not ended."""
     try:

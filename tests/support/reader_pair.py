@@ -1,10 +1,11 @@
 """The two readers of a port side by side, in one process and with one clock, so that all they say can be compared."""
 
-import os
 import random
 
-from contactfpga.driver import reader, remote
+from contactfpga.driver import native
 from contactfpga.driver.link import Link
+from contactfpga.driver.native import Port
+from contactfpga.driver.native_link import NativeLink
 
 
 class Line:
@@ -25,28 +26,15 @@ class Line:
         pass
 
 
-class NoProcess:
-    """What does the work of the process that reads, when it is told to."""
+class NativeLine(Line):
+    """The same, with what decodes it in C."""
 
-    def __init__(self, line, skin=None):
-        memory = os.memfd_create("test")
-        os.ftruncate(memory, reader.MEMORY_BYTES)
-        self.shared = reader.Shared.of(memory)
-        os.close(memory)
-        self.wake = os.eventfd(0, os.EFD_NONBLOCK)
-        self.link = reader.ReaderLink(line, skin, self.shared, self.wake)
-        self.control = self
+    def __init__(self, now):
+        super().__init__(now)
+        self.core = Port(-1, now())
 
-    def fileno(self):
-        return -1
-
-    def send(self, what, *arguments):
-        with self.link.changed:
-            reader._do(self.link, what, list(arguments))
-        self.link._send()
-
-    def end(self):
-        os.close(self.wake)
+    def close(self):
+        self.core.close()
 
 
 class Pair:
@@ -54,25 +42,38 @@ class Pair:
 
     def __init__(self, skin=None):
         self.now = 0.0
-        self.lines = [Line(lambda: self.now) for _ in range(2)]
+        self.lines = Line(self._now), NativeLine(self._now)
         self.thread = Link(self.lines[0], skin)
-        self.process = NoProcess(self.lines[1], skin)
-        self.remote = remote.RemoteLink("the line", self.process)
-        self.remote.transport.clock = lambda: self.now
+        self.native = NativeLink(self.lines[1], self.lines[1], skin)
+
+    def _now(self):
+        return self.now
 
     @property
     def links(self):
-        return self.thread, self.remote
+        return self.thread, self.native
 
     def take(self, data):
-        """Both get these bytes."""
-        for link in (self.thread, self.process.link):
-            with link.changed:
-                link._take(data)
-            link._send()
+        """Both get these bytes; the native one does not look at them yet."""
+        for start in range(0, len(data), native.CHUNK):
+            piece = data[start : start + native.CHUNK]
+            self._take(piece)
+            self.native._core.feed(piece, self.now)
+
+    def pass_time(self):
+        """Nothing came until now."""
+        self._take(b"")
+        self.native.catch_up()
+        self.native._send()
+
+    def _take(self, data):
+        with self.thread.changed:
+            self.thread._take(data)
+        self.thread._send()
 
     def sent(self):
         """What both sent to the board since the last call, which is the same."""
+        self.pass_time()
         first, second = (line.sent for line in self.lines)
         assert first == second
         for line in self.lines:
@@ -80,4 +81,4 @@ class Pair:
         return first
 
     def close(self):
-        self.remote.close()
+        self.native.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, TypeVar, cast, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 from contactfpga.driver.events import SideEvent
 from contactfpga.driver.facts import BoardFacts
@@ -21,9 +21,6 @@ from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
-
-if TYPE_CHECKING:
-    from contactfpga.driver.remote import RemoteLink
 
 QUEUE = 16_384
 """Frames that wait for :meth:`Board.next` at most."""
@@ -45,11 +42,11 @@ class Board(BoardFacts):
 
     def __init__(
         self,
-        port: Transport | RemoteLink,
+        port: Transport | Link,
         skin: Skin | None = None,
         opened: Callable[[Board], object] | None = None,
     ):
-        link = cast("RemoteLink", port) if hasattr(port, "wait_for") else Link(port, skin)
+        link = port if isinstance(port, Link) else Link(port, skin)
         super().__init__(link, Subscription(link, QUEUE), skin)
         if opened is not None:
             opened(self)
@@ -92,6 +89,8 @@ class Board(BoardFacts):
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
         if self.live:
+            if (zones := self._frames.shown(timeout, max_age_s)) is not None:
+                return zones
             self._link.take_what_came()
             self._frames.keep_last()
         return self._frames.next(timeout) if max_age_s is None else self._frames.newest(max_age_s, checked(timeout))
@@ -211,7 +210,7 @@ class AsyncBoard(BoardFacts):
     commands, which wait.
     """
 
-    def __init__(self, board: Board, link: Link | RemoteLink, frames: Subscription, expected: Skin | None):
+    def __init__(self, board: Board, link: Link, frames: Subscription, expected: Skin | None):
         super().__init__(link, frames, expected)
         self.board = board
         """The board that this one wraps. Its methods block."""
@@ -264,7 +263,7 @@ SLOT_BITS = 5000
 class _SlotListener:
     """Waits for all slots of one test."""
 
-    def __init__(self, link: Link | RemoteLink, count: int, attempt_s: float):
+    def __init__(self, link: Link, count: int, attempt_s: float):
         self.whole: tuple[SelfTestSlot, ...] | None = None
         self.attempt_s = attempt_s
         self._count = count
@@ -288,7 +287,7 @@ class _SlotListener:
             self.whole = tuple(self._so_far)
 
 
-def _run_self_test(link: Link | RemoteLink, timeout: float) -> tuple[SelfTestSlot, ...]:
+def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
     """All slots of a test that begins after this call. Raises :class:`ReadTimeout`, and as a command does."""
     deadline = link.clock() + timeout
     while True:
@@ -303,7 +302,7 @@ def _run_self_test(link: Link | RemoteLink, timeout: float) -> tuple[SelfTestSlo
             return slots.whole
 
 
-def _listen_for_slots(link: Link | RemoteLink) -> _SlotListener:
+def _listen_for_slots(link: Link) -> _SlotListener:
     hello = link.conversation.hello
     if hello is None:
         raise ContactFPGAError(f"{link.transport.name}: no hello has come yet")

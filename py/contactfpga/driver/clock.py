@@ -17,7 +17,7 @@ from contactfpga.driver.stats import Stats
 from contactfpga.skin.derived import EPOCH_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import Frame, may_number
-from contactfpga.zones.zone import HostLine
+from contactfpga.zones.zone import HostLine, HostLines
 
 _WRAP_US = 1 << TIME_BITS
 _EPOCH_US = 1 << EPOCH_BITS
@@ -116,6 +116,14 @@ class Timeline:
             return False
         soon = not self._live or now - self._now <= self._patience_s
         return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
+
+    @property
+    def last(self) -> tuple[int, int, float] | None:
+        """Of the last frame its time since power-up in us, the bits of a request's number, and when it came; None where
+        a frame cannot continue it."""
+        if self.before is None or self._time_us is None or not self._known:
+            return None
+        return self._time_us, self.before.heard, self._now
 
     def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
         """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before;
@@ -314,11 +322,49 @@ class ClockFit:
         likely: np.ndarray = np.exp((exponents.min() - exponents) / 2)
         return likely
 
-    def line(self, arrived_s: float) -> HostLine | None:
-        """For frames that arrived then; None before the first :meth:`arrived`."""
+    def arrived_in_turn(
+        self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """:meth:`arrived` for each of many frames after the first one; before it, of :meth:`line` all but the first
+        field. Most arrivals say nothing new, and only those that do are taken one by one."""
+        count, at = len(times_us), 0
+        base_us, (base_s, rate, sigma_s) = np.empty(count, np.int64), np.empty((3, count))
+        while at < count:
+            devices_s = (times_us[at:] - self._base_us) / 1e6
+            excess_s = arrived_s[at:] - wire_s[at:] - self._base_s - devices_s
+            below_s = self._height_s + self._slope * (devices_s - self._fitted_s) - excess_s
+            telling = (np.floor(devices_s / PIECE_S) > self._piece) | (below_s > 0)
+            quiet = int(telling.argmax()) if telling.any() else count - at
+            known = slice(at, min(at + quiet + 1, count))
+            now_s = np.empty(known.stop - at)
+            now_s[0], now_s[1:] = self._newest.device_s, devices_s[: len(now_s) - 1]
+            bounds_s = self._height_s + self._slope * (now_s - self._fitted_s)
+            base_s[known] = self._base_s + now_s + bounds_s - self._least_s / 2
+            base_us[known] = self._base_us + np.rint(now_s * 1e6).astype(np.int64)
+            rate[known], sigma_s[known] = 1.0 + self._slope, math.sqrt(self._variance)
+            if quiet:
+                self._newest = _Point(float(devices_s[quiet - 1]), float(excess_s[quiet - 1]))
+            at += quiet
+            if at < count:
+                self.arrived(int(times_us[at]), float(arrived_s[at]), float(wire_s[at]))
+                at += 1
+        return base_us, base_s, rate, sigma_s
+
+    def bounds(self) -> tuple[int, int, float, float, float, float, float] | None:
+        """Base in us, number of the last piece, base in s, height, slope and time of the line that bounds arrivals, and
+        time of the newest one: an arrival on the same piece that is not below this line says nothing new. None before
+        the first."""
         if not self._pieces:
             return None
-        now_s = self._newest.device_s
+        line = self._base_s, self._height_s, self._slope, self._fitted_s
+        return self._base_us, int(self._piece), *line, self._newest.device_s
+
+    def line(self, arrived_s: float) -> HostLine | None:
+        """For frames that arrived then; None before the first :meth:`arrived`."""
+        return self.line_from(self._newest.device_s, arrived_s) if self._pieces else None
+
+    def line_from(self, now_s: float, arrived_s: float) -> HostLine:
+        """The same if the newest arrival was of that time of :meth:`bounds`."""
         base_s = self._base_s + now_s + self._bound(now_s) - self._least_s / 2
         base_us = self._base_us + round(now_s * 1e6)
         return HostLine(arrived_s, base_us, base_s, 1.0 + self._slope, math.sqrt(self._variance))
@@ -383,6 +429,26 @@ class HostClock:
                 self._fit.answered(time_us, asked_s)
             self._line = self._fit.line(now)
         return self._line
+
+    def take_reads(
+        self, times_us: np.ndarray, sizes: np.ndarray, arrived_s: np.ndarray, counts: np.ndarray
+    ) -> HostLines | None:
+        """The same of reads one after the other, none of which answers a request: when they came, how many frames each
+        had, and time and bytes of the last one of them. There was an arrival before."""
+        if self._fit is None:
+            return None
+        lines = self._fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
+        return HostLines(*(np.repeat(values, counts) for values in (arrived_s, *lines)))
+
+    @property
+    def fit(self) -> ClockFit | None:
+        """None in a recording."""
+        return self._fit
+
+    @property
+    def begun(self) -> bool:
+        """Whether :meth:`take_reads` may be called."""
+        return self._fit is None or self._fit.bounds() is not None
 
     def end(self, now: float) -> None:
         """These were all."""

@@ -9,11 +9,13 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
+from collections.abc import Iterator
 
 import numpy as np
 
 from contactfpga.driver.clock import MOST_S, HostClock, Timeline, continues
 from contactfpga.driver.events import Lines, UnitLine
+from contactfpga.driver.reads import Reads
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import SkinMismatch, VersionMismatch
@@ -77,6 +79,8 @@ class Conversation:
         self._timeline = Timeline(self.stats, live)
         self._clock = HostClock(live)
         self._reader = protocol.HelloReader()
+        self.decodes: tuple[Widths, bytes] | None = None
+        """What frames are decoded with, and what their check begins with; None where they come only one by one."""
         self._widths: Widths | None = None
         self._rest = b""
         self._noticed = math.inf
@@ -118,15 +122,72 @@ class Conversation:
         self._end(now)
         return events
 
-    def receive_runs(self, data: bytes, now: float) -> list[Event | Run]:
-        """The same, but most of many frames come in runs: those that answer no request that none before them does."""
+    def receive_runs(self, data: bytes, now: float, decoded: many.PacketTable | None = None) -> list[Event | Run]:
+        """The same, but most of many frames come in runs: those that answer no request that none before them does.
+        ``decoded``: all packets that ``data`` completes, of the sheet and check of the last hello."""
         packets = self._split(data, now)
+        if decoded is not None and len(decoded.packets) != len(packets):
+            decoded = None
+        same = self.decodes
         events: list[Event | Run] = []
         at = 0
         while at < len(packets):
-            at += self._take_some(packets[at:], now, events)
+            known = decoded if decoded is not None and self.decodes == same else None
+            at += self._take_some(packets[at:], now, events, known and known.part(at, len(packets)))
         self._end(now)
         return events
+
+    def receive_reads(self, reads: Reads) -> Iterator[tuple[float, list[Event | Run]]]:
+        """The same of many reads in turn: when what was completed came, and that. Where nothing but frames came of
+        which each continues the one before, many reads give one run."""
+        table = reads.decoded
+        ends = None if table is None or len(table.packets) < FEW_IN_RUN else _ends(continues(table.packets))
+        at = 0
+        while at < len(reads):
+            end = at if ends is None else self._steady(reads, at, ends)
+            if end > at:
+                yield reads.at_s[end - 1], [self._take_reads(reads, at, end)]
+                at = end
+                continue
+            now = reads.at_s[at]
+            if reads.paused(at):
+                self.doubt(now)
+            self._noticed = now
+            decoded = reads.decoded_at(at) if self.decodes == reads.decodes else None
+            yield now, self.receive_runs(reads.data_of(at), now, decoded)
+            at += 1
+
+    def lost_track(self, rest: bytes, missing: int) -> None:
+        """So many bytes came and are gone; the next read completes this packet."""
+        self._rest = rest
+        self.stats.bytes += missing
+
+    def steady(self) -> tuple[float, ...] | None:
+        """What :attr:`Timeline.last` says of the last frame, what :meth:`ClockFit.bounds` says, and what a byte takes
+        on the wire in s; None where a frame that continues the last one might change anything else than counters."""
+        last, fit = self._timeline.last, self._clock.fit
+        bounds = None if fit is None else fit.bounds()
+        if last is None or bounds is None or self.lines.fading or self.decodes is None:
+            return None
+        return *last, *bounds, self._clock.byte_s
+
+    def frame_from(self, frame: Frame, time_us: int, before: Frame | None, line_s: float, arrived_s: float) -> Zones:
+        """One that continues the last one while all is :meth:`steady`, perhaps with others between; it is not counted.
+        ``before``: the one before it, if that is another than the last one; ``line_s``: as for
+        :meth:`ClockFit.line_from`."""
+        fit = self._clock.fit
+        assert self._widths is not None
+        assert fit is not None
+        faults, before = self.lines.names("fault" in frame.flags), before or self._timeline.before
+        line = fit.line_from(line_s, arrived_s)
+        return Zones(frame, self._widths.sheet, time_us, before, line, faults, self.units.history)
+
+    def pass_time(self, now: float, paused: bool) -> None:
+        """Nothing came until now. Who reads sees to it that nobody ``paused`` for long, as :meth:`doubt` wants."""
+        if paused:
+            self.doubt(now)
+        self._noticed = now
+        self._requests.poll(now, hello=not self._timeline.known)
 
     def _split(self, data: bytes, now: float) -> list[bytes]:
         self.stats.bytes += len(data)
@@ -136,6 +197,48 @@ class Conversation:
             self._clock.begin(now)
         return [packet for packet in packets if packet]
 
+    def _steady(self, reads: Reads, at: int, ends: list[int]) -> int:
+        """Up to which read there are only frames of which each continues the one before, in the last one at least one,
+        and many enough; ``at`` where there are not."""
+        first = reads.packets_before(at)
+        end = reads.last_within(at, ends[first + 1] if first + 1 < len(ends) else first)
+        if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.decodes != reads.decodes:
+            return at
+        if not self._requests.idle or self.lines.fading or not self._clock.begun:
+            return at
+        assert reads.decoded is not None
+        valid, time_us, _, heard, *_ = reads.decoded.packets[first].item()
+        return end if valid and self._timeline.expects(heard, time_us, reads.at_s[at]) else at
+
+    def _take_reads(self, reads: Reads, at: int, end: int) -> Run:
+        assert self._widths is not None
+        assert reads.decoded is not None
+        data, now = reads.data_of(at, end), reads.at_s[end - 1]
+        self.stats.bytes += len(data)
+        self._noticed = now
+        self._rest = data[data.rindex(0) + 1 :]
+        widths, before = self._widths, self._timeline.before
+        decoded = reads.decoded.part(reads.packets_before(at), reads.packets_before(end))
+        last = frame_of(
+            decoded.packets[-1].item(), decoded.records[decoded.starts[-2] : decoded.starts[-1]], widths.sheet
+        )
+        times_us = self._timeline.take_run(decoded.packets, widths, last, now)
+        self._requests.take_frame(last.heard, now)
+        lines = self._clock.take_reads(*reads.last_frames(at, end, times_us))
+        self._passed()
+        faults = self.lines.names(flagged=True)
+        return Run(
+            widths.sheet,
+            decoded.packets,
+            decoded.starts,
+            decoded.records,
+            times_us,
+            lines,
+            before,
+            faults,
+            self.units.history,
+        )
+
     def _end(self, now: float) -> None:
         self._clock.end(now)
         if len(self._rest) > LONGEST_PACKET:
@@ -143,7 +246,9 @@ class Conversation:
             self._rest = b""
         self._requests.poll(now, hello=not self._timeline.known)
 
-    def _take_some(self, packets: list[bytes], now: float, events: list[Event | Run]) -> int:
+    def _take_some(
+        self, packets: list[bytes], now: float, events: list[Event | Run], decoded: many.PacketTable | None
+    ) -> int:
         """Take packets until the sheet changes, at least one; how many.
 
         A frame is decoded by itself where it is not known to continue the one before, and so decides what the next
@@ -151,8 +256,8 @@ class Conversation:
         """
         before, widths = self._before(), self._widths
         table, ends, follows = None, [0], False
-        if len(packets) >= FEW and widths is not None and widths.report.zones and not widths.sheet.ghosts:
-            table = many.decode(packets, widths, before)
+        if len(packets) >= FEW and widths is not None and self.decodes is not None:
+            table = many.decode(packets, widths, before) if decoded is None else decoded
             ends, follows = self._stretches(table.packets, now)
         at = 0
         while at < len(packets) and self._widths is widths and self._before() == before:
@@ -161,7 +266,10 @@ class Conversation:
                 events.append(self._take_run(table, at, ends[at], len(packets[ends[at] - 1]), now))
                 at, follows = ends[at], False
                 continue
-            event = self._packet(packets[at], now)
+            if decoded is not None and decoded.packets[at]["valid"]:
+                event = self._decoded(decoded, at, len(packets[at]), now)
+            else:
+                event = self._packet(packets[at], now)
             at, follows = at + 1, isinstance(event, Arrival)
             if event is not None:
                 events.append(event)
@@ -174,8 +282,7 @@ class Conversation:
         _, time_us, _, heard, *_ = packets[0].item()
         expected = bool(packets["valid"][0]) and self._timeline.expects(heard, time_us, now)
         found[0] = expected
-        places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
-        return np.minimum.accumulate(places[::-1])[::-1].tolist(), expected
+        return _ends(found), expected
 
     def _take_run(self, table: many.PacketTable, start: int, end: int, last_bytes: int, now: float) -> Run:
         assert self._widths is not None
@@ -212,6 +319,15 @@ class Conversation:
         self._passed()
         return event
 
+    def _decoded(self, decoded: many.PacketTable, index: int, packet_bytes: int, now: float) -> Event | None:
+        """:meth:`_packet` of one that is a whole frame."""
+        assert self._widths is not None
+        start, end = decoded.starts[index], decoded.starts[index + 1]
+        frame = frame_of(decoded.packets[index].item(), decoded.records[start:end], self._widths.sheet)
+        event = self._take_frame(frame, self._widths, packet_bytes, now)
+        self._passed()
+        return event
+
     def _passed(self) -> None:
         """A valid packet came."""
         self._begun = True
@@ -229,7 +345,7 @@ class Conversation:
         self.stats.foreign_version += 1
         if not old.hello:
             return None
-        self.hello = self.sheet = self._widths = None
+        self.hello = self.sheet = self._widths = self.decodes = None
         self._timeline = Timeline(self.stats, self._live)
         self._clock.forget()
         return VersionMismatch(
@@ -247,7 +363,13 @@ class Conversation:
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
             told = self._reader.take(plain)
-            return None if told is None else self._take_hello(told, now)
+            if told is None:
+                return None
+            event = self._take_hello(told, now)
+            widths = self._widths
+            many_at_once = widths is not None and widths.report.zones and not widths.sheet.ghosts
+            self.decodes = (widths, self._before()) if widths is not None and many_at_once else None
+            return event
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):
             return self._take_lines(plain, hello)
@@ -318,3 +440,10 @@ class Conversation:
             f"{self.port} now has {describe(hello)}, before it was {describe(before)}: another bitstream was "
             "loaded; frames from here on are of the new Skin"
         )
+
+
+def _ends(found: np.ndarray) -> list[int]:
+    """For each place, and the one after the last, the first one from there on that was not found."""
+    places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
+    ends: list[int] = np.minimum.accumulate(places[::-1])[::-1].tolist()
+    return ends

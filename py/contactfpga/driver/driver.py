@@ -9,19 +9,21 @@ import threading
 from pathlib import Path
 
 from contactfpga.choices.choice import trusted
-from contactfpga.driver import forks, recording
+from contactfpga.driver import forks, native, recording
 from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
+from contactfpga.driver.link import Link
+from contactfpga.driver.native_link import NativeLink, NativePort
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
-from contactfpga.driver.transport import SimulatedPort, connect
-from contactfpga.errors import BoardClosed, PortBusy, PortLost, SkinMismatch
+from contactfpga.driver.transport import SerialTransport, SimulatedPort, Transport, connect
+from contactfpga.errors import AddressError, BoardClosed, PortBusy, PortLost, SkinMismatch
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
-READERS = ("thread", "process")
+READERS = ("native", "thread")
 """What may read a port."""
 
 
@@ -33,7 +35,7 @@ def open(
     record: str | Path | Tap | None = None,
     timeout: float = 1.0,
     trust: bool = False,
-    reader: str = "thread",
+    reader: str | None = None,
 ) -> Board:
     """Open a board and wait for its hello.
 
@@ -52,16 +54,16 @@ def open(
     second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
     ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
     ``timeout`` in seconds, for the hello. ``trust``: files of Skins may name modules, which are imported and so run
-    (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`. ``reader``: ``"thread"`` reads the port in a
-    thread of this process, ``"process"`` in a process of its own, so that frames come soon while other Python threads
-    compute (docs/use.md).
+    (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`. ``reader``: ``"native"`` reads
+    a serial port in a thread in C, which never waits for Python; ``"thread"`` reads any port in a thread in Python; by
+    default the first of them that can, and for a Tap, which gets bytes as they come, ``"thread"`` (docs/use.md).
 
     Raises :class:`AddressError`, :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`,
     :class:`OnlyNoise`, :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a
     Skin that cannot work, and OSError, such as FileNotFoundError, for its file.
     """
     timeout = checked(timeout)
-    if reader not in READERS:
+    if reader is not None and reader not in READERS:
         raise ValueError(f"reader is {shown(reader)}; it must be one of {', '.join(READERS)}")
     if skin is not None and not isinstance(skin, Skin):
         skin = Skin.load(skin, trust)
@@ -95,22 +97,27 @@ def open(
 
 
 def _opened(
-    port: str | SimulatedPort | None, skin: Skin | None, baud: int, record: str | Path | Tap | None, reader: str
+    port: str | SimulatedPort | None, skin: Skin | None, baud: int, record: str | Path | Tap | None, reader: str | None
 ) -> Board:
     if port is None or (isinstance(port, str) and searched(port)):
         from contactfpga.driver import finding  # all boards, which a named port has no use for
 
         port = finding.find(port, skin, baud)
-    if reader == "process":
-        from contactfpga.driver import remote  # processes, which a thread has no use for
-
-        return Board(remote.open_link(port, baud, skin, record), skin)
-    transport = connect(port, baud)
+    why_not = native.refusal(port)
+    if reader == "native" and why_not:
+        name = port if isinstance(port, str) else "a virtual board"
+        raise AddressError(f"{name}: reader='native' cannot read it: {why_not}; leave reader out")
+    transport: Transport = connect(port, baud)
     try:
+        line = None
+        wanted = reader == "native" or (reader is None and isinstance(record, str | Path | None))
+        if wanted and not why_not and isinstance(transport, SerialTransport):
+            transport = line = NativePort(transport)
         if record is not None:
             tap = FileTap(record) if isinstance(record, (str, Path)) else record
             transport = RecordingTransport(transport, tap)
-        return Board(transport, skin, record.opened if isinstance(record, Opening) else None)
+        link = Link(transport, skin) if line is None else NativeLink(line, transport, skin)
+        return Board(link, skin, record.opened if isinstance(record, Opening) else None)
     except BaseException:
         transport.close()
         raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from contactfpga.driver.events import Silence, checked_deadline
 from contactfpga.driver.link import Link
@@ -16,14 +16,11 @@ from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.units import UnitHistory
 
-if TYPE_CHECKING:
-    from contactfpga.driver.remote import RemoteLink
-
 
 class BoardFacts:
     """An open port, what its board said about itself, and queues of its frames."""
 
-    def __init__(self, link: Link | RemoteLink, frames: Subscription, expected: Skin | None):
+    def __init__(self, link: Link, frames: Subscription, expected: Skin | None):
         self._link, self._frames, self._expected = link, frames, expected
 
     def __repr__(self) -> str:

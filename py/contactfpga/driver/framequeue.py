@@ -20,6 +20,8 @@ class FrameQueue:
         """Whether the queue also takes events between frames."""
         self.dropped = 0
         """Frames that were not taken in time."""
+        self.ahead = 0
+        """So many of the frames that come next were taken already."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
         self._taken = 0  # frames of the run in front
         self._length = 0
@@ -29,6 +31,13 @@ class FrameQueue:
 
     def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
         """Add what came."""
+        if self.ahead and isinstance(item, (Zones, Run)):
+            known = min(self.ahead, _count(item))
+            self.ahead -= known
+            if known == _count(item):
+                return
+            assert isinstance(item, Run)
+            item = item.after(known)
         self._items.append(item)
         self._length += _count(item)
         while self._length > self.maxsize:

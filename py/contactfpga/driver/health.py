@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from contactfpga.driver import finding
+from contactfpga.driver import finding, native
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.wire.faults import STUCK
@@ -103,13 +103,11 @@ def hello(board: Board) -> Iterator[Finding]:
 
 
 def reader(board: Board) -> Iterator[Finding]:
-    """Who reads the port, and who else can."""
-    from contactfpga.driver import remote  # processes, which no other look has a use for
-
-    if why := remote.refusal(board.port):
-        yield Finding("note", f"{board.port} is read by a thread; open(port, reader='process') cannot read it: {why}")
+    """Who reads the port."""
+    if why := native.refusal(board.port):
+        yield Finding("note", f"{board.port} is read in Python, not in C: {why}")
     else:
-        yield Finding("ok", f"{board.port} is read by a thread; open(port, reader='process') can read it as well")
+        yield Finding("ok", f"{board.port} is read in C, which waits for no Python thread")
 
 
 def clock(board_s: float, host_s: float) -> Iterator[Finding]:

@@ -284,6 +284,14 @@ class Link:
         if not self.transport.threaded:
             self._send()
 
+    def catch_up(self) -> None:
+        """Take what someone else has read; where the threads that wait read for themselves, there is nothing."""
+
+    def newest(self, queue: FrameQueue, timeout: float) -> Zones | None:
+        """The newest frame, none that the queue has had, and have the queue go on after it; None where the queue has to
+        be looked at. Raises as :meth:`wait_for`."""
+        return None
+
     def take_what_came(self) -> None:
         """Read the bytes that wait at a port which no thread reads."""
         if self.transport.threaded:

@@ -90,11 +90,12 @@ class RecordingTransport:
         self.counters = counters_of(transport)
         self.write = transport.write
         self.clock = transport.clock
+        self.take = tap.take
         self._tap = tap
 
     def read(self, timeout_s: float) -> bytes:
         data = self._transport.read(timeout_s)
-        self._tap.take(data, self._transport.clock())
+        self.take(data, self._transport.clock())
         return data
 
     def close(self) -> None:

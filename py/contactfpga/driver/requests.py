@@ -58,6 +58,11 @@ class Requests:
         self._in_flight = False  # the command was sent since the stage is known
         self._recent: collections.deque[int] = collections.deque(maxlen=MOST_APART + 1)
 
+    @property
+    def idle(self) -> bool:
+        """Every request is answered."""
+        return self._tickets == self.answered
+
     def ask(self, now: float, until: float, hello: bool = False) -> int:
         """A ticket for a frame that is scanned after now; someone waits for it until then. ``hello``: ask for a hello
         as well."""

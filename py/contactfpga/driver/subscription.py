@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
-from typing import TYPE_CHECKING, Generic, TypeVar, cast
+from typing import Generic, TypeVar, cast
 
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.link import Link
@@ -14,9 +14,6 @@ from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
-
-if TYPE_CHECKING:
-    from contactfpga.driver.remote import RemoteLink
 
 Item = TypeVar("Item")
 
@@ -29,7 +26,7 @@ class Listening(Generic[Item]):
 
     all_events = False
 
-    def __init__(self, link: Link | RemoteLink, maxsize: int, board: object = None, deadline_s: float | None = None):
+    def __init__(self, link: Link, maxsize: int, board: object = None, deadline_s: float | None = None):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
             raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
         self._link = link
@@ -47,6 +44,7 @@ class Listening(Generic[Item]):
     @property
     def dropped(self) -> int:
         """Frames that were not taken in time."""
+        self._link.catch_up()
         return self._frames.dropped
 
     def next(self, timeout: float = 1.0) -> Item:
@@ -189,6 +187,12 @@ class Subscription(Listening[Zones]):
         return Batch.of(frames or [self.next(timeout)])
 
     # ---- for the board
+
+    def shown(self, timeout: float, max_age_s: float | None) -> Zones | None:
+        """The newest frame, where it is known before the others were taken; see :meth:`Link.newest`."""
+        if max_age_s is not None or timeout == 0:
+            return None
+        return self._link.newest(self._frames, checked(timeout))
 
     def newest(self, max_age_s: float, timeout: float) -> Zones:
         """The next frame, none that came or was scanned longer ago than this; raises :class:`NoData` as soon as there

@@ -100,14 +100,14 @@ class SerialTransport:
         try:
             count = self._port.readinto(self._buffer, timeout=max(0.0, timeout_s))
         except self._errors as error:
-            raise self._lost(error) from None
+            raise self.lost(error) from None
         return bytes(self._buffer[:count])
 
     def write(self, data: bytes) -> None:
         try:
             self._port.write(data, timeout=1.0)
         except self._errors as error:
-            raise self._lost(error) from None
+            raise self.lost(error) from None
 
     def clock(self) -> float:
         return time.monotonic()
@@ -121,7 +121,12 @@ class SerialTransport:
         """Close the child's descriptor: the lock is the parent's, and ends with the last descriptor."""
         self.close()
 
-    def _lost(self, error: Exception) -> PortLost:
+    def fileno(self) -> int:
+        """Its descriptor."""
+        return int(self._port.fileno())
+
+    def lost(self, error: Exception) -> PortLost:
+        """What is told of a port that is gone."""
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
 
 

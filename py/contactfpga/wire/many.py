@@ -30,7 +30,8 @@ FIELDS = np.dtype(
         ("overwritten", np.int64),
         ("flags", np.int64),
         ("items", np.int64),
-    ]
+    ],
+    align=True,
 )
 """Fields of a packet: whether it is a whole frame, then those of :class:`~contactfpga.wire.protocol.Frame`; ``items``
 counts its records."""
@@ -47,6 +48,10 @@ class PacketTable:
     records: np.ndarray
     """(m, 3) int64 of all packets in order: area and sums, or area and barycenter; (m, 4) for a sheet whose ends meet,
     as :attr:`contactfpga.wire.protocol.Frame.moments`."""
+
+    def part(self, start: int, end: int) -> PacketTable:
+        """Of some of them."""
+        return PacketTable(self.packets[start:end], self.starts[start : end + 1], self.records)
 
 
 def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTable:

@@ -12,7 +12,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
 from contactfpga.zones.units import UnitHistory
-from contactfpga.zones.zone import HostLine, Zones
+from contactfpga.zones.zone import HostLine, HostLines, Zones
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,8 +28,8 @@ class Run:
     """(m, 3) int64, or (m, 4) for a sheet whose ends meet, at least up to the last start."""
     times_us: np.ndarray
     """(n,) int64, since power-up."""
-    line: HostLine | None
-    """Arrival times, and frame times on the host's clock; None in a recording."""
+    line: HostLine | HostLines | None
+    """When they arrived, together or each by itself, and their times on the host's clock; None in a recording."""
     before: Frame | None = None
     """The frame before the first one."""
     faults: tuple[str, ...] = (STUCK,)
@@ -47,6 +47,7 @@ class Run:
             packets=self.packets[index:],
             starts=self.starts[index:],
             times_us=self.times_us[index:],
+            line=self.line.after(index) if isinstance(self.line, HostLines) else self.line,
             before=self._frame(index - 1) if index else self.before,
         )
 
@@ -58,7 +59,8 @@ class Run:
     def __getitem__(self, index: int) -> Zones:
         before = self._frame(index - 1) if index else self.before
         time_us = self._plain[2][index]
-        return Zones(self._frame(index), self.sheet, time_us, before, self.line, self.faults, self.history)
+        line = self.line.of(index) if isinstance(self.line, HostLines) else self.line
+        return Zones(self._frame(index), self.sheet, time_us, before, line, self.faults, self.history)
 
     def _frame(self, index: int) -> Frame:
         if (made := self._made.get(index)) is None:

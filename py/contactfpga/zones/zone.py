@@ -439,3 +439,30 @@ class HostLine:
         """The host's clock in s at a device time in us, for frames that arrived by :attr:`arrived_s`."""
         at_s = self.base_s + (time_us - self.base_us) * (self.rate * 1e-6)
         return np.minimum(at_s, self.arrived_s) if isinstance(at_s, np.ndarray) else min(at_s, self.arrived_s)
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class HostLines:
+    """A :class:`HostLine` for each of many frames: arrays (n,) of what is a number there."""
+
+    arrived_s: np.ndarray
+    base_us: np.ndarray
+    base_s: np.ndarray
+    rate: np.ndarray
+    sigma_s: np.ndarray
+
+    def at(self, times_us: np.ndarray) -> np.ndarray:
+        """As :meth:`HostLine.at`, of each frame."""
+        at_s: np.ndarray = np.minimum(self.base_s + (times_us - self.base_us) * (self.rate * 1e-6), self.arrived_s)
+        return at_s
+
+    def of(self, index: int) -> HostLine:
+        """That of one frame."""
+        return HostLine(*(values[index].item() for values in self._fields()))
+
+    def after(self, index: int) -> HostLines:
+        """Without the first frames."""
+        return HostLines(*(values[index:] for values in self._fields()))
+
+    def _fields(self) -> tuple[np.ndarray, ...]:
+        return self.arrived_s, self.base_us, self.base_s, self.rate, self.sigma_s

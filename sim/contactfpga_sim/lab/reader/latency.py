@@ -1,4 +1,4 @@
-"""From the last byte to user code, with a reader thread or process, against a C program on the same line."""
+"""From the last byte to user code, with a thread in C or in Python that reads, beside a C program on the same line."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ OPEN_S = 60.0
 ENDED_S = 0.8
 """Silence that ends a stream."""
 BEGUN = 20
-"""Frames that mark a stream's beginning; a few arrive while the board makes the others."""
-READERS = ("thread", "process")
+"""Frames after which a stream has begun; a few come while the board makes the others."""
+READERS = ("native", "thread")
 
 
 class Found(NamedTuple):

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,17 +15,14 @@ from contactfpga_sim.lab.speed.driver import SKIN
 
 PACE = Pace(1_000, 1, 3.0)
 LOOP_S = 0.01
-"""Interval of reading each link."""
-TICKS = os.sysconf("SC_CLK_TCK")
+"""How often each link is looked at."""
 
 
 class Share(NamedTuple):
-    """Load, in shares of a core."""
+    """What it takes."""
 
     used: float
-    """Share used by the process with the links."""
-    readers: float
-    """Share used by its reader processes together."""
+    """Of a core, by the process that uses the links, with all its threads."""
     came: float
     """Share of the frames that arrived while they were sent."""
     age_ms: float
@@ -45,18 +40,18 @@ def measured(reader: str, links: int, call: str) -> Share:
         feeder.begin()
         time.sleep(0.2)
         before = [board.stats.frames for board in boards]
-        used, others, begun = time.process_time(), _children_s(), time.monotonic()
+        used, begun = time.process_time(), time.monotonic()
         ages: list[float] = []
         while (now := time.monotonic()) < begun + PACE.seconds - 0.5:
             for board, queue in zip(boards, queues):
                 ages.append(_age_s(board, queue, call, feeder))
             time.sleep(max(0.0, now + LOOP_S - time.monotonic()))
         span = time.monotonic() - begun
-        used, others = time.process_time() - used, _children_s() - others
+        used = time.process_time() - used
         came = sum(board.stats.frames - first for board, first in zip(boards, before))
         written_s = np.array(feeder.written_s)
         sent = links * max(1, int(((written_s >= begun) & (written_s < begun + span)).sum()))
-    return Share(used / span, others / span, came / sent, float(np.median(ages)) * 1e3)
+    return Share(used / span, came / sent, float(np.median(ages)) * 1e3)
 
 
 def _opened(port: str, reader: str) -> contactfpga.Board:
@@ -75,14 +70,3 @@ def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str,
     if not 0 <= place < len(feeder.written_s) or arrived_s is None:
         return 0.0
     return time.monotonic() - feeder.written_s[place]
-
-
-def _children_s() -> float:
-    """CPU time of this process's readers."""
-    total = 0
-    for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-            if int(fields[1]) == os.getpid() and b"reader of" in (folder / "cmdline").read_bytes():
-                total += int(fields[11]) + int(fields[12])
-    return total / TICKS

@@ -1,0 +1,314 @@
+"""The thread in C that reads ports (c/reader.c), by ctypes.
+
+A library of plain C needs no header of Python's and no build for each of its versions; installing compiles it where
+there is a C compiler (hatch_build.py). Calls that wait release the interpreter's lock, the others keep it: so the
+newest frame is copied after a thread that waited has the lock again, and is as new as it can be.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contactfpga.driver import forks
+from contactfpga.driver.address import Serial, parse
+from contactfpga.driver.reads import Read, Reads
+from contactfpga.skin.derived import Widths
+from contactfpga.wire.many import FIELDS, PacketTable
+from contactfpga.zones.run import frame_of
+
+LIBRARY = Path(__file__).with_name("_reader.so")
+"""Where installing puts the library."""
+
+CHUNK = 16_384
+"""Bytes of a read, at most."""
+
+_WORD = 8
+_TAKEN = struct.Struct("8Q")
+_READ = struct.Struct("d4q")
+_NEWEST = struct.Struct("Qqqdd")
+_FRAME = struct.Struct("?7x8q")
+
+
+class Sheet(ctypes.Structure):
+    """What frames are decoded with."""
+
+    _fields_ = [
+        (name, ctypes.c_uint32)
+        for name in (
+            *("known", "rows", "columns", "connectivity", "report"),
+            *("fraction_bits", "closed", "zone_capacity", "prefix"),
+        )
+    ]
+
+
+class Base(ctypes.Structure):
+    """What is known after the packets that were taken; see :meth:`Port.settle`."""
+
+    _fields_ = [
+        ("steady", ctypes.c_int64),
+        ("packets", ctypes.c_uint64),
+        ("time_us", ctypes.c_int64),
+        ("heard", ctypes.c_int64),
+        ("came_s", ctypes.c_double),
+        ("base_us", ctypes.c_int64),
+        ("piece", ctypes.c_int64),
+        ("base_s", ctypes.c_double),
+        ("height_s", ctypes.c_double),
+        ("slope", ctypes.c_double),
+        ("fitted_s", ctypes.c_double),
+        ("newest_s", ctypes.c_double),
+        ("byte_s", ctypes.c_double),
+    ]
+
+
+class Newest(NamedTuple):
+    """The newest frame."""
+
+    packets: int
+    """Its number, from 1: that of its packet since the port was opened."""
+    time_us: int
+    """Since power-up."""
+    before: bool
+    """Whether the frame before it came after the last packet that was taken."""
+    at_s: float
+    """When it came."""
+    line_s: float
+    """Time of the newest arrival of the fit of clocks by then."""
+
+
+class Library:
+    """The functions of the library."""
+
+    def __init__(self, path: Path):
+        keeps, releases = ctypes.PyDLL(str(path)), ctypes.CDLL(str(path), use_errno=True)
+        address, double, number = ctypes.c_void_p, ctypes.c_double, ctypes.c_uint64
+
+        def function(library: ctypes.CDLL, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
+            found = getattr(library, f"cfpga_{name}")
+            found.restype, found.argtypes = result, arguments
+            return found  # type: ignore[no-any-return]
+
+        self.open = function(releases, "open", address, ctypes.c_int, double)
+        self.close = function(releases, "close", None, address)
+        self.wait = function(releases, "wait", None, address, number, ctypes.c_int, double)
+        self.free = function(keeps, "free", None, address)
+        self.wake = function(keeps, "wake", None, address)
+        self.forked = function(keeps, "forked", None)
+        self.feed = function(keeps, "feed", None, address, ctypes.c_char_p, ctypes.c_size_t, double)
+        self.sheet = function(keeps, "sheet", None, address, ctypes.POINTER(Sheet))
+        self.waiting = function(keeps, "waiting", ctypes.c_size_t, address)
+        self.notice = function(keeps, "notice", ctypes.c_int, address, double)
+        self.failure = function(keeps, "failure", ctypes.c_int, address)
+        self.take = function(keeps, "take", None, address, address, ctypes.c_size_t)
+        self.settle = function(keeps, "settle", None, address, ctypes.POINTER(Base))
+        self.newest = function(keeps, "newest", ctypes.c_int, address, number, address)
+
+
+@functools.lru_cache(maxsize=1)
+def library() -> Library:
+    """Raises OSError where there is none."""
+    found = Library(LIBRARY)
+    forks.in_child(found.forked)
+    return found
+
+
+def missing() -> str:
+    """Why the library cannot be used; empty where it can."""
+    if os.name != "posix":
+        return "it needs Linux or macOS"
+    if not LIBRARY.exists():
+        return "it was installed without a C compiler; install one, then the package again"
+    try:
+        library()
+    except OSError as error:
+        return f"its library cannot be loaded ({error}); install the package again"
+    return ""
+
+
+def refusal(port: object) -> str:
+    """Why the thread in C cannot read a port; empty where it can."""
+    if not isinstance(port, str) or not isinstance(parse(port), Serial):
+        return "only the bytes of a serial port come by themselves, from a descriptor that C can read"
+    return missing()
+
+
+class Port:
+    """A port that the thread reads; with a descriptor of -1 it gets what :meth:`feed` gives."""
+
+    def __init__(self, descriptor: int, now: float):
+        self._library, self._inherited = library(), False
+        self._address = self._library.open(descriptor, now)
+        if not self._address:
+            raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+        self._decodes: tuple[Widths, bytes] | None = None
+        self._columns, self._room = 3, 0
+        self.taken = 0
+        """Packets that were taken, and those that were overwritten before."""
+        self._bytes = 0  # the same
+        self._base = Base()
+        self._make_room()
+        forks.watch(self)
+
+    def forked(self) -> None:
+        """In a child it is not this process's."""
+        self._inherited = True
+
+    def __del__(self) -> None:
+        if self._mine():
+            address, self._address = self._address, None  # what ends with it may still call wake() or close()
+            self._library.close(address)
+            self._library.free(address)
+
+    def _mine(self) -> bool:
+        return bool(getattr(self, "_address", None)) and not self._inherited
+
+    def close(self) -> None:
+        """Read no more; who waits goes on. May be called twice."""
+        if self._mine():
+            self._library.close(self._address)
+
+    def wake(self) -> None:
+        """Who waits goes on, now and later."""
+        if self._mine():
+            self._library.wake(self._address)
+
+    def feed(self, data: bytes, now: float) -> None:
+        """These bytes came, at most :data:`CHUNK`."""
+        self._library.feed(self._address, data, len(data), now)
+
+    def wait(self, packets: int, seconds: float) -> None:
+        """Until there are more packets than these since the port was opened, or nothing comes any more."""
+        self._library.wait(self._address, packets, 0, seconds)
+
+    def wait_for_much(self, seconds: float) -> None:
+        """Until so much waits that it has to be taken, or nothing comes any more."""
+        self._library.wait(self._address, 0, 1, seconds)
+
+    def paused(self, now: float) -> bool:
+        """Whether nobody has read for longer than times are known."""
+        return bool(self._library.notice(self._address, now))
+
+    @property
+    def failure(self) -> int:
+        """errno of a port that is lost, -1 at its end, 0 as long as it goes on."""
+        return int(self._library.failure(self._address))
+
+    def decode(self, decodes: tuple[Widths, bytes] | None) -> None:
+        """What frames are from now on; see :attr:`contactfpga.driver.conversation.Conversation.decodes`."""
+        if decodes == self._decodes:
+            return
+        told = Sheet()
+        if decodes is not None:
+            widths, before = decodes
+            sheet = widths.sheet
+            told = Sheet(
+                1,
+                sheet.rows,
+                sheet.columns,
+                sheet.connectivity,
+                ("moments", "cells", "barycenter").index(sheet.report),
+                sheet.barycenter_bits,
+                sheet.closed,
+                sheet.zone_capacity,
+                int.from_bytes(before, "little"),
+            )
+            self._columns, self._room = len(widths.record_bits), widths.max_items
+        else:
+            self._columns = 3
+        self._make_room()
+        self._library.sheet(self._address, ctypes.byref(told))
+        self._decodes = decodes
+
+    def _make_room(self) -> None:
+        """For the newest frame and the one before it."""
+        self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
+        self._newest_view = self._newest.data
+        self._newest_words = self._newest.view(np.int64)
+        self._newest_at = self._newest.ctypes.data
+
+    # ---- what came
+
+    def take(self) -> tuple[Reads, bytes, int] | None:
+        """All reads that wait, the begin of their first packet where bytes before them are gone, and how many of these
+        were not taken; None where nothing waits."""
+        if not (size := self._library.waiting(self._address)):
+            return None
+        memory = np.empty(size, np.uint8)
+        self._library.take(self._address, memory.ctypes.data, size)
+        count, packets, records, length, partial, gap, first_packet, first_byte = _TAKEN.unpack_from(memory.data)
+        if not count:
+            return None
+        columns = self._columns
+        reads = _TAKEN.size
+        fields = reads + count * _READ.size
+        starts = fields + packets * FIELDS.itemsize
+        sizes = starts + (packets + 1) * _WORD
+        carried = sizes + packets * _WORD
+        begun = carried + records * columns * _WORD
+        data, end = begun + partial, begun + partial + length
+        table = None
+        if self._decodes is not None:
+            rows = np.frombuffer(memory, np.int64, records * columns, carried).reshape(-1, columns)
+            found = np.frombuffer(memory, FIELDS, packets, fields)
+            table = PacketTable(found, np.frombuffer(memory, np.int64, packets + 1, starts), rows)
+        came = Reads(
+            Read(0.0, first_byte, first_packet, 0, 0),
+            list(_READ.iter_unpack(memory.data[reads:fields])),
+            memory[data:end].tobytes(),
+            self._decodes,
+            table,
+            np.frombuffer(memory, np.int64, packets, sizes),
+        )
+        missing = first_byte - self._bytes if gap else 0
+        self.taken, self._bytes = first_packet + packets, first_byte + length
+        return came, memory[begun:data].tobytes(), missing
+
+    # ---- the newest frame
+
+    def settle(self, steady: tuple[float, ...] | None) -> None:
+        """What :meth:`contactfpga.driver.conversation.Conversation.steady` says after what was taken."""
+        base = self._base
+        base.steady, base.packets = steady is not None, self.taken
+        if steady is not None:
+            base.time_us, base.heard, base.came_s, base.base_us, base.piece, *rest = steady
+            base.base_s, base.height_s, base.slope, base.fitted_s, base.newest_s, base.byte_s = rest
+        self._library.settle(self._address, ctypes.byref(base))
+
+    def newest(self, packets: int) -> Newest | None:
+        """The newest frame, whose fields and records :meth:`frame` gives then; None where it is not newer than this
+        packet. Raises :class:`Unsettled` where what came does not tell it."""
+        found = self._library.newest(self._address, packets, self._newest_at)
+        if found < 0:
+            raise Unsettled
+        return Newest(*_NEWEST.unpack_from(self._newest_view)) if found else None
+
+    def frame(self) -> Any:
+        """That frame, as it came over the wire."""
+        return self._frame(0)
+
+    def frame_before(self) -> Any:
+        """The one before it."""
+        return self._frame(1)
+
+    def _frame(self, index: int) -> Any:
+        assert self._decodes is not None
+        place = _NEWEST.size + index * FIELDS.itemsize
+        fields = _FRAME.unpack_from(self._newest_view, place)
+        start = _NEWEST.size + 2 * FIELDS.itemsize
+        if index:
+            start += _FRAME.unpack_from(self._newest_view, _NEWEST.size)[-1] * self._columns * _WORD
+        start //= _WORD
+        records = self._newest_words[start : start + fields[-1] * self._columns].reshape(-1, self._columns).copy()
+        return frame_of(fields, records, self._decodes[0].sheet)
+
+
+class Unsettled(Exception):
+    """The newest frame cannot be told before what came was taken."""

@@ -1,0 +1,106 @@
+"""What came in several reads of a port, with the packets among it that were decoded already."""
+
+from __future__ import annotations
+
+import bisect
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.driver.clock import MOST_S
+from contactfpga.skin.derived import Widths
+from contactfpga.wire.many import PacketTable
+
+PAUSED, NOISE = 1, 2
+"""Of a read: nobody had read before it for longer than times are known; more bytes than a packet has came without a
+delimiter."""
+
+
+class Read(NamedTuple):
+    """What came at once; bytes and packets are those of all reads up to it."""
+
+    at_s: float
+    bytes: int
+    packets: int
+    records: int
+    odd: int
+    """Of :data:`PAUSED` and :data:`NOISE`."""
+
+
+class Reads:
+    """Consecutive reads.
+
+    ``reads``: of the fields of :class:`Read`, after as many bytes and packets as ``before`` says; ``data``: all bytes.
+    ``decoded``: of every packet, with (n,) ``sizes`` in bytes, whether it is a whole frame by what
+    :attr:`contactfpga.driver.conversation.Conversation.decodes` said, ``decodes``, and then its fields.
+    """
+
+    def __init__(
+        self,
+        before: Read,
+        reads: list[tuple[float, int, int, int, int]],
+        data: bytes,
+        decodes: tuple[Widths, bytes] | None,
+        decoded: PacketTable | None,
+        sizes: np.ndarray,
+    ):
+        self.at_s = [read[0] for read in reads]
+        self.decodes, self.decoded = decodes, decoded
+        self._data, self._sizes = data, sizes
+        self._bytes = [0, *(read[1] - before.bytes for read in reads)]
+        self._packets = [0, *(read[2] - before.packets for read in reads)]
+        self._odd = [read[4] for read in reads]
+
+    def __len__(self) -> int:
+        return len(self.at_s)
+
+    def paused(self, at: int) -> bool:
+        """Whether nobody had read before this read for longer than times are known."""
+        return bool(self._odd[at] & PAUSED)
+
+    def packets_before(self, at: int) -> int:
+        """Packets that were complete before this read."""
+        return self._packets[at]
+
+    def data_of(self, at: int, end: int | None = None) -> bytes:
+        """Bytes of this read, or up to another one."""
+        return self._data[self._bytes[at] : self._bytes[at + 1 if end is None else end]]
+
+    def decoded_at(self, at: int) -> PacketTable | None:
+        """What this read completed."""
+        if self.decoded is None or len(self) == 1:
+            return self.decoded
+        return self.decoded.part(self._packets[at], self._packets[at + 1])
+
+    def last_within(self, at: int, packets: int) -> int:
+        """Up to which read from this one on all packets are among the first ``packets``, there is nothing else to be
+        told of, no pause is as long as times are known, and the last read has a packet."""
+        end = bisect.bisect_right(self._packets, packets, at + 1, self._next_break(at) + 1) - 1
+        while end > at and self._packets[end] == self._packets[end - 1]:
+            end -= 1
+        return end
+
+    def _next_break(self, at: int) -> int:
+        """The first read from here on that is odd, or from the next one on that came too late after the one before."""
+        if self._odd[at]:
+            return at
+        place = bisect.bisect_right(self._breaks, at)
+        return self._breaks[place] if place < len(self._breaks) else len(self)
+
+    @functools.cached_property
+    def _breaks(self) -> list[int]:
+        late = np.diff(self.at_s, prepend=self.at_s[0]) > MOST_S
+        found: list[int] = np.flatnonzero((np.array(self._odd) > 0) | late).tolist()
+        return found
+
+    def last_frames(
+        self, at: int, end: int, times_us: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of each read with frames, the last one's time of ``times_us`` and bytes with the delimiter, when it came, and
+        how many they are."""
+        by = np.array(self._packets[at : end + 1])
+        counts = np.diff(by)
+        some = counts > 0
+        lasts = by[1:][some] - 1
+        return times_us[lasts - by[0]], self._sizes[lasts] + 1, np.array(self.at_s[at:end])[some], counts[some]

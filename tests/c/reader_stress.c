@@ -1,0 +1,116 @@
+/* Threads that read, take, wait and close at the same time: run it with a sanitizer.
+ *
+ *     reader_stress BYTES
+ *
+ * Bytes of a known sequence go over a pseudo-terminal while other ports come and go. Every byte is taken once, in order.
+ */
+#define _XOPEN_SOURCE 700
+#define _DEFAULT_SOURCE
+#include "../../c/reader.c"
+
+#include <stdatomic.h>
+#include <stdio.h>
+#include <termios.h>
+
+static size_t count;
+static int master;
+static port *line;
+static atomic_bool done;
+
+static uint8_t next(uint32_t *state) {
+    *state ^= *state << 13, *state ^= *state >> 17, *state ^= *state << 5;
+    return *state % 11 ? (uint8_t)(*state >> 8) : 0;
+}
+
+static int open_pair(int *other) {
+    struct termios raw;
+    *other = posix_openpt(O_RDWR | O_NOCTTY);
+    if (*other < 0 || grantpt(*other) || unlockpt(*other)) return -1;
+    int descriptor = open(ptsname(*other), O_RDWR | O_NOCTTY | O_NONBLOCK);
+    if (descriptor < 0 || tcgetattr(descriptor, &raw)) return -1;
+    cfmakeraw(&raw);
+    return tcsetattr(descriptor, TCSANOW, &raw) ? -1 : descriptor;
+}
+
+static void *feed_line(void *nothing) {
+    uint32_t state = 1;
+    uint8_t data[3000];
+    for (size_t sent = 0; sent < count;) {
+        size_t some = 1 + sent % sizeof data, written = 0;
+        some = some < count - sent ? some : count - sent;
+        for (size_t i = 0; i < some; i++) data[i] = next(&state);
+        while (written < some) {
+            ssize_t found = write(master, data + written, some - written);
+            if (found > 0) written += (size_t)found;
+        }
+        sent += some;
+    }
+    return nothing;
+}
+
+static void *look(void *nothing) {
+    static uint8_t out[1 << 17];
+    sheet told = {1, 16, 16, 8, 0, 0, 0, 64, 0x1234};
+    base known;
+    memset(&known, 0, sizeof known);
+    while (!done) {
+        cfpga_newest(line, 0, out);
+        cfpga_notice(line, now_s());
+        cfpga_settle(line, &known);
+        cfpga_sheet(line, &told);
+        cfpga_wait(line, 1000000000, 1, 0.001);
+    }
+    return nothing;
+}
+
+static void *open_and_close(void *nothing) {
+    while (!done) {
+        int other, descriptor = open_pair(&other);
+        port *p = descriptor < 0 ? NULL : cfpga_open(descriptor, now_s());
+        if (!p || write(other, "abc", 4) != 4) abort();
+        cfpga_wait(p, 0, 0, 0.01);
+        cfpga_wake(p);
+        cfpga_close(p);
+        cfpga_free(p);
+        close(descriptor);
+        close(other);
+    }
+    return nothing;
+}
+
+int main(int words, char **word) {
+    pthread_t threads[4];
+    int descriptor = open_pair(&master);
+    count = words > 1 ? strtoul(word[1], NULL, 10) : 0;
+    line = descriptor < 0 ? NULL : cfpga_open(descriptor, now_s());
+    if (!line) return 1;
+    void *(*work[])(void *) = {feed_line, look, open_and_close, open_and_close};
+    for (int i = 0; i < 4; i++)
+        if (pthread_create(&threads[i], NULL, work[i], NULL)) return 1;
+    uint32_t state = 1;
+    uint64_t packets = 0;
+    size_t came = 0;
+    while (came < count) {
+        cfpga_wait(line, packets, 0, 0.01);
+        size_t size = cfpga_waiting(line);
+        if (!size) continue;
+        uint8_t *out = malloc(size);
+        taken told;
+        cfpga_take(line, out, size);
+        memcpy(&told, out, sizeof told);
+        if (told.gap || told.first_byte != came) return 2;
+        const uint8_t *data = out + sizeof told + told.reads * sizeof(read_) + told.packets * (sizeof(fields) + 16) + 8
+            + told.records * 8 * 3;
+        for (uint64_t i = 0; i < told.bytes; i++)
+            if (data[i] != next(&state)) return 3;
+        came += told.bytes;
+        packets = told.first_packet + told.packets;
+        free(out);
+    }
+    done = true;
+    for (int i = 0; i < 4; i++) pthread_join(threads[i], NULL);
+    cfpga_close(line);
+    cfpga_free(line);
+    printf("%zu bytes, %llu packets\n", came, (unsigned long long)packets);
+    return 0;
+}
