@@ -14,9 +14,6 @@ from contactfpga_sim.lab.settle import breaks, tables
 from contactfpga_sim.lab.settle.breaks import HIGH_V, KNOBS, SETTLE_US, SIZE, US
 from contactfpga_sim.lab.settle.tables import NAMES, RowTime
 
-SHOWN_MA = 45
-"""Of the current into a pin; the edge at which a row is selected is cut off."""
-
 COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
 
 
@@ -25,7 +22,7 @@ def draw(folder: Path) -> list[Path]:
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):
-        return [_row(folder / "settle-row.svg"), _breaks(folder / "settle-breaks.svg"), _shorted(folder)]
+        return [_row(folder / "settle-row.svg"), _breaks(folder / "settle-breaks.svg")]
 
 
 def _steps(axes: Any, found: RowTime) -> None:
@@ -101,27 +98,3 @@ def _breaks(path: Path) -> Path:
         axes.grid(visible=True)
         axes.legend(loc="upper left" if late else "lower left")
     return style.save(figure, path)
-
-
-def _shorted(folder: Path) -> Path:
-    figure = style.new(3.6)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    for color, count in zip(COLORS, (1, 3)):
-        found = tables.row_time(tables.sheet(count))
-        label = f"{count} shorted" if count > 1 else "1 shorted diode"
-        upper.plot(US * found.seconds, found.column, color=color, lw=1.8, label=label)
-        lower.plot(US * found.seconds, -found.pin_ma(patterns.middle(SIZE)), color=color, lw=1.8, label="selected row")
-    _steps(upper, found)
-    for start in found.starts_us:
-        lower.axvline(start, color=style.GRID, lw=1)
-    lower.axhline(Circuit().pin_ma, color=style.INK, lw=1, ls=style.DASHES[1])
-    lower.text(0.01, Circuit().pin_ma + 1, "8 mA", color=style.SOFT)
-    _thresholds(upper)
-    upper.set_ylabel("column, V")
-    upper.legend(loc="lower left", bbox_to_anchor=(0.05, 0.0))
-    lower.set_ylabel("into the selected\nrow's pin, mA")
-    lower.set_ylim(-5, SHOWN_MA)
-    most = max(-tables.row_time(tables.sheet(3)).pin_ma(patterns.middle(SIZE)))
-    lower.text(found.starts_us[2] + 0.01, SHOWN_MA, f"to {most:.0f} mA", va="top", color=style.SOFT)
-    lower.set_xlabel("time, µs")
-    return style.save(figure, folder / "settle-shorted.svg")
