@@ -62,6 +62,7 @@ NOT_NOTICED = {
     ("diodes_reversal", "the same with guard lines"): (1, 2),
     ("moving", "`raster`"): (1, 1),
     ("moving", "`adaptive`"): (4, 5),
+    ("moving", "starter kit, 10 N"): (2, 3),
     ("clock", "board with `clock_hz` off"): (0.3, 1),
 }
 """First and last value at which nothing is told; what is neither here nor in TOLD nor always right is never told."""
