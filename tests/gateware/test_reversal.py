@@ -16,9 +16,9 @@ from reversal import (
     slots,
     small,
     touches,
-    zones,
 )
 from toy_labeller import TOY
+from zone_oracles import zones_by_scipy
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Widths
@@ -94,7 +94,7 @@ def check_truth(skin: Skin, timeline: Timeline, trace: Trace, changes: list[tupl
             wanted = [int(sum(1 << int(x) for x in np.flatnonzero(row))) for row in seen]
             assert records == wanted, f"frame with the end mark at {end}"
         elif skin.labeller in ("run", "serial"):
-            assert sorted(moments(skin, one) for one in records) == zones(seen, skin.connectivity), end
+            assert sorted(moments(skin, one) for one in records) == zones_by_scipy(seen, skin.connectivity), end
     return checked
 
 
