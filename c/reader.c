@@ -30,6 +30,7 @@ enum {
     PACKETS = 1 << 14,
     RECORDS = 1 << 14,
     READS = 1 << 13,
+    HELD = 4096,           /* bytes that wait at most of packets that only Python decodes, as in a port's own buffer */
     MANY_PORTS = 8,        /* from here on a turn begins at most every PAUSE_NS */
     PAUSE_NS = 200000
 };
@@ -249,8 +250,15 @@ static void judge(port *p, uint64_t first, const read_ *came) {
     p->at_s = came->at_s;
 }
 
+/* Whether nothing more is read before Python took what waits. It decodes some packets one by one, and while it does a
+ * ring of them would only grow old. */
+static bool held_back(const port *p) {
+    return !p->known && p->head.packets > p->tail.packets && p->head.bytes - p->tail.bytes >= HELD;
+}
+
 /* How full the fullest ring is, of 4. */
 static int quarters(const port *p) {
+    if (held_back(p)) return 4;
     uint64_t most = 4 * (p->head.bytes - p->tail.bytes) / BYTES, found[] = {
         4 * (p->head.packets - p->tail.packets) / PACKETS, 4 * (p->head.records - p->tail.records) / RECORDS,
         4 * (p->reads_head - p->reads_tail) / READS};
@@ -335,7 +343,8 @@ static void *run(void *nothing) {
         for (int i = 0; i < count; i++) {
             port *p = hub.ports[i];
             pthread_mutex_lock(&p->lock);
-            hub.polled[i + 1] = (struct pollfd){p->failure || p->left_out ? -1 : p->descriptor, POLLIN, 0};
+            bool rests = p->failure || p->left_out || held_back(p);
+            hub.polled[i + 1] = (struct pollfd){rests ? -1 : p->descriptor, POLLIN, 0};
             pthread_mutex_unlock(&p->lock);
         }
         pthread_mutex_unlock(&hub.lock);
@@ -489,7 +498,9 @@ void cfpga_sheet(port *p, const sheet *told) {
     hello->fraction_bits = (uint8_t)told->fraction_bits, hello->closed = told->closed;
     hello->zone_capacity = (uint16_t)told->zone_capacity;
     hello->fingerprint[0] = (uint8_t)told->prefix, hello->fingerprint[1] = (uint8_t)(told->prefix >> 8);
+    bool held = held_back(p);
     p->known = told->known;
+    if (held && p->descriptor >= 0) wake_thread();
     p->columns = told->closed ? 4 : 3;
     if (p->known) p->decoder.widths = contactfpga__widths(hello);
     p->clean = false;
@@ -625,6 +636,7 @@ void cfpga_take(port *p, uint8_t *out, size_t room) {
     for (uint64_t i = from.records; i < to.records; i++, out += 8 * p->columns)
         memcpy(out, p->records + 4 * (i % RECORDS), 8 * p->columns);
     copy_bytes(p, from.bytes - told.partial, (size_t)(told.partial + told.bytes), out);
+    if (held_back(p) && p->descriptor >= 0) wake_thread();
     p->tail = to;
     p->reads_tail += told.reads;
     p->gap = false;

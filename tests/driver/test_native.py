@@ -2,6 +2,7 @@
 Python says."""
 
 import asyncio
+import contextlib
 import ctypes
 import dataclasses
 import gc
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+import tty
 
 import pytest
 from byte_histories import SKINS, History
@@ -295,6 +297,37 @@ def test_frames_come_while_no_python_thread_runs(board):
         sender.wait(LONG)
         assert newest.time_us == first.time_us + count * 96
         assert host.stats.lost == 0
+
+
+def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
+    """So a board that sends more than Python decodes fills no ring with frames that grow old."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    packets = 20 * (99 * b"\x55" + b"\0")
+
+    def fill():
+        """Bytes that go in until none has for a while."""
+        total, until = 0, time.monotonic() + 1.0
+        while time.monotonic() < until:
+            with contextlib.suppress(BlockingIOError):
+                total += os.write(master, packets)
+                until = time.monotonic() + 1.0
+            assert total < 1_000_000, "nothing holds it back"
+            time.sleep(1e-4)
+        return total
+
+    port = native.Port(slave, time.monotonic())
+    try:
+        held = fill()
+        assert native.CHUNK < 2 * held < 6 * native.CHUNK
+        reads, _, missing = port.take()
+        assert (missing, len(reads.data_of(0, len(reads))) > 4000) == (0, True)
+        assert fill() > 4000
+    finally:
+        port.close()
+        os.close(master)
+        os.close(slave)
 
 
 @pytest.mark.slow

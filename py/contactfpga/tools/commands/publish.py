@@ -74,10 +74,12 @@ def run(args: argparse.Namespace) -> int:
             ending.callback(transport.close)
             options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
             publishers[BoardPublisher(transport, network, of, **options)] = transport
-        for of in boards:
-            print(f"{NET}{of}" + (f"?connect={here}" if here else ""), flush=True)
-        _warn(args)
-        return _publish(publishers)
+        with interrupt.usual_end():  # from the first line on, which tells that it runs
+            for of in boards:
+                print(f"{NET}{of}" + (f"?connect={here}" if here else ""), flush=True)
+            _warn(args)
+            return _publish(publishers)
+    return 0
 
 
 def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int]]:
@@ -130,7 +132,8 @@ def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
     finally:
         stop.set()
         for thread in threads:
-            thread.join()
+            if thread.ident is not None:  # a signal may come before all are started
+                thread.join()
     return 1 if gone else 0
 
 
