@@ -504,7 +504,7 @@ void cfpga_sheet(port *p, const sheet *told) {
     p->columns = told->closed ? 4 : 3;
     if (p->known) p->decoder.widths = contactfpga__widths(hello);
     p->clean = false;
-    /* What waits is decoded anew where it is read as bytes: see native.py. */
+    /* What waits is decoded again where it is read as bytes: see native.py. */
     for (uint64_t i = p->tail.packets; i < p->head.packets; i++) p->packets[i % PACKETS].frame.valid = 0;
     pthread_mutex_unlock(&p->lock);
 }
