@@ -95,7 +95,7 @@ def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
 @pytest.mark.slow
 def test_what_the_arm_has_done_is_kept(tmp_path):
     def ready(terminal):
-        return any(int(done) >= 3 for done in re.findall(r"(\d+)/191", terminal.said))
+        return any(int(done) >= 3 for done in re.findall(r"(\d+)/\d+", terminal.said))
 
     status, took, said = interrupted(
         ["study", "arm", "--charts", "--output", tmp_path], ready, True, tmp_path / "cache"
@@ -103,14 +103,14 @@ def test_what_the_arm_has_done_is_kept(tmp_path):
     assert_well_ended(status, took, said)
     lines = (tmp_path / "arm-charts-so-far.csv").read_text().splitlines()
     assert len(lines) >= 4
-    assert " ".join(said.split()).count(f"interrupted; {len(lines) - 1} of 191 runs are in") == 1
+    assert len(re.findall(rf"interrupted; {len(lines) - 1} of \d+ runs are in", " ".join(said.split()))) == 1
     assert not (tmp_path / "arm-charts.csv").exists()
 
 
 @pytest.mark.campaign  # it has a board to compile first
 def test_failures_keep_the_rows_that_are_finished(tmp_path):
     def ready(terminal):
-        return any(int(done) >= 1 for done in re.findall(r"(\d+)/36", terminal.said))
+        return any(int(done) >= 1 for done in re.findall(r"(\d+)/\d+", terminal.said))
 
     status, took, said = interrupted(["study", "failures", "--output", tmp_path], ready, True, tmp_path / "cache")
     assert_well_ended(status, took, said)

@@ -179,7 +179,7 @@ def test_figures_command(run, tmp_path, suffix):
     assert status == 0
     found = json.loads(out)
     names = sorted(Path(file).name for file in found["files"])
-    assert names == [f"cover-{name}.{suffix}" for name in ("force", "impact", "line", "map")]
+    assert names == [f"cover-{name}.{suffix}" for name in ("force", "line", "map")]
     before = [Path(file).read_bytes() for file in found["files"]]
     assert min(map(len, before)) > 3000
     assert found["stiffness_n_m"] == pytest.approx(1 / 0.098e-3)
