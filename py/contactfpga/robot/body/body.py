@@ -75,8 +75,8 @@ class Body:
         answer is retried.
 
         Args:
-         joints: a function from a time on the host's clock to the joint angles, for instance a
-         :class:`JointHistory`; without it there are only contacts in the links' frames.
+         joints: a function from a time on the host's clock to the joint angles, for instance a :class:`JointHistory`;
+             without it there are only contacts in the links' frames.
          timeout: seconds for a board's hello.
          period_s: shortest interval of reading a link's newest frame.
         """
