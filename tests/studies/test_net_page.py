@@ -46,15 +46,14 @@ def test_the_picture_shows_the_pages_table(tmp_path):
 
 def test_the_picture_has_the_figures_of_its_rows(tmp_path, monkeypatch):
     """Two links take 8 % each of a publisher's core, and half of the frames 6 ms, three times those of a bare pair."""
-    page = (
-        "<!-- figures: links of 0 -->\n| links | a | b | c | CPU | router | reader | latency | times |\n"
-        "|---|---|---|---|---|---|---|---|---|\n"
-        "| 1 | 1 | 1 | 0 | 9.0 % | 1.0 % | 2.0 % | 5.0 / 9.0 ms | 2.0 / 3.0 |\n"
-        "| 2 | 1 | 1 | 0 | 8.0 % | 1.0 % | 2.0 % | 6.0 / 9.0 ms | 3.0 / 9.0 |\n"
-        "| 2, and one more | 1 | 1 | 0 | 7.0 % | 1.0 % | 2.0 % | 6.0 / 9.0 ms | 3.0 / 9.0 |\n<!-- end -->\n"
+    whole = (
+        "links,a,b,c,CPU,router,reader,latency,times\n"
+        "1,1,1,0,9.0 %,1.0 %,2.0 %,5.0 / 9.0 ms,2.0 / 3.0\n"
+        "2,1,1,0,8.0 %,1.0 %,2.0 %,6.0 / 9.0 ms,3.0 / 9.0\n"
+        '"2, and one more",1,1,0,7.0 %,1.0 %,2.0 %,6.0 / 9.0 ms,3.0 / 9.0\n'
     )
-    (tmp_path / "net.md").write_text(page)
-    monkeypatch.setattr(tables, "PAGE", tmp_path / "net.md")
+    (tmp_path / "net-links.csv").write_text(whole)
+    monkeypatch.setattr(tables, "WHOLE", tmp_path / "net-links.csv")
     seen = {}
     monkeypatch.setattr(tables.style, "save", lambda figure, path: seen.update(figure=figure))
     tables.draw(tmp_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import functools
 from pathlib import Path
 from typing import Any
@@ -92,16 +93,18 @@ def _ms(latency: tuple[float, float]) -> str:
     return " / ".join(f"{1000 * one:.1f}" for one in latency) + " ms"
 
 
-PAGE = Path("docs/net.md")
+WHOLE = Path("docs/tables/net-links.csv")
+"""The whole table of links."""
 ENDS = {"publisher": style.BLUE, "router": style.VERMILLION, "reader": style.GREEN}
 SHARES = {"half arrive (p50)": style.BLUE, "99 % arrive (p99)": style.VERMILLION}
 
 
 def draw(folder: Path) -> Path:
-    """CPU time and latency by number of links, from the page's table of links."""
+    """CPU time and latency by number of links, from :data:`WHOLE`."""
     import matplotlib
 
-    rows = [row for row in _rows(writer.sections(PAGE.read_text(encoding="utf-8"))["links"].text) if row[0].isdecimal()]
+    with WHOLE.open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.reader(file) if row[0].isdecimal()]
     links = [int(row[0]) for row in rows]
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(3.4)
@@ -126,10 +129,6 @@ def draw(folder: Path) -> Path:
             axes.grid(True)
             axes.legend(handlelength=3)
         return style.save(figure, folder / "net.svg")
-
-
-def _rows(table: str) -> list[list[str]]:
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines() if line[:1] == "|"]
 
 
 def _pair(cell: str) -> list[float]:
