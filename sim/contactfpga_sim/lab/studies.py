@@ -285,10 +285,12 @@ _ALL = (
             "bridges": Section(
                 "bridges:bridge_table", kept="1 ms, 0", page="boards.md", sample="bridges:bridge_sample"
             ),
-            "sides": Section("scans:sides_table", sample="scans:sides_sample"),
-            "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table"),
-            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",)),
-            "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",)),
+            "sides": Section("scans:sides_table", sample="scans:sides_sample", kept=NO_ROW),
+            "gain": Section(
+                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole|nothing"
+            ),
+            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
+            "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
         },
     ),
     Study(
