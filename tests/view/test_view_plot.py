@@ -112,8 +112,8 @@ def test_it_is_drawn_and_says_what_is_not_known(tmp_path, late):
     path = plot.draw(Recording(frames, late=late), tmp_path / "plot.svg")
     text = path.read_text()
     assert "made-up.bin: 16x16 cells, 500 frames in 0.5 s" in text
-    assert ("no times of arrival" in text) == (not late)
-    assert re.search(r"how long a barycenter lay in each cell, s", text)
+    assert ("the file has no delays" in text) == (not late)
+    assert re.search(r"how long a barycenter was in each cell, s", text)
     first = path.read_bytes()
     assert plot.draw(Recording(frames, late=late), tmp_path / "again.svg").read_bytes() == first
 
