@@ -31,7 +31,7 @@ OPTIONS = ["-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-pthread
 
 
 def compiler() -> list[str]:
-    """The compiler with its first arguments; empty: there is none."""
+    """Command of a C compiler with its first arguments; empty without a compiler."""
     named = shlex.split(os.environ.get("CONTACTFPGA_CC", ""))
     if named:
         return [] if named == ["none"] else named

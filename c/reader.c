@@ -1,10 +1,11 @@
 /* reader.c: reads the ports of boards in a thread of its own, for py/contactfpga/driver/native.py.
  *
- * One thread reads all ports of a process; who waits for a port reads it meanwhile, which saves a change of threads. It
- * notes when bytes came, decodes the packets that are whole frames of a
- * known sheet, and keeps both in rings, of which the oldest reads are overwritten. What a packet means is for the Python
- * driver to say. It takes what came when it likes; meanwhile the newest frame can be had as long as every packet since
- * continues the frame before it, which is what the driver itself would find (struct base).
+ * One thread reads all ports of a process. A caller that waits for a port reads that port itself, which saves a change of
+ * threads. The reader notes when bytes came, decodes packets that are whole frames of a known sheet, and keeps both in
+ * rings, of which the oldest reads are overwritten. Packets that only Python decodes wait in the system's buffer instead
+ * (held_back). The meaning of a packet is left to the Python driver, which takes what came when it likes. Meanwhile the
+ * newest frame can be read as long as every packet since continues the frame before it, as the driver would find (struct
+ * base).
  *
  * C99 and POSIX threads. All memory is allocated in cfpga_open. Every function may be called by several threads.
  */

@@ -73,12 +73,12 @@ def claims(rng: random.Random, run_before: Path | None) -> list[Finding]:
 
 
 def share(until: float, cores: int, left: int) -> int:
-    """Seconds for the next of so many claims that are left: what others did not need is shared."""
+    """Seconds for the next of ``left`` claims: they share the time that earlier ones did not need."""
     return max(1, round((until - time.monotonic()) * min(1, cores / left)))
 
 
 def tried(claim: dict, limit_s: int) -> Finding:
-    """A claim by the tests of it that end in so many seconds."""
+    """Judge a claim by those of its tests that end within ``limit_s`` seconds."""
     files = {path.stem: path for path in (ROOT / "tests").rglob("test_*.py")}
     named = [(files[file], name) for file, name in (test.split("::") for test in claim["tests"])]
     nodes = [str(path) if name == "*" else f"{path}::{name}" for path, name in named]
@@ -95,7 +95,7 @@ def tried(claim: dict, limit_s: int) -> Finding:
 
 
 def run(command: Sequence[str], said: Path, limit_s: int) -> bool:
-    """Whether a command ends within so many seconds; if not, it and what it started are ended. What it prints goes into
+    """Whether a command ends within ``limit_s`` seconds; otherwise it is killed with its children. Its output goes into
     the file ``said``."""
     with said.open("w") as out:
         process = subprocess.Popen(

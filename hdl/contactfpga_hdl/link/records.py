@@ -25,7 +25,7 @@ def closing_layout(derived: Derived) -> data.StructLayout:
 
 
 def word_bits(derived: Derived) -> int:
-    """Of a record and of what closes a frame: whole bytes."""
+    """Width of a record and of a frame's closing word, in whole bytes, as bits."""
     return 8 * max(derived.item_bytes, math.ceil(closing_layout(derived).size / 8))
 
 

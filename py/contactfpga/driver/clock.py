@@ -364,7 +364,8 @@ class ClockFit:
         return self.line_from(self._newest.device_s, arrived_s) if self._pieces else None
 
     def line_from(self, now_s: float, arrived_s: float) -> HostLine:
-        """The same if the newest arrival was of that time of :meth:`bounds`."""
+        """The host's line for frames that arrived then, if the newest arrival of the fit has the time ``now_s`` of
+        :meth:`bounds`."""
         base_s = self._base_s + now_s + self._bound(now_s) - self._least_s / 2
         base_us = self._base_us + round(now_s * 1e6)
         return HostLine(arrived_s, base_us, base_s, 1.0 + self._slope, math.sqrt(self._variance))
@@ -433,8 +434,9 @@ class HostClock:
     def take_reads(
         self, times_us: np.ndarray, sizes: np.ndarray, arrived_s: np.ndarray, counts: np.ndarray
     ) -> HostLines | None:
-        """The same of reads one after the other, none of which answers a request: when they came, how many frames each
-        had, and time and bytes of the last one of them. There was an arrival before."""
+        """The host's lines of reads in turn, none of which answers a request; None in a recording. ``arrived_s`` and
+        ``counts``: time and number of frames of each read; ``times_us`` and ``sizes``: time and bytes of its last
+        frame. An arrival came before (:attr:`begun`)."""
         if self._fit is None:
             return None
         lines = self._fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
@@ -442,7 +444,7 @@ class HostClock:
 
     @property
     def fit(self) -> ClockFit | None:
-        """None in a recording."""
+        """The fit of the host's clock; None in a recording."""
         return self._fit
 
     @property

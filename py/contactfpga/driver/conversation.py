@@ -123,8 +123,8 @@ class Conversation:
         return events
 
     def receive_runs(self, data: bytes, now: float, decoded: many.PacketTable | None = None) -> list[Event | Run]:
-        """The same, but most of many frames come in runs: those that answer no request that none before them does.
-        ``decoded``: all packets that ``data`` completes, of the sheet and check of the last hello."""
+        """Events of received bytes as :meth:`receive`, with most of many frames in runs: frames that answer no further
+        request. ``decoded``: all packets that ``data`` completes, by the sheet and check of the last hello."""
         packets = self._split(data, now)
         if decoded is not None and len(decoded.packets) != len(packets):
             decoded = None
@@ -138,8 +138,8 @@ class Conversation:
         return events
 
     def receive_reads(self, reads: Reads) -> Iterator[tuple[float, list[Event | Run]]]:
-        """The same of many reads in turn: when what was completed came, and that. Where nothing but frames came of
-        which each continues the one before, many reads give one run."""
+        """Events of many reads in turn, each with the time at which its bytes came, in s. Reads that bring only frames
+        which continue one another give one run."""
         table = reads.decoded
         ends = None if table is None or len(table.packets) < FEW_IN_RUN else _ends(continues(table.packets))
         at = 0
@@ -158,7 +158,7 @@ class Conversation:
             at += 1
 
     def lost_track(self, rest: bytes, missing: int) -> None:
-        """So many bytes came and are gone; the next read completes this packet."""
+        """Count ``missing`` bytes that were overwritten; ``rest`` is the packet that the next read completes."""
         self._rest = rest
         self.stats.bytes += missing
 

@@ -21,7 +21,7 @@ class FrameQueue:
         self.dropped = 0
         """Frames that were not taken in time."""
         self.ahead = 0
-        """So many of the frames that come next were taken already."""
+        """Number of coming frames that the listener has already: they are left out."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
         self._taken = 0  # frames of the run in front
         self._length = 0

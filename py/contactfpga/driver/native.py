@@ -25,7 +25,7 @@ from contactfpga.wire.many import FIELDS, PacketTable
 from contactfpga.zones.run import frame_of
 
 LIBRARY = Path(__file__).with_name("_reader.so")
-"""Where installing puts the library."""
+"""File of the library, put there by the installation."""
 
 CHUNK = 16_384
 """Bytes of a read, at most."""
@@ -121,7 +121,7 @@ def library() -> Library:
 
 
 def missing() -> str:
-    """Why the library cannot be used; empty where it can."""
+    """Why the library cannot be used; empty if it can."""
     if os.name != "posix":
         return "it needs Linux or macOS"
     if not LIBRARY.exists():
@@ -181,15 +181,15 @@ class Port:
             self._library.wake(self._address)
 
     def feed(self, data: bytes, now: float) -> None:
-        """These bytes came, at most :data:`CHUNK`."""
+        """Take bytes in place of the thread, at most :data:`CHUNK`; for tests."""
         self._library.feed(self._address, data, len(data), now)
 
     def wait(self, packets: int, seconds: float) -> None:
-        """Until there are more packets than these since the port was opened, or nothing comes any more."""
+        """Wait for more than ``packets`` packets since the port was opened, for the port's end, or for ``seconds``."""
         self._library.wait(self._address, packets, 0, seconds)
 
     def wait_for_much(self, seconds: float) -> None:
-        """Until so much waits that it has to be taken, or nothing comes any more."""
+        """Wait until a ring is a quarter full, for the port's end, or for ``seconds``."""
         self._library.wait(self._address, 0, 1, seconds)
 
     def paused(self, now: float) -> bool:
@@ -291,11 +291,11 @@ class Port:
         return Newest(*_NEWEST.unpack_from(self._newest_view)) if found else None
 
     def frame(self) -> Any:
-        """That frame, as it came over the wire."""
+        """The newest frame of the last :meth:`newest`, as it came over the wire."""
         return self._frame(0)
 
     def frame_before(self) -> Any:
-        """The one before it."""
+        """The frame before :meth:`frame`."""
         return self._frame(1)
 
     def _frame(self, index: int) -> Any:

@@ -26,7 +26,8 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 SERVE_S = 0.5
-"""How often what came is taken while nobody calls; logs and files of recorded bytes are as late as this."""
+"""Interval of taking what came while nobody calls; logs are as late as this. A file of recorded bytes has
+:data:`contactfpga.driver.link.READ_S`."""
 
 
 class NativePort:
@@ -40,19 +41,20 @@ class NativePort:
         self.core = Port(inner.fileno(), inner.clock())
 
     def read(self, timeout_s: float) -> bytes:
-        raise NotImplementedError("its link takes what came")
+        """Never called: :class:`NativeLink` takes what came from :attr:`core`."""
+        raise AssertionError("a NativeLink takes what came")
 
     def close(self) -> None:
         self.core.close()
         self._inner.close()
 
     def lost(self, failure: int) -> ContactFPGAError:
-        """What is told of a port that is gone; ``failure``: of :attr:`contactfpga.driver.native.Port.failure`."""
+        """The error for a lost port; ``failure`` is :attr:`contactfpga.driver.native.Port.failure`."""
         return self._inner.lost(OSError(failure, os.strerror(failure) if failure > 0 else "it ended"))
 
 
 class NativeLink(Link):
-    """A link with such a port."""
+    """A :class:`~contactfpga.driver.link.Link` to a board on a :class:`NativePort`."""
 
     def __init__(self, port: NativePort, transport: Transport, skin: Skin | None):
         self._port, self._core = port, port.core
@@ -64,7 +66,7 @@ class NativeLink(Link):
 
     @property
     def conversation(self) -> Conversation:
-        """What has been said by now."""
+        """The conversation after all that came by now."""
         self.catch_up()
         return self._said
 
@@ -74,7 +76,7 @@ class NativeLink(Link):
 
     @property
     def last_s(self) -> float:
-        """When a frame came last."""
+        """Time at which the last frame came, in s on the host's clock."""
         self.catch_up()
         return self._last_s
 

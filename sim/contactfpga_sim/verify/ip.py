@@ -113,7 +113,7 @@ def record_fields(skin: Skin) -> dict[str, int]:
 
 
 def closing_fields(skin: Skin) -> dict[str, int]:
-    """The same of what closes a frame."""
+    """Bits of each field of the word that closes a frame, lowest first."""
     return {name: len(Signal(shape)) for name, shape in closing_layout(skin.derived).members.items()}
 
 
@@ -273,7 +273,7 @@ module {NAME}_sva (
 
 
 def _of_records(skin: Skin) -> str:
-    """What holds of the stream of records."""
+    """Assertions about the stream of records, in SystemVerilog."""
     fields = closing_fields(skin)
     place = dict(zip(fields, itertools.accumulate(fields.values(), initial=0), strict=False))
 

@@ -57,7 +57,7 @@ def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.nd
 
 
 def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same where the ends meet: a step more joins the last cluster with the first."""
+    """Clocks of ``run`` on a closed sheet: one more step joins the last cluster with the first."""
     last_step, steps = _strips(frames, connectivity)
     joined = _over_the_seam(frames, connectivity)
     steps = steps + joined
