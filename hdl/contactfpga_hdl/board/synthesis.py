@@ -26,11 +26,11 @@ class Family:
 
 FAMILIES = {
     # No other memory there; left alone, yosys makes small ones of flip-flops.
-    "iCE40UP": Family("synth_ice40", "-abc9 -device u", (NO_COLLISIONS, _BLOCK_RAMS)),
+    "iCE40UP": Family("synth_ice40", "-abc9 -dff -device u", (NO_COLLISIONS, _BLOCK_RAMS)),
     # Flip-flops of a tile share their enable. One that few have leaves places empty, and the HX1K has none to spare.
     # In an FPGA that full the usual router of nextpnr goes on forever for many seeds; this one ends.
     "iCE40HX": Family(
-        "synth_ice40", "-abc9 -device hx -dffe_min_ce_use 6", (NO_COLLISIONS, _BLOCK_RAMS), "--router router2"
+        "synth_ice40", "-abc9 -dff -device hx -dffe_min_ce_use 6", (NO_COLLISIONS, _BLOCK_RAMS), "--router router2"
     ),
     # The products have a few bits each; the way to a multiplier and back takes longer than they do.
     "LFE5U": Family("synth_ecp5", "-nodsp", (NO_COLLISIONS,)),

@@ -72,11 +72,11 @@ def place_of(derived: Derived, column: Value) -> Value:
     return column >> 1 if derived.skin.connectivity == 8 else column
 
 
-def _split(m: Module, bits: Value) -> tuple[Value, Value]:
-    """The lowest set bit alone, and the others."""
-    lowest, others = Signal.like(bits), Signal.like(bits)
-    m.d.comb += [others.eq(bits & (bits - 1)), lowest.eq(bits & ~others)]
-    return lowest, others
+def _without_lowest(m: Module, bits: Value) -> Value:
+    """All bits but the lowest one that is set."""
+    others = Signal.like(bits, name_suffix="_others")
+    m.d.comb += others.eq(bits & (bits - 1))
+    return others
 
 
 def _index(one_hot: Value, width: int) -> Value:
@@ -121,15 +121,23 @@ def over_the_seam(derived: Derived, row: Value, before: Value) -> Value:
 
 
 class _Left:
-    """The part of two rows still to be walked."""
+    """The part of two rows still to be walked.
+
+    An edge is the first column of a run or the one past its last: the new row's runs in one word. What is left
+    without the lowest bits is in registers, so that no clock finds a bit and then decides with it.
+    """
 
     def __init__(self, derived: Derived):
         columns = derived.skin.columns
         self.befores = Signal(columns)  # where runs of the row before start
-        self.starts = Signal(columns)  # where runs of the new row start and stop
-        self.stops = Signal(columns)
-        self.inside = Signal(columns)  # all columns up to the end of the first cluster; none: no work
+        self.befores_later = Signal(columns)  # without the first one
+        self.edges = Signal(columns + 1)
+        self.edges_stop = Signal(columns + 1)  # without the first run's start
+        self.edges_later = Signal(columns + 1)  # without the first run
+        self.inside = Signal(columns)  # all columns up to the end of the first cluster
         self.ends = Signal(columns)  # where the clusters after that one end
+        self.found = Signal()  # a row with clusters was taken; the first one is next
+        self.work = Signal()  # there is a first cluster
         self.last = Signal()  # the new row is the frame's last one
         self.seam = Signal()  # the last cluster goes on in the first one
         self.first = Signal()  # the cluster is the first one
@@ -139,7 +147,7 @@ class _Left:
 class Walk(wiring.Component):
     """Cuts two adjacent rows into steps, one per clock while ``enable`` is high.
 
-    rows (in): taken when the one before is cut.
+    rows (in): taken when the one before is cut. The first step is cut two clocks later.
     step_valid, step (out): one clock after the step is cut.
     """
 
@@ -163,24 +171,22 @@ class Walk(wiring.Component):
         return m
 
     def _walk_clusters(self, m: Module, left: _Left) -> None:
-        work = left.inside[0]
         inside = left.inside
-        before, befores_left = _split(m, left.befores)
-        start, starts_left = _split(m, left.starts)
-        stop, stops_left = _split(m, left.stops)
         has_before = (left.befores & inside).any()
-        has_run = (left.starts & inside).any()
+        has_run = (left.edges & inside).any()
         closes = Signal()
         opens = Signal(init=1)
         step = Signal.like(self.step)
+        start = left.edges & ~left.edges_stop
+        past = left.edges_stop & ~left.edges_later
         m.d.comb += [
-            closes.eq(~(befores_left & inside).any() & ~(starts_left & inside).any()),
-            step.end.eq(~work),
+            closes.eq(~(left.befores_later & inside).any() & ~(left.edges_later & inside).any()),
+            step.end.eq(~left.work),
             step.has_before.eq(has_before),
-            step.before.eq(_index(before, len(step.before))),
+            step.before.eq(_index(left.befores & ~left.befores_later, len(step.before))),
             step.has_run.eq(has_run),
-            step.start.eq(_index(start, len(step.start))),
-            step.stop.eq(_index(stop, len(step.stop))),
+            step.start.eq(_index(start[:-1], len(step.start))),
+            step.stop.eq(_index(past[1:], len(step.stop))),
             step.opens.eq(opens),
             step.closes.eq(closes),
             step.row_done.eq(closes & ~left.ends.any()),
@@ -191,26 +197,39 @@ class Walk(wiring.Component):
             m.d.comb += step.seam.eq(left.seam & left.first)
             with m.If(left.seam & ~left.ends.any() & (has_before | has_run)):
                 m.d.comb += closes.eq(0)
+        edges_stop = _without_lowest(m, left.edges_later)
         with m.If(self.enable):
-            m.d.sync += [self.step.eq(step), self.step_valid.eq(work | left.last)]
-        with m.If(self.enable & work):
-            m.d.sync += opens.eq(closes)
-            with m.If(has_before):
-                m.d.sync += left.befores.eq(befores_left)
-            with m.If(has_run):
-                m.d.sync += [left.starts.eq(starts_left), left.stops.eq(stops_left)]
-            with m.If(closes):
-                if self.derived.skin.closed:
-                    m.d.sync += left.first.eq(0)
-                self._next_cluster(m, left, left.ends)
+            m.d.sync += [self.step.eq(step), self.step_valid.eq(left.work | left.last & ~left.found), left.found.eq(0)]
+            with m.If(left.work):
+                m.d.sync += opens.eq(closes)
+            with m.If(left.found | left.work & has_before):
+                m.d.sync += [
+                    left.befores.eq(left.befores_later),
+                    left.befores_later.eq(_without_lowest(m, left.befores_later)),
+                ]
+            with m.If(left.found | left.work & has_run):
+                m.d.sync += [
+                    left.edges.eq(left.edges_later),
+                    left.edges_stop.eq(edges_stop),
+                    left.edges_later.eq(_without_lowest(m, edges_stop)),
+                ]
+            with m.If(left.found | left.work & closes):
+                upto = Signal.like(left.ends)
+                m.d.comb += upto.eq(left.ends ^ (left.ends - 1))
+                m.d.sync += [
+                    left.work.eq(left.ends.any()),
+                    left.inside.eq(upto),
+                    left.ends.eq(left.ends & ~upto),
+                    left.first.eq(left.found),
+                ]
 
     def _take_row(self, m: Module, left: _Left) -> None:
         row = self.rows.payload
         before = Signal.like(row.cells)  # the row last taken, empty before a frame
-        work = left.inside[0]
-        with m.If(self.enable & ~work):
+        idle = ~left.work & ~left.found
+        with m.If(self.enable & idle):
             m.d.sync += left.last.eq(0)  # its end mark is on its way
-        m.d.comb += self.rows.ready.eq(self.enable & ~work)
+        m.d.comb += self.rows.ready.eq(self.enable & idle)
         taken = self.rows.valid & self.rows.ready
         y = row_number(m, self.derived, row, taken)
         with m.If(taken):
@@ -220,21 +239,13 @@ class Walk(wiring.Component):
             else:
                 joined = row.cells & right_row | before & right_before
             m.d.sync += [
-                left.befores.eq(before & ~(before << 1)),
-                left.starts.eq(row.cells & ~(row.cells << 1)),
-                left.stops.eq(row.cells & ~right_row),
+                left.befores_later.eq(before & ~(before << 1)),
+                left.edges_later.eq(row.cells ^ (row.cells << 1)),
+                left.ends.eq((row.cells | before) & ~joined),
+                left.found.eq((row.cells | before).any()),
                 left.last.eq(row.last),
                 left.y.eq(y),
                 before.eq(Mux(row.last, 0, row.cells)),
             ]
             if self.derived.skin.closed:
-                m.d.sync += [left.seam.eq(over_the_seam(self.derived, row.cells, before)), left.first.eq(1)]
-            row_ends = Signal(len(joined))
-            m.d.comb += row_ends.eq((row.cells | before) & ~joined)
-            self._next_cluster(m, left, row_ends)
-
-    def _next_cluster(self, m: Module, left: _Left, ends: Value) -> None:
-        """The first of the clusters that end here is next."""
-        upto, others = Signal.like(left.ends), Signal.like(left.ends)
-        m.d.comb += [others.eq(ends & (ends - 1)), upto.eq(Mux(ends.any(), ends ^ (ends - 1), 0))]
-        m.d.sync += [left.ends.eq(others), left.inside.eq(upto)]
+                m.d.sync += left.seam.eq(over_the_seam(self.derived, row.cells, before))
