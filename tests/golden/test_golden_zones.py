@@ -189,9 +189,9 @@ def test_known_shapes(art, connectivity, zones):
 )
 def test_step_rule_by_hand(art, connectivity, steps, departures):
     work = labelling(cells_of(art), connectivity)
-    assert work.busy == tuple(count + 1 for count in steps)
-    assert work.end == steps[-1] + 3
-    assert [(zone.row, zone.clock - 2) for zone in work.departures] == departures
+    assert work.busy == tuple(count + 2 if count else 1 for count in steps)
+    assert work.end == work.busy[-1] + 2
+    assert [(zone.row, zone.clock - 3) for zone in work.departures] == departures
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,9 @@ def run_rule(clusters, columns, connectivity):
     for cluster in clusters:
         before = {cell for cell in cluster if cell[0] == 0}
         steps += max(runs(before), runs(cluster - before))
-        done.append(steps + 2)
-    return done, steps + 1, steps + 3
+        done.append(steps + 3)
+    found = bool(clusters)  # a clock to find the first one
+    return done, steps + found + 1, steps + found + 3
 
 
 def serial_rule(clusters, columns, connectivity):

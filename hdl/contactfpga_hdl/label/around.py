@@ -107,22 +107,22 @@ def stored_turns() -> dict[str, int]:
 
 
 def unwrapped(
-    m: Module, derived: Derived, join: data.View, kept: data.View, found: Value, group: data.View
-) -> data.View:
-    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``; returns the table's new value."""
+    m: Module, derived: Derived, join: data.View, kept: data.View, found: Value, group: data.View, stored: data.View
+) -> None:
+    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``; and to what is ``stored`` of it."""
     m.submodules.unwrap = unwrap = Unwrap(derived)
     m.d.comb += [
         unwrap.kept.eq(kept),
         unwrap.found.eq(found),
-        unwrap.joins.eq(join.pop | join.load),
-        unwrap.zone.eq(join.load),
+        unwrap.joins.eq(join.load | join.again),
+        unwrap.zone.eq(join.begun),
         unwrap.cells.eq(join.run.area),
         *(getattr(unwrap, name).eq(join[name]) for name in ("down", "turn", "ring")),
     ]
     m.d.comb += [group[name].eq(unwrap.group[name]) for name in unwrap.group.shape().members]
-    stored = Signal(kept_layout(derived))
-    m.d.comb += [stored.eq(group), stored.back.eq(group.back & ~join.first_turn)]
-    return stored
+    # A zone in the table is on the turn of its first run, a waiting group on that of its first cluster.
+    with m.If(join.first_turn & ~join.place[-1]):
+        m.d.comb += stored.back.eq(0)
 
 
 class Acts(Protocol):

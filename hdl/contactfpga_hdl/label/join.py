@@ -3,29 +3,90 @@
 import math
 from typing import TYPE_CHECKING
 
-from amaranth.hdl import Array, Const, Module, Mux, Signal, Value
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout, waiting
+from contactfpga_hdl.label.steps import join_layout, nesting, place_bits, place_of, step_layout, waiting
 from contactfpga_hdl.util.stack import Stack
 
 if TYPE_CHECKING:
     from contactfpga_hdl.label.around import Turns
 
 
-class _Brackets:
-    """New-row runs with a later or earlier run of the same zone, bit i for the i-th."""
+def _marks_layout(derived: Derived) -> data.StructLayout:
+    """Runs of the new row that a step finds to be one zone, by their numbers: ``last`` and the later ``first`` when
+    two groups become one, ``onto`` and the step's run ``number`` when that one follows."""
+    number = range(_runs(derived))
+    back = {"over_back": 1, "onto_back": 1} if derived.skin.closed else {}  # the later one is a turn further back
+    return data.StructLayout(
+        {
+            "over": 1,
+            "last": number,
+            "first": number,
+            "follows": 1,
+            "onto": number,
+            "number": number,
+            "row_done": 1,
+            **back,
+        }
+    )
 
-    def __init__(self, runs: int):
-        self.after = Signal(runs)  # as known so far
-        self.before = Signal(runs)
-        self.new_after = Signal(runs)  # with this step
-        self.new_before = Signal(runs)
-        self.turned = Signal(runs)  # a turn further back than that earlier one
-        self.new_turned = Signal(runs)
-        self.number = Signal(range(runs))  # of the step's new run
+
+def _runs(derived: Derived) -> int:
+    """The most runs of a row."""
+    return max(1, math.ceil(derived.skin.columns / 2))
+
+
+class Brackets(wiring.Component):
+    """Which runs of a row have an earlier or a later one of their zone in it.
+
+    enable (in): nothing changes without it.
+    marks (in): of a step, all zeros for none. They count from the next clock on.
+    passes (in): the run of the row before is passed.
+    earlier, later (out): it has an earlier, or a later, run of its zone in its row.
+    turned (out): on a sheet whose ends meet, it is a turn further back than the earlier one.
+    """
+
+    def __init__(self, derived: Derived):
+        self.derived = derived
+        super().__init__(
+            {
+                "enable": In(1),
+                "marks": In(_marks_layout(derived)),
+                "passes": In(1),
+                **{name: Out(1) for name in ("earlier", "later", "turned")},
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        late = Signal.like(self.marks)
+        over, follows = late.over, late.follows
+        found = {
+            "earlier": _bit(over, late.first) | _bit(follows, late.number),
+            "later": _bit(over, late.last) | _bit(follows, late.onto),
+        }
+        if self.derived.skin.closed:
+            found["turned"] = _bit(late.over_back, late.first) | _bit(late.onto_back, late.number)
+        with m.If(self.enable):
+            m.d.sync += late.eq(self.marks)
+        for name, bits in found.items():
+            known = Signal(_runs(self.derived), name=f"known_{name}")  # bit i for the new row's i-th run
+            old = Signal.like(known, name=f"old_{name}")  # of the row before, from the run on that is passed next
+            m.d.comb += getattr(self, name).eq(old[0])
+            with m.If(self.enable):
+                m.d.sync += known.eq(known | bits)
+                with m.If(self.passes):
+                    m.d.sync += old.eq(old >> 1)
+                with m.If(late.row_done):
+                    m.d.sync += [old.eq(known | bits), known.eq(0)]
+        return m
+
+
+def _bit(condition: Value, number: Value) -> Value:
+    return Mux(condition, 1 << number, 0)
 
 
 class Join(wiring.Component):
@@ -33,6 +94,7 @@ class Join(wiring.Component):
 
     enable (in): nothing changes without it.
     valid, step (in): from the walk.
+    lookup (out): place of the stored group that is added, if any.
     join_valid, join (out): one clock after the step.
     """
 
@@ -44,18 +106,18 @@ class Join(wiring.Component):
                 "enable": In(1),
                 "valid": In(1),
                 "step": In(step),
+                "lookup": Out(place_bits(derived) + 1),
                 "join_valid": Out(1),
                 "join": Out(join_layout(derived)),
             }
         )
-        self._runs = max(1, math.ceil(derived.skin.columns / 2))  # the most a row can hold
         self._group_layout = data.StructLayout(
             {
                 # zones of the row before with runs to come, and in the first cluster the seam
                 "open": range(nesting(derived) + derived.skin.closed + 1),
                 "has_run": 1,  # in the new row, and then the numbers of the first and the last one
-                "first": range(self._runs),
-                "last": range(self._runs),
+                "first": range(_runs(derived)),
+                "last": range(_runs(derived)),
                 "place": range(derived.open_zones),  # of the first one in the table
                 # turns of the cluster that is walked, and of the first and the last run; a 1 is a turn back
                 **({"turn": 1, "first_turn": 1, "last_turn": 1} if derived.skin.closed else {}),
@@ -64,82 +126,70 @@ class Join(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
+        step = self.step
         m.submodules.stack = stack = Stack(self._group_layout, waiting(self.derived))
-        works = self.enable & self.valid & ~self.step.end
+        m.submodules.brackets = brackets = Brackets(self.derived)
+        works = self.enable & self.valid & ~step.end
         kept = Signal(self._group_layout)  # the group of the cluster being walked
         current = Signal(self._group_layout)
-        with m.If(~self.step.opens):
+        number = Signal(range(_runs(self.derived)))  # of the step's new run
+        with m.If(~step.opens):
             m.d.comb += current.eq(kept)
-        known = _Brackets(self._runs)
-        earlier, later, turned = self._brackets(m, works, known)
-        pop = self.step.has_before & earlier & (current.open == 0)
+        earlier, later = step.has_before & brackets.earlier, step.has_before & brackets.later
+        pop = earlier & (current.open == 0)
+        begun = step.has_before & ~earlier  # the first run of its zone
+        more, fewer = begun & later, earlier & ~later
         turns = None
         if self.derived.skin.closed:
             from contactfpga_hdl.label.around import Turns
 
             turns = Turns(self.derived)
-            with m.If(self.step.opens):
-                m.d.comb += current.open.eq(self.step.seam)
-            m.d.comb += turns.seam.eq(~self.step.has_before & ~self.step.has_run)
-            pop = pop | turns.seam & (stack.level != 0)
-            turns.find(m, current.turn, self.step.has_before & earlier, pop, Const(0), turned)
-            turns.keep(m, works & self.step.has_before, earlier, later)
-        passed = self.step.has_before & ~later  # the last run of its zone
-        begun = self.step.has_before & ~earlier  # the first one
+            with m.If(step.opens):
+                m.d.comb += current.open.eq(step.seam)
+            m.d.comb += turns.seam.eq(~step.has_before & ~step.has_run)
+            pop, fewer = pop | turns.seam & (stack.level != 0), fewer | turns.seam
+            turns.find(m, current.turn, earlier, pop, Const(0), brackets.turned)
+            turns.keep(m, works & step.has_before, earlier, later)
         joined = self._take_in(m, current, pop, stack.top, turns)
-        group = self._add_run(m, joined, known.number)
-        ended = passed & earlier if turns is None else passed & earlier | turns.seam
+        group = self._add_run(m, joined, number)
+        # Whether the group is open is known before the number of its open zones is.
+        stays = Mux(pop, ~(fewer & (stack.top.open == 1)), more | (current.open != 0) & ~(fewer & (current.open == 1)))
+        push = step.closes & stays
         m.d.comb += [
-            group.open.eq(joined.open + (self.step.has_before & ~earlier & later) - ended),
+            group.open.eq(joined.open + more - fewer),
             stack.enable.eq(works),
             stack.pop.eq(pop),
-            stack.push.eq(self.step.closes & (group.open != 0)),
+            stack.push.eq(push),
             stack.entry.eq(group),
+            brackets.enable.eq(self.enable),
+            brackets.passes.eq(works & step.has_before),
         ]
-        self._mark(m, known, current, pop, stack.top, joined, turns)
-        decided = self._decide(m, group, pop, begun)
-        if turns is not None:
-            shares = {"down": turns.down, "turn": turns.turn, "ring": turns.ring, "first_turn": group.first_turn}
-            m.d.comb += [decided[name].eq(share) for name, share in shares.items()]
         with m.If(works):
-            m.d.sync += kept.eq(group)
+            m.d.comb += brackets.marks.eq(self._mark(current, pop, stack.top, joined, number, turns))
+            m.d.sync += [kept.eq(group), number.eq(Mux(step.row_done, 0, number + step.has_run))]
+        decided = self._decide(m, group, push)
+        if turns is not None:
+            shares = {"begun": begun, "down": turns.down, "turn": turns.turn, "ring": turns.ring}
+            m.d.comb += [decided[name].eq(share) for name, share in shares.items()]
+            m.d.comb += decided.first_turn.eq(group.first_turn)
+        place, level = Signal(place_bits(self.derived)), Signal(place_bits(self.derived))
+        pushed = Signal()  # by the step before
+        m.d.comb += [
+            place.eq(place_of(self.derived, step.before)),
+            level.eq(stack.level),
+            self.lookup.eq(Mux(pop, Cat(level, 1), Cat(place, 0))),
+            decided.again.eq(pop & pushed),
+            decided.load.eq(begun | pop & ~pushed),
+        ]
+        # A waiting group's place is the number of groups that wait once it does.
+        with m.If(push):
+            m.d.comb += decided.place.eq(Cat((level + ~pop)[: len(level)], 1))
+        if waiting(self.derived):
+            with m.If(works):
+                m.d.sync += pushed.eq(push)
         with m.If(self.enable):
             m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(decided)]
         return m
-
-    def _brackets(self, m: Module, works: Value, known: _Brackets) -> tuple[Value, Value, Value]:
-        """Whether the step's run of the row before has an earlier, or later, run of its zone in its row, and whether it
-        is a turn further back than the earlier one.
-
-        Bit i belongs to the row's i-th run; those of the row before shift down as its runs are passed.
-        """
-        old_after = Signal(self._runs)  # runs after one of the same zone
-        old_before = Signal(self._runs)  # runs before one of the same zone
-        old_turned = Signal(self._runs)
-        with m.If(works):
-            m.d.sync += [
-                known.after.eq(known.new_after),
-                known.before.eq(known.new_before),
-                known.number.eq(known.number + self.step.has_run),
-            ]
-            with m.If(self.step.has_before):
-                m.d.sync += [old_after.eq(old_after >> 1), old_before.eq(old_before >> 1)]
-            with m.If(self.step.row_done):
-                m.d.sync += [
-                    old_after.eq(known.new_after),
-                    old_before.eq(known.new_before),
-                    known.after.eq(0),
-                    known.before.eq(0),
-                    known.number.eq(0),
-                ]
-        if self.derived.skin.closed:
-            with m.If(works):
-                m.d.sync += known.turned.eq(known.new_turned)
-                with m.If(self.step.has_before):
-                    m.d.sync += old_turned.eq(old_turned >> 1)
-                with m.If(self.step.row_done):
-                    m.d.sync += [old_turned.eq(known.new_turned), known.turned.eq(0)]
-        return old_after[0], old_before[0], old_turned[0]
 
     def _take_in(
         self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: "Turns | None"
@@ -182,42 +232,39 @@ class Join(wiring.Component):
 
     def _mark(
         self,
-        m: Module,
-        known: _Brackets,
         current: data.View,
         pop: Value,
         waiting: data.View,
         joined: data.View,
+        number: Value,
         turns: "Turns | None",
-    ) -> None:
-        """Set the brackets of new-row runs found to be one zone."""
+    ) -> Value:
+        """The new row's runs that the step finds to be one zone."""
+        layout = _marks_layout(self.derived)
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
-        onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
-
-        def bit(condition: Value, number: Value) -> Value:
-            return Mux(condition, 1 << number, 0)
-
-        m.d.comb += [
-            known.new_before.eq(known.before | bit(over, waiting.last) | bit(onto, joined.last)),
-            known.new_after.eq(known.after | bit(over, current.first) | bit(onto, known.number)),
-        ]
+        follows = self.step.has_run & joined.has_run  # the new run follows one of its zone
+        marks = {
+            "over": over,
+            "last": waiting.last,
+            "first": current.first,
+            "follows": follows,
+            "onto": joined.last,
+            "number": number,
+            "row_done": self.step.row_done,
+        }
         if turns is not None:
-            over_back = over & (current.first_turn | turns.down) & ~waiting.last_turn
-            onto_back = onto & joined.turn & ~joined.last_turn
-            back = bit(over_back, current.first) | bit(onto_back, known.number)
-            m.d.comb += known.new_turned.eq(known.turned | back)
+            marks["over_back"] = over & (current.first_turn | turns.down) & ~waiting.last_turn
+            marks["onto_back"] = follows & joined.turn & ~joined.last_turn
+        return Cat(marks[name] for name in layout.members)
 
-    def _decide(self, m: Module, group: data.View, pop: Value, begun: Value) -> data.View:
+    def _decide(self, m: Module, group: data.View, push: Value) -> data.View:
         step = self.step
-        closed = step.closes & (group.open == 0)
+        closed = step.closes & ~push
         decided = Signal(self.join.shape())
         m.d.comb += [
             decided.end.eq(step.end),
             decided.closes.eq(step.closes),
-            decided.pop.eq(pop),
-            decided.load.eq(begun),
-            decided.push.eq(step.closes & (group.open != 0)),
-            decided.store.eq(closed & group.has_run),
+            decided.store.eq(push | closed & group.has_run),
             decided.leaves.eq(step.end | closed & (step.final | ~group.has_run)),
             decided.place.eq(group.place),
         ]

@@ -18,9 +18,8 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.join import Join
-from contactfpga_hdl.label.steps import Walk, join_layout, kept_layout, place_of, step_layout, waiting, zone_of
+from contactfpga_hdl.label.steps import Walk, join_layout, kept_layout, place_bits, zone_of
 from contactfpga_hdl.payloads import labeller_ports, record_layout
-from contactfpga_hdl.util.stack import Stack
 
 
 class RunLabeller(wiring.Component):
@@ -52,7 +51,7 @@ class RunLabeller(wiring.Component):
             join.step.eq(walk.step),
             sums.valid.eq(join.join_valid),
             sums.join.eq(join.join),
-            sums.lookup.eq(walk.step.before),
+            sums.lookup.eq(join.lookup),
         ]
         return m
 
@@ -62,7 +61,7 @@ class Sum(wiring.Component):
 
     enable (in): nothing changes without it.
     valid, join (in): a step's addition to its zone, and the zone's fate.
-    lookup (in): one clock ahead of ``join``, the start of its run of the row before.
+    lookup (in): one clock ahead of ``join``, the place of what it loads.
     records (out): in the clock of the step that closes the zone.
     """
 
@@ -73,7 +72,7 @@ class Sum(wiring.Component):
                 "enable": In(1),
                 "valid": In(1),
                 "join": In(join_layout(derived)),
-                "lookup": In(step_layout(derived)["before"].shape),
+                "lookup": In(place_bits(derived) + 1),
                 "records": Out(stream.Signature(record_layout(derived))),
             }
         )
@@ -83,33 +82,30 @@ class Sum(wiring.Component):
         moments = kept_layout(self.derived)
         join = self.join
         works = self.enable & self.valid & ~join.end
-        m.submodules.stack = stack = Stack(moments, waiting(self.derived))
-        m.submodules.table = table = memory.Memory(shape=moments, depth=self.derived.open_zones, init=[])
+        m.submodules.table = table = memory.Memory(shape=moments, depth=2 << place_bits(self.derived), init=[])
         write = table.write_port()
         read = table.read_port()
         kept = Signal(moments)
         group = Signal(moments)
+        stored = Signal(moments)
+        before = Signal(moments)  # what was stored in the clock before
+        found = Signal(moments)
+        m.d.comb += found.eq(Mux(join.again, before, Mux(join.load, read.data, 0)))
         for name in ("area", "sum_x", "sum_y"):
             # Only the first run of its zone loads, and only the later ones can find it on the stack.
-            before = Mux(join.pop, stack.top[name], Mux(join.load, read.data[name], 0))
-            m.d.comb += group[name].eq((kept[name] + join.run[name]) + before)
-        stored = group
+            m.d.comb += group[name].eq((kept[name] + join.run[name]) + found[name])
+        m.d.comb += stored.eq(group)
         if self.derived.skin.closed:
             from contactfpga_hdl.label.around import unwrapped
 
-            found = Mux(join.pop, stack.top, Mux(join.load, read.data, 0))
-            stored = unwrapped(m, self.derived, join, kept, found, group)
+            unwrapped(m, self.derived, join, kept, found, group, stored)
         with m.If(works):
-            m.d.sync += kept.eq(group)
+            m.d.sync += [kept.eq(group), before.eq(group)]
             with m.If(join.closes):
                 m.d.sync += kept.eq(0)
         m.d.comb += [
-            stack.enable.eq(works),
-            stack.pop.eq(join.pop),
-            stack.push.eq(join.push),
-            stack.entry.eq(group),
             read.en.eq(self.enable),
-            read.addr.eq(place_of(self.derived, self.lookup)),
+            read.addr.eq(self.lookup),
             write.en.eq(works & join.store),
             write.addr.eq(join.place),
             write.data.eq(stored),

@@ -36,17 +36,16 @@ def step_layout(derived: Derived) -> data.StructLayout:
 
 def join_layout(derived: Derived) -> data.StructLayout:
     """A step's addition to its zone, and the zone's fate."""
-    turns = {"down": 1, "turn": 1, "ring": 1, "first_turn": 1}  # docs/labelling.md#around-a-cylinder
+    turns = {"begun": 1, "down": 1, "turn": 1, "ring": 1, "first_turn": 1}  # docs/labelling.md#around-a-cylinder
     return data.StructLayout(
         {
             "end": 1,
             "closes": 1,  # the next step starts from nothing
-            "run": moments_layout(derived),  # add the new run, a group from the stack, and a zone of the row before
-            "pop": 1,
-            "load": 1,
-            "push": 1,  # put what there is on the stack, or into the table, or emit it
-            "store": 1,
-            "place": range(derived.open_zones),
+            "run": moments_layout(derived),  # of the new run, to add
+            "load": 1,  # add the group that was looked up
+            "again": 1,  # add the group that the step before stored
+            "store": 1,  # put what there is in ``place``
+            "place": place_bits(derived) + 1,
             "leaves": 1,
             **(turns if derived.skin.closed else {}),
         }
@@ -65,6 +64,11 @@ def waiting(derived: Derived) -> int:
         return nesting(derived)
     columns = derived.skin.columns
     return (columns + 3) // 4 if derived.skin.connectivity == 8 else columns // 4 + 1
+
+
+def place_bits(derived: Derived) -> int:
+    """Width of a place in each half of the table: of zones in the row before, and of waiting groups."""
+    return max(1, (derived.open_zones - 1).bit_length(), waiting(derived).bit_length())
 
 
 def place_of(derived: Derived, column: Value) -> Value:

@@ -40,8 +40,8 @@ LABELLERS: dict[str, Labeller] = {
             gateware="contactfpga_hdl.label.run:RunLabeller",
             golden="contactfpga_sim.model.golden.label:RUN",
             exact=True,
-            end_clocks=lambda derived: derived.open_zones + derived.skin.closed + 3,
-            row_clocks=lambda derived: derived.open_zones + derived.skin.closed + 1,
+            end_clocks=lambda derived: derived.open_zones + derived.skin.closed + 4,
+            row_clocks=lambda derived: derived.open_zones + derived.skin.closed + 2,
             closed=True,
         ),
         Labeller(

@@ -52,8 +52,7 @@ def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[
 
 def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """``LabellerRule.strips`` of ``run``, for every row of (N, R, C) bool frames."""
-    last_step, steps = _strips(frames, connectivity)
-    return last_step + 2, steps + 1, steps + 3
+    return _run_clocks(*_strips(frames, connectivity))
 
 
 def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -62,7 +61,13 @@ def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray
     joined = _over_the_seam(frames, connectivity)
     steps = steps + joined
     last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
-    return last_step + 2, steps + 1, steps + 3
+    return _run_clocks(last_step, steps)
+
+
+def _run_clocks(last_step: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The first step of a row is two clocks after it, and an empty row below an empty one has none."""
+    busy = steps + 1 + (steps > 0)
+    return last_step + 3, busy, busy + 2
 
 
 def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
