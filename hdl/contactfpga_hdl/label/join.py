@@ -274,14 +274,10 @@ class Join(wiring.Component):
 
     def _run_moments(self, m: Module, run: data.View) -> list:
         """Moments of the new run, whose column sum is a difference of triangular numbers."""
-        start, stop = self.step.start, self.step.stop
-        columns = self.derived.skin.columns
-        up_to = Array(math.comb(column + 1, 2) for column in range(columns))
-        below = Array(math.comb(column, 2) for column in range(columns))
-        length = Signal(range(columns + 1))
-        m.d.comb += length.eq(stop - start + 1)
+        step = self.step
+        below = Array(math.comb(column, 2) for column in range(self.derived.skin.columns + 1))
         return [
-            run.area.eq(length),
-            run.sum_x.eq(up_to[stop] - below[start]),
-            run.sum_y.eq(length * self.step.y),
+            run.area.eq(step.area),
+            run.sum_x.eq(below[step.past] - below[step.start]),
+            run.sum_y.eq(step.area * step.y),
         ]

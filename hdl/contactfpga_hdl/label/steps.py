@@ -22,8 +22,9 @@ def step_layout(derived: Derived) -> data.StructLayout:
             "has_before": 1,
             "before": column,  # start of the run in the row before
             "has_run": 1,
-            "start": column,  # first and last column of the new run
-            "stop": column,
+            "start": column,  # first column of the new run, the one past its last, and how many they are
+            "past": range(derived.skin.columns + 1),
+            "area": range(derived.skin.columns + 1),
             "opens": 1,  # first and last step of a cluster
             "closes": 1,
             "row_done": 1,  # last step of a row
@@ -181,16 +182,17 @@ class Walk(wiring.Component):
         closes = Signal()
         opens = Signal(init=1)
         step = Signal.like(self.step)
-        start = left.edges & ~left.edges_stop
-        past = left.edges_stop & ~left.edges_later
+        start = _index((left.edges & ~left.edges_stop)[:-1], len(step.start))
+        past = _index(left.edges_stop & ~left.edges_later, len(step.past))
         m.d.comb += [
             closes.eq(~(left.befores_later & inside).any() & ~(left.edges_later & inside).any()),
             step.end.eq(~left.work),
             step.has_before.eq(has_before),
             step.before.eq(_index(left.befores & ~left.befores_later, len(step.before))),
             step.has_run.eq(has_run),
-            step.start.eq(_index(start[:-1], len(step.start))),
-            step.stop.eq(_index(past[1:], len(step.stop))),
+            step.start.eq(start),
+            step.past.eq(past),
+            step.area.eq(past - start),
             step.opens.eq(opens),
             step.closes.eq(closes),
             step.row_done.eq(closes & ~left.ends.any()),

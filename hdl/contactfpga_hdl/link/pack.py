@@ -148,7 +148,7 @@ class Packer(wiring.Component):
         place = Signal.like(write.offset, init=1)
         longest = min(FULL_BLOCK, self.derived.max_stored_bytes)
         length = Signal(range(longest + 1), init=1)
-        full = length == FULL_BLOCK
+        full = Signal()  # the block is as long as one may be
         ends_block = Signal()
         m.d.comb += [
             ends_block.eq(commit | full | (plain.payload == 0)),
@@ -159,10 +159,10 @@ class Packer(wiring.Component):
             write.data.eq(Mux(ends_block, length, plain.payload)),
         ]
         with m.If(restart):
-            m.d.sync += [code.eq(0), place.eq(1), length.eq(1)]
+            m.d.sync += [code.eq(0), place.eq(1), length.eq(1), full.eq(0)]
         with m.Elif(plain.valid):
             m.d.sync += place.eq(place + 1)
             with m.If(ends_block):
-                m.d.sync += [code.eq(place), length.eq(1)]
+                m.d.sync += [code.eq(place), length.eq(1), full.eq(0)]
             with m.Else():
-                m.d.sync += length.eq(length + 1)
+                m.d.sync += [length.eq(length + 1), full.eq(length == FULL_BLOCK - 1)]

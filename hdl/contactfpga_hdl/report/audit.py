@@ -195,19 +195,19 @@ class Counts(wiring.Component):
         return m
 
     def _explain(self, m: Module, tally: Tally) -> None:
-        """Add counted cells and subtract passing zones, which pause the counting."""
+        """Add counted cells and, a clock after they pass, subtract zones, which pauses the counting."""
         cells = Signal.like(self.cells)
         unexplained = Signal(moments_layout(self.derived))
-        m.d.comb += tally.hold.eq(self.zone_valid)
-        with m.If(~self.zone_valid):
+        passed, zone = Signal(), Signal.like(self.zone)
+        m.d.sync += [passed.eq(self.zone_valid), zone.eq(self.zone)]
+        m.d.comb += tally.hold.eq(passed)
+        with m.If(~passed):
             m.d.sync += cells.eq(cells + tally.moments.area)
         for name in ("area", "sum_x", "sum_y"):
-            less = self.zone_valid.replicate(len(self.zone[name]))
-            share = Mux(self.zone_valid, self.zone[name], tally.moments[name])
+            less = passed.replicate(len(zone[name]))
+            share = Mux(passed, zone[name], tally.moments[name])
             # One adder does both: minus a number is plus its complement and one.
-            m.d.sync += unexplained[name].eq(
-                (Cat(self.zone_valid, unexplained[name]) + Cat(self.zone_valid, share ^ less))[1:]
-            )
+            m.d.sync += unexplained[name].eq((Cat(passed, unexplained[name]) + Cat(passed, share ^ less))[1:])
         ended = Signal()
         m.d.sync += ended.eq(self.ends | ended & tally.busy)
         with m.If(ended & ~tally.busy):

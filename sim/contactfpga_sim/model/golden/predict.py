@@ -245,7 +245,7 @@ class RowPipeline:
 
     def _counted(self) -> int:
         """The cycle from which a row with a pressed cell can be counted: after the previous row's groups of columns,
-        counted in clocks without a zone."""
+        counted in clocks without a zone that passed in the clock before."""
         pressed = [index for index, row in enumerate(self._cells) if row.any()]
         if not pressed:
             return 0
@@ -253,7 +253,8 @@ class RowPipeline:
         passing: set[int] = set()
         if self._facts.zones:
             work = self._work([*self._cells, np.zeros_like(self._cells[0])])
-            passing = {self._handed[zone.row] + zone.clock for zone in work.departures if zone.row < len(self._handed)}
+            handed = self._handed
+            passing = {handed[zone.row] + zone.clock + 1 for zone in work.departures if zone.row < len(handed)}
         left = 1 + self._facts.column_groups
         while left:
             left -= cycle not in passing
