@@ -74,14 +74,15 @@ class Brackets(wiring.Component):
             m.d.sync += late.eq(self.marks)
         for name, bits in found.items():
             known = Signal(_runs(self.derived), name=f"known_{name}")  # bit i for the new row's i-th run
+            new = Signal.like(known, name=f"new_{name}")
             old = Signal.like(known, name=f"old_{name}")  # of the row before, from the run on that is passed next
-            m.d.comb += getattr(self, name).eq(old[0])
+            m.d.comb += [new.eq(known | bits), getattr(self, name).eq(old[0])]
             with m.If(self.enable):
-                m.d.sync += known.eq(known | bits)
+                m.d.sync += known.eq(new)
                 with m.If(self.passes):
                     m.d.sync += old.eq(old >> 1)
                 with m.If(late.row_done):
-                    m.d.sync += [old.eq(known | bits), known.eq(0)]
+                    m.d.sync += [old.eq(new), known.eq(0)]
         return m
 
 

@@ -5,9 +5,9 @@ from functools import partial
 from amaranth.hdl import Array, Const, Mux, Signal, Value
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.label.join import Join
+from contactfpga_hdl.label.join import Brackets, Join
 from contactfpga_hdl.label.run import RunLabeller, Sum
-from contactfpga_hdl.label.steps import Walk, place_of, waiting
+from contactfpga_hdl.label.steps import Walk, place_bits, place_of, waiting
 from contactfpga_hdl.util.stack import Stack
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
@@ -53,23 +53,26 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
     with m.If(works & stack.push & ~stack.pop):
         proof.claim(stack.level < waiting(derived))
 
-    # Which places of the table hold an open zone; all of it comes one clock after the stack of `join`.
+    # Which places of the table hold an open zone or a waiting group; one clock after the stack of `join`.
     summing = join.join_valid & ~joined.end
-    load_place = proof.before(place_of(derived, step.before))
-    live, taken, stored = (Signal(derived.open_zones, name=name) for name in ("live", "taken", "stored"))
+    half = 1 << place_bits(derived)
+    lookup = proof.before(join.lookup)
+    live, taken, read, stored = (Signal(2 * half, name=name) for name in ("live", "taken", "read", "stored"))
     m.d.comb += [
-        taken.eq(Mux(summing & joined.load, Const(1) << load_place, 0)),
+        taken.eq(Mux(summing & (joined.load | joined.again), Const(1) << lookup, 0)),
+        read.eq(Mux(joined.load, taken, 0)),
         stored.eq(Mux(summing & joined.store, Const(1) << joined.place, 0)),
     ]
     m.d.sync += live.eq((live & ~taken) | Mux(joined.leaves, 0, stored))  # in the last row zones are stored, too
     proof.claim((taken & ~live) == 0)
-    proof.claim((taken & proof.before(stored)) == 0)  # its word was read in the clock before
+    proof.claim((read & proof.before(stored)) == 0)  # its word was read in the clock before
     proof.claim((live & ~taken & stored) == 0)
+    with m.If(summing & joined.again):
+        proof.claim(taken == proof.before(stored))
     with m.If(summing & joined.store):
-        proof.claim(joined.place < derived.open_zones)
-    summed_level = inside.part("sum.stack").level
+        proof.claim(Mux(joined.place[-1], joined.place[:-1] <= waiting(derived), joined.place < derived.open_zones))
     with m.If(join.join_valid & joined.end):
-        proof.claim((live == 0) & (summed_level == 0))
+        proof.claim(live == 0)
 
     # Between two rows nothing is known of the one before but its brackets, and they nest.
     walked, walked_last = Signal(columns), Signal()  # the row in the walk
@@ -81,31 +84,51 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
         m.d.sync += midst.eq(~step.row_done)
         with m.If(step.row_done):
             m.d.sync += open_row.eq(Mux(step.final, 0, stepped))
-    nests, first_runs = _brackets(m, open_row, inside["join.old_after"], inside["join.old_before"])
+    earlier, later, known = brackets_of(inside)
+    nests, first_runs = _brackets(m, open_row, earlier, later)
     places = (Mux(is_first, 1 << place_of(derived, x), 0) for x, is_first in enumerate(first_runs))
     open_places = sum(places, Const(0, derived.open_zones))  # no two are the same
     with m.If(~midst):
         proof.lemma((open_row == 0) | nests)
         proof.lemma(stack.level == 0)
-        proof.lemma((inside["join.after"] == 0) & (inside["join.before"] == 0) & (inside["join.number"] == 0))
+        proof.lemma((known == 0) & (inside["join.number"] == 0) & ~inside["join.pushed"])
+    with m.If(inside["join.brackets.late.row_done"]):
+        proof.lemma(~works & ~midst)
     with m.If(~proof.before(midst)):
-        proof.lemma(live == proof.before(open_places))
-    proof.lemma(summed_level == proof.before(stack.level))
+        proof.lemma(live[:half] == proof.before(open_places))
+    proof.lemma(live[half:] == proof.before((Const(2) << stack.level) - 2))
     with m.If(step_valid & step.end):
         proof.lemma(~midst & (open_row == 0))
     proof.lemma(inside["walk.before"] == Mux(walked_last, 0, walked))
-    with m.If((midst | works) & ~(works & step.row_done)):
-        proof.lemma(inside["walk.inside"][0])
-    proof.lemma(mask_of_first_cluster(inside))
-    with m.If(~inside["walk.inside"][0]):
+    with m.If(midst | works):
+        proof.lemma(~inside["walk.found"] & (inside["walk.work"] == ~(works & step.row_done)))
+    proof.lemma(walk_is_sound(inside))
+    with m.If(~inside["walk.work"]):
         proof.lemma(inside["walk.opens"])
-        proof.lemma(inside["walk.before"] == Mux(works, Mux(step.final, 0, stepped), open_row))
+        with m.If(~inside["walk.found"]):
+            proof.lemma(inside["walk.before"] == Mux(works, Mux(step.final, 0, stepped), open_row))
 
 
-def mask_of_first_cluster(labeller: Inside):
-    """Whether the walk's mask is a run of ones from column 0 on, followed by the other clusters' ends."""
+def walk_is_sound(labeller: Inside):
+    """Whether the walk's mask is a run of ones from column 0 on, followed by the other clusters' ends, and what is
+    left without the lowest bits is that."""
     inside, ends = labeller["walk.inside"], labeller["walk.ends"]
-    return ((inside & (inside + 1)) == 0) & ((ends & inside) == 0) & (inside[0] | (ends == 0))
+    work, found = labeller["walk.work"], labeller["walk.found"]
+    before, before_later = labeller["walk.befores"], labeller["walk.befores_later"]
+    edges, stop, later = (labeller[f"walk.{name}"] for name in ("edges", "edges_stop", "edges_later"))
+    first = (inside & (inside + 1) == 0) & (ends & inside == 0) & inside[0]
+    left = (before_later == (before & before - 1)) & (stop == (edges & edges - 1)) & (later == (stop & stop - 1))
+    return Mux(work, ~found & first & left, found == ends.any())
+
+
+def brackets_of(labeller: Inside):
+    """Which runs of the row before have an earlier and a later one, and what is known of the new row, once the marks
+    of the last step count."""
+    done = labeller["join.brackets.late.row_done"]
+    new = [labeller[f"join.brackets.new_{name}"] for name in ("earlier", "later")]
+    old = [labeller[f"join.brackets.old_{name}"] for name in ("earlier", "later")]
+    earlier, later = (Mux(done, after, before) for after, before in zip(new, old, strict=True))
+    return earlier, later, Mux(done, 0, new[0] | new[1])
 
 
 def _brackets(m, row, earlier, later):
@@ -172,8 +195,8 @@ def _pushed_in_a_stall(level, inside: Inside):
 
 
 _OVERFLOW_BUGS = (
-    Bug("brackets forgotten", Join, "old_before",
-        lambda brackets, inside: Mux(inside.component.step.row_done, 0, brackets)),
+    Bug("brackets forgotten", Brackets, "old_later",
+        lambda brackets, inside: Mux(inside["late.row_done"], 0, brackets)),
     Bug("never pushed", Join, "push", lambda *_: 0),
     Bug("always in the first place", Join, "decided.place", lambda *_: 0),
     Bug("the last row is a row like others", Walk, "last", lambda *_: 0),
@@ -189,11 +212,11 @@ _STALL_BUGS = (
     Bug("the stack runs on", Stack, "level", _pushed_in_a_stall),
     Bug("the table is written", Sum, "write__en",
         lambda _, inside: inside.component.valid & ~inside.component.join.end & inside.component.join.store),
-    Bug("rows are taken", Walk, "rows__ready", lambda _, inside: ~inside["inside"][0]),
+    Bug("rows are taken", Walk, "rows__ready", lambda _, inside: ~inside["work"]),
 )  # fmt: skip
 _END_BUGS = (
     Bug("no mark after the first row", Walk, "step_valid",
-        lambda valid, inside: valid & (inside["inside"][0] | inside["y"].any() | ~inside.component.enable)),
+        lambda valid, inside: valid & (inside["work"] | inside["y"].any() | ~inside.component.enable)),
     Bug("the mark comes again", Walk, "last", lambda last, inside: last | inside["last"]),
 )  # fmt: skip
 CASES = (
@@ -201,13 +224,13 @@ CASES = (
         ProofCase("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected",
                   partial(nothing_overflows, columns=columns, connectivity=connectivity), clocks,
                   _OVERFLOW_BUGS if (columns, connectivity) == (4, 8) else (), bug_clocks=14, campaign=columns == 8)
-        for columns, connectivity, clocks in ((4, 8, 9), (4, 4, 12), (8, 8, 14), (8, 4, 24))
+        for columns, connectivity, clocks in ((4, 8, 11), (4, 4, 14), (8, 8, 16), (8, 4, 26))
     ),
     *(
         ProofCase("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected, closed",
                   partial(nothing_overflows, columns=columns, connectivity=connectivity, closed=True), clocks,
                   _OVERFLOW_BUGS[:2] if columns == 4 else (), bug_clocks=14, campaign=True)
-        for columns, connectivity, clocks in ((3, 8, 9), (4, 8, 10), (4, 4, 13))
+        for columns, connectivity, clocks in ((3, 8, 11), (4, 8, 12), (4, 4, 15))
     ),
     ProofCase("a stall changes nothing", "8 columns, 8-connected, closed",
               partial(stalls_change_nothing, columns=8, connectivity=8, closed=True), 2),

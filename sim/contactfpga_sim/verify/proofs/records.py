@@ -5,13 +5,13 @@ from functools import partial
 from amaranth.hdl import Cat, Const, Mux, Signal
 
 from contactfpga_hdl.label.around import Unwrap
-from contactfpga_hdl.label.join import Join
+from contactfpga_hdl.label.join import Brackets, Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import Walk, place_of
 from contactfpga_hdl.payloads import zone_layout
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
-from contactfpga_sim.verify.proofs.label import mask_of_first_cluster, rows_into, skin_of
+from contactfpga_sim.verify.proofs.label import rows_into, skin_of, walk_is_sound
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.zones import (
     OpenRow,
@@ -91,28 +91,30 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
     later = [starts[x] & (open_row.reach[x] & starts)[x + 1 :].any() for x in columns]
     words = [inside.word("sum.table", place) for place in range(dut.derived.open_zones)]
     with m.If(rest):
-        for brackets, ones in (("join.old_after", earlier), ("join.old_before", later)):
+        for brackets, ones in (("earlier", earlier), ("later", later)):
             for x in columns:
-                proof.lemma(~starts[x] | (inside[brackets].bit_select(numbers[x], 1) == ones[x]))
+                known = inside[f"join.brackets.old_{brackets}"].bit_select(numbers[x], 1)
+                proof.lemma(~starts[x] | (known == ones[x]))
         for x in columns:
             with m.If(starts[x] & ~earlier[x]):
                 word, moments = words[place_of(dut.derived, x)], open_row.moments[x].as_value()
                 proof.lemma(word[: len(moments)] == moments)
         if isinstance(open_row, TurnedRow):
-            proof.lemma(inside["join.turned"] == 0)
-            turned = inside["join.old_turned"]
+            proof.lemma(inside["join.brackets.known_turned"] == 0)
+            turned = inside["join.brackets.old_turned"]
             for x in columns:
                 with m.If(starts[x]):
                     linked = turned.bit_select(numbers[x], 1)
                     turns_are_known(proof, open_row, x, words[place_of(dut.derived, x)], linked)
-        proof.lemma((inside["join.after"] == 0) & (inside["join.before"] == 0) & (inside["join.number"] == 0))
-        proof.lemma(inside["sum.kept"] == 0)
-        proof.lemma((inside.part("join.stack").level == 0) & (inside.part("sum.stack").level == 0))
+        known = inside["join.brackets.known_earlier"] | inside["join.brackets.known_later"]
+        proof.lemma((known == 0) & (inside["join.brackets.late"] == 0) & (inside["join.number"] == 0))
+        proof.lemma((inside["sum.kept"] == 0) & ~inside["join.pushed"])
+        proof.lemma(inside.part("join.stack").level == 0)
     with m.If(idle):
         proof.lemma(~inside["walk.last"] & ~inside.part("walk").step_valid & ~join.join_valid)
-        proof.lemma(~inside["walk.inside"][0] & (inside["walk.before"] == open_row.cells))
-    proof.lemma(mask_of_first_cluster(inside))
-    with m.If(~inside["walk.inside"][0]):
+        proof.lemma(~inside["walk.work"] & ~inside["walk.found"] & (inside["walk.before"] == open_row.cells))
+    proof.lemma(walk_is_sound(inside))
+    with m.If(~inside["walk.work"]):
         proof.lemma(inside["walk.opens"])
     open_rows_agree(proof, open_row)
     if isinstance(open_row, TurnedRow):
@@ -122,21 +124,20 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
 def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:
     """Lemmas in the clock after a row's handover, when the walk has all of it ahead."""
     walk = inside.part("walk")
-    proof.lemma(inside["walk.befores"] == (before & ~(before << 1)))
+    proof.lemma(inside["walk.befores_later"] == (before & ~(before << 1))[: len(before)])
     proof.lemma((inside["walk.last"] == last) & (inside["walk.y"] == y))
-    proof.lemma((inside["walk.starts"] == (row & ~(row << 1))) & (inside["walk.stops"] == (row & ~(row >> 1))))
+    proof.lemma(inside["walk.edges_later"] == (row ^ (row << 1)))
     if dut.derived.skin.connectivity == 8:
         joined = (row | before) & ((row | before) >> 1)
     else:
         joined = row & (row >> 1) | before & (before >> 1)
     ends = (row | before) & ~joined
-    proof.lemma(inside["walk.ends"] == (ends & (ends - 1)))
-    proof.lemma(inside["walk.inside"] == Mux(ends == 0, 0, ends ^ (ends - 1)))
+    proof.lemma((inside["walk.ends"] == ends) & (inside["walk.found"] == (ends != 0)))
     proof.lemma(~walk.step_valid | walk.step.end)
     if dut.derived.skin.closed:
         eight = dut.derived.skin.connectivity == 8
         over = (row | before)[0] & (row | before)[-1] if eight else row[0] & row[-1] | before[0] & before[-1]
-        proof.lemma((inside["walk.seam"] == over) & inside["walk.first"])
+        proof.lemma(inside["walk.seam"] == over)
 
 
 def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int, closed: bool = False) -> None:
@@ -155,29 +156,20 @@ def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int
     proof.claim(found == (flood_around if closed else flood_fill)(m, derived, frame, wanted))
 
 
-def _takes(inside: Inside):
-    return inside["rows__ready"] & inside.component.rows.valid
-
-
-def _clusters_end_early(columns, inside: Inside):
-    """Whether clusters end early, with the first run of the row before, or else of the new row."""
-    before, row = inside["before"], inside.component.rows.payload.cells
-    ends = (before & ~(before >> 1))[: len(before)]
-    return Mux(_takes(inside), Mux(ends == 0, row | before, ends ^ ends - 1), columns)
-
-
 def _seam_forgotten(seam, inside: Inside):
     return seam & ~inside["last"]
 
 
 _BUGS = (
-    Bug("clusters end with the row before", Walk, "inside", _clusters_end_early),
+    Bug("a row's first cluster ends a column early", Walk, "inside",
+        lambda columns, inside: Mux(inside["found"], columns >> 1, columns)),
     Bug("always in the first row", Walk, "y", lambda *_: 0),
-    Bug("the group on the stack is forgotten", Join, "decided.pop", lambda *_: 0),
+    Bug("the group that waits is forgotten", Join, "lookup", lambda place, _: place[:-1]),
+    Bug("what was just stored is forgotten", Join, "decided.again", lambda *_: 0),
     Bug("the table is not read", Join, "decided.load", lambda *_: 0),
     Bug("a zone leaves a row early", Join, "decided.leaves",
         lambda leaves, inside: leaves | inside["decided.closes"] & inside["decided.store"]),
-    Bug("runs do not join", Join, "new_before", lambda _, inside: inside["before"]),
+    Bug("runs do not join", Brackets, "new_later", lambda _, inside: inside["known_later"]),
 )  # fmt: skip
 _CLOSED_BUGS = (
     Bug("the seam is forgotten in a last row", Walk, "seam", _seam_forgotten),
