@@ -94,13 +94,6 @@ def longest(text):
     return max((table.count("\n") - 2 for table in re.findall(r"(?:^\|.*\|\n)+", f"{text}\n", re.MULTILINE)), default=0)
 
 
-def widest(text):
-    """Columns of the longest table."""
-    return (
-        max(re.findall(r"(?:^\|.*\|\n)+", f"{text}\n", re.MULTILINE), key=len, default="").partition("\n")[0].count("|")
-    )
-
-
 @pytest.mark.parametrize(
     ("study", "name"),
     [(study, name) for study in DECLARED for name, section in study.sections.items() if section.kept or section.heads],
@@ -114,7 +107,7 @@ def test_a_page_keeps_what_its_study_declares(study, name, tmp_path):
     assert text == writer.sections((DOCS / page).read_text())[name].text
     assert file.read_text() == (DOCS / beside.FOLDER / file.name).read_text()
     assert (longest(text) < longest(section(page, name))) == bool(declared.kept)
-    assert (widest(text) < widest(section(page, name))) == bool(declared.heads) or declared.kept == NO_ROW
+    assert (" columns](" in text) == bool(declared.heads)
     assert bool(longest(text)) == (declared.kept != NO_ROW)
 
 

@@ -15,19 +15,25 @@ _ALL = (
             "places": Section(
                 "tables:places_table",
                 kept=r"^\| (flush, .*|buttons|tiles) \| 10 \| 1 \| 5 |^\| tiles \| 6.4 \| 0.4 \| 5 ",
+                heads="^(?!pressed|limit alone)",
             ),
             "effects": Section(
                 "tables:effects_table",
                 kept=NO_ROW,
             ),
-            "set": Section("tables:set_table", kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)"),
+            "set": Section(
+                "tables:set_table",
+                kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)",
+                heads="^$|^(paper|set|6 ms|UART|pin|limit)",
+            ),
             "sheet": Section("tables:sheet_table"),
             "speeds": Section("tables:speed_table"),
             "defense": Section("tables:defense_table", kept="switch"),
-            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit"),
+            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit", heads="^(?!indent)"),
             "failures": Section(
                 "tables:failure_table",
                 kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
+                heads="^$|reacts|because|peak|reversals",
             ),
             "steps": Section("tables:step_table", kept=NO_ROW),
         },
@@ -41,8 +47,10 @@ _ALL = (
         minutes=4,
         sections={
             "outages": Section("tables:outages_table", kept="unplugged|sends nothing|another Skin"),
-            "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6"),
-            "folds": Section("tables:folds_table", kept=r"^\| [25] ", sample="tables:folds_sample"),
+            "registration": Section(
+                "tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6", heads="^(?!wrongly|residual)"
+            ),
+            "folds": Section("tables:folds_table", kept=r"^\| 5 ", sample="tables:folds_sample"),
         },
         pictures="tables:draw",
         extra="test",
@@ -63,15 +71,21 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section("tables:front_table", kept=r"\*\*"),
+            "front": Section("tables:front_table", kept=r"\*\*", heads="family|method|touch|miscounted|missed|barycenter"),
             "families": Section(
                 "tables:families_table",
-                kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
+                kept=r"^\| (run, 6.4 mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
             ),
-            "methods": Section("tables:methods_table", kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|"),
-            "host": Section("tables:host_table", kept=r"\| (9|10|28|29|91|92) \|"),
-            "floor": Section("limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm"),
-            "other_ways": Section("limits:rivals_section", kept="6.4 mm"),
+            "methods": Section(
+                "tables:methods_table",
+                kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|",
+                heads="method|touch|alone|miscounted|barycenter|LUT4",
+            ),
+            "host": Section("tables:host_table", kept=r"\| (10|29|92) \|", heads="^(?!labelled|faster)"),
+            "floor": Section(
+                "limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm", heads="^(?!cover|felt|saved)"
+            ),
+            "other_ways": Section("limits:rivals_section", kept="6.4 mm", heads="^(?!pitch|missed|lines)"),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -103,7 +117,12 @@ _ALL = (
         page="cover.md",
         minutes=3,
         sections={
-            "closes": Section("caps:felt_table", kept="6.4 mm|10 mm.*the paper", sample="caps:felt_sample"),
+            "closes": Section(
+                "caps:felt_table",
+                kept="6.4 mm|10 mm.*the paper",
+                heads="pitch|presses|50 %|99 %",
+                sample="caps:felt_sample",
+            ),
             "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
@@ -111,10 +130,16 @@ _ALL = (
             "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
             "sense": Section("tables:sense_table", kept=r"^\| (halfspace|bonded), point \| R\* = 2 mm"),
             "thinning": Section(
-                "tables:thinning_table", kept=r"^\| (6|0.895|0.252) ms", sample="tables:thinning_table"
+                "tables:thinning_table",
+                kept=r"^\| (6|0.895|0.252) ms",
+                heads="^(?!the paper|in the)",
+                sample="tables:thinning_table",
             ),
             "foams": Section(
-                "tables:foam_table", kept=r"^\| (PORON 4701-30, 320|Plastazote|Sylodyn)", sample="tables:foam_table"
+                "tables:foam_table",
+                kept=r"^\| (PORON 4701-30, 320|Plastazote|Sylodyn)",
+                heads="^(?!source)",
+                sample="tables:foam_table",
             ),
         },
         pictures="tables:draw",
@@ -133,9 +158,13 @@ _ALL = (
         page="failures.md",
         minutes=10,
         sections={
-            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed"),
+            "failures": Section(
+                "tables:table",
+                kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed",
+                heads="knob|until|at|helps",
+            ),
             "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
-            "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)"),
+            "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)", heads="knob|why"),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
@@ -161,8 +190,8 @@ _ALL = (
         minutes=30,
         sections={
             "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table", kept="of registers"),
-            "modules": Section("tables:modules_table", kept="(scan|label) .*`"),
+            "flipped": Section("tables:designs_table", kept="of registers", heads="^(?!bits|flips)"),
+            "modules": Section("tables:modules_table", kept="(scan|label) .*`", heads="^(?!masked)"),
             "ways": Section("tables:ways_table", kept="silently wrong"),
         },
         compute="tables:compute",
@@ -176,9 +205,9 @@ _ALL = (
         minutes=5,
         sections={
             "layouts": Section("tables:layouts_table", kept="at one end|best of all", sample="tables:layouts_table"),
-            "places": Section("tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)"),
-            "wrong": Section("tables:wrong_table", kept="30 %|drifted"),
-            "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|"),
+            "places": Section("tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)", heads="^(?!over)"),
+            "wrong": Section("tables:wrong_table", kept="30 %|drifted", heads="not|^error|radius|covers|reports"),
+            "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|", heads="method|2 ms|15 ms"),
             "pairs": Section("tables:pairs_table", kept="60 mm"),
             "limits": Section("tables:limits_table"),
             "breaks": Section("tables:breaks_table", page="haptics_limits.md", kept=r"^\| \["),
@@ -287,7 +316,7 @@ _ALL = (
             ),
             "sides": Section("scans:sides_table", sample="scans:sides_sample", kept=NO_ROW),
             "gain": Section(
-                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole|nothing"
+                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole"
             ),
             "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
             "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
@@ -301,8 +330,8 @@ _ALL = (
         sections={
             "reader_rest": Section("tables:rest_table"),
             "reader_busy": Section("tables:busy_table"),
-            "reader_loop": Section("tables:loop_table"),
-            "reader_links": Section("tables:links_table"),
+            "reader_loop": Section("tables:loop_table", kept=r"^\| nothing.*`native|computes.*`native`"),
+            "reader_links": Section("tables:links_table", kept=r"^\| 64 "),
         },
     ),
     Study(
@@ -324,8 +353,8 @@ _ALL = (
         minutes=60,
         sections={
             "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
-            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16"),
+            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16", heads="^(?!sheet)"),
+            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="^(?!sheet)"),
             "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md", kept="16x16"),
         },
         compute="scripts/measure_rivals.py:compute",
@@ -436,11 +465,18 @@ _ALL = (
             "speed": Section("tables:speed_table"),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section(
-                "tables:breaks_table", kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`"
+                "tables:breaks_table",
+                kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`",
+                heads="knob|up to|next|helps",
             ),
-            "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) "),
+                        "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) ", heads="scenes|second|IDF1"),
             "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
-            "recorded": Section("tables:recorded_table", kept=r"all \| `Tracker`", needs=("../shared/data",)),
+            "recorded": Section(
+                "tables:recorded_table",
+                kept=r"all \| `Tracker`",
+                heads="^(?!frames|tracker)",
+                needs=("../shared/data",),
+            ),
         },
         pictures="tables:draw",
         extra="test",
