@@ -176,10 +176,8 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner"),
-            "bumper": Section("tables:bumper_section", kept="the answer"),
-            "hands": Section("tables:hands_section", kept="the answer"),
-            "sole": Section("tables:sole_section", kept="the answer"),
+                        "fingers": Section("tables:fingers_section", kept="23x23|answer|runner", heads="^(?!pitch|bytes)"),
+            "bumper": Section("tables:bumper_section", kept="the answer", heads="^(?!pitch|bytes)"),
         },
         extra="chart",
     ),
@@ -240,11 +238,17 @@ _ALL = (
             "kits": Section("tables:headline", page="../README.md"),
             "times": Section("tables:times_table"),
             "built": Section("tables:built_table"),
-            "pins": Section("tables:pins_table", kept="the kit|22 kΩ alone|reversal"),
-            "parts": Section("tables:parts_table", kept=r"^\| fast \| beside", sample="tables:parts_table"),
+            "pins": Section("tables:pins_table", kept="the kit|22 kΩ alone|reversal", heads="^(?!cells)"),
+            "parts": Section(
+                "tables:parts_table",
+                kept=r"^\| fast \| beside",
+                heads="count|what|value",
+                sample="tables:parts_table",
+            ),
             "predictions": Section(
                 "tables:predictions_table",
                 kept=r"`(contact_worst|break_worst|settle)_us|`felt_half_n",
+                heads="^(?!name)",
                 sample="tables:predictions_table",
             ),
         },
@@ -378,10 +382,11 @@ _ALL = (
         page="safety.md",
         minutes=5,
         sections={
-            "coverage": Section("tables:coverage_table", kept=r"^\| (none|`guard`, |these)"),
+            "coverage": Section("tables:coverage_table", kept=r"^\| (none|`guard`, |these)", heads="options|reported"),
             "faults": Section(
                 "tables:faults_table",
                 kept="row is broken|stuck closed|does not close|diode is shorted|no supply|wire of",
+                heads="^(?!effect|wrong frames|without|time until)",
             ),
             "times": Section("tables:times_table", sample="tables:times_table"),
         },
@@ -400,14 +405,10 @@ _ALL = (
         minutes=2,
         sections={
             "needs": Section("tables:needs_table", kept="nominal|500|64x64, rows"),
-            "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]"),
+            "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]", heads="^(?!circuit|what breaks)"),
             "shorted": Section("tables:shorted_table", kept=r"^\| [012] ", sample="tables:shorted_table"),
             "summary": Section("tables:summary_table", kept=r"^\| all", needs=("ngspice",)),
-            "agreement": Section(
-                "tables:agreement_table",
-                kept=r"^\| (settle|project rows) \| 16x16 \| one cell \| 30, 2, 3",
-                needs=("ngspice",),
-            ),
+            "agreement": Section("tables:agreement_table", kept=NO_ROW, needs=("ngspice",)),
         },
         pictures="pictures:draw",
     ),
@@ -487,7 +488,12 @@ _ALL = (
         page="units.md",
         minutes=1,
         sections={
-            "units": Section("tables:units_table", kept=r"\| 6 \|", sample="tables:units_table"),
+            "units": Section(
+                "tables:units_table",
+                kept=r"\| 6 \|",
+                heads="converter|supply|sweep|packet|Mbaud",
+                sample="tables:units_table",
+            ),
         },
     ),
     Study(
