@@ -97,7 +97,7 @@ _ALL = (
         page="clock.md",
         minutes=1,
         sections={
-            "accuracy": Section("tables:accuracy_table", sample="tables:slow_sample"),
+            "accuracy": Section("tables:accuracy_table", heads="^(?!error within)", sample="tables:slow_sample"),
         },
     ),
     Study(
@@ -125,9 +125,14 @@ _ALL = (
             ),
             "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
-            "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
+            "paper": Section(
+                "tables:paper_table",
+                page="paper.md",
+                kept="misprint|wrong;|not reproduce|inconsistent|bottoms|fails|vacuous|low by",
+                sample="tables:paper_table",
+            ),
             "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
-            "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
+            "failing": Section("tables:failing_table", page="paper.md", kept=NO_ROW),
             "sense": Section("tables:sense_table", kept=r"^\| (halfspace|bonded), point \| R\* = 2 mm"),
             "thinning": Section(
                 "tables:thinning_table",
@@ -208,7 +213,12 @@ _ALL = (
             "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|", heads="method|2 ms|15 ms"),
             "pairs": Section("tables:pairs_table", kept="60 mm"),
             "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table", page="haptics_limits.md", kept=r"^\| \["),
+            "breaks": Section(
+                "tables:breaks_table",
+                page="haptics_limits.md",
+                kept=r"^\| \[",
+                heads="knob|until|at$|reported|helps",
+            ),
             "breakpictures": Section(
                 "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
             ),
@@ -286,9 +296,9 @@ _ALL = (
         page="mutants.md",
         minutes=90,
         sections={
-            "mutants": Section("tables:mutants_table", kept=r"^\| all"),
-            "options": Section("tables:options_table", kept=r"^\| all"),
-            "several": Section("tables:several_table", kept=r"^\| all"),
+            "mutants": Section("tables:mutants_table", kept=r"^\| all", heads="^(?!stage)"),
+            "options": Section("tables:options_table", kept=r"^\| all", heads="^(?!stage)"),
+            "several": Section("tables:several_table", kept=r"^\| all", heads="^(?!stage)"),
         },
         compute="tables:compute",
     ),
@@ -299,7 +309,7 @@ _ALL = (
         minutes=2,
         sections={
             "batch": Section("tables:batch_table"),
-            "links": Section("tables:links_table", kept=r"^\| (1|16|64) "),
+            "links": Section("tables:links_table", kept=r"^\| (1|16|64) ", heads="^(?!frames|in times)"),
             "thousand": Section("tables:thousand_table", kept="network|readers"),
         },
         pictures="tables:draw",
@@ -372,7 +382,7 @@ _ALL = (
         minutes=10,
         sections={
             "costs": Section("scripts/measure_ros.py:costs_table", kept="Contacts|Marker"),
-            "shown": Section("scripts/measure_ros.py:shown_table"),
+            "shown": Section("scripts/measure_ros.py:shown_table", heads="ROS|by|late"),
         },
         extra="test",
     ),
@@ -418,7 +428,7 @@ _ALL = (
         page="several.md",
         minutes=3,
         sections={
-            "several_line": Section("tables:line_table", kept=r"000 \| [148] \|", sample="tables:line_sample"),
+            "several_line": Section("tables:line_table", kept=r"000 \| [48] \|", sample="tables:line_sample"),
             "several_size": Section("tables:size_table", of_netlists=True),
         },
         extra="boards",
@@ -451,7 +461,7 @@ _ALL = (
         page="mutants.md",
         minutes=60,
         sections={
-            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| (units|all)"),
+            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| all", heads="^(?!folder)"),
             "left": Section("scripts/tested_mutants.py:left"),
         },
         compute="scripts/tested_mutants.py:compute",
@@ -503,7 +513,7 @@ _ALL = (
         minutes=4,
         sections={
             "view_load": Section("tables:loads_table"),
-            "view_clicks": Section("tables:clicks_table", kept="gateware|until it is drawn|^\\| all"),
+            "view_clicks": Section("tables:clicks_table", kept="gateware|^\\| all"),
         },
         compute="tables:compute",
         pictures="tables:draw",
