@@ -26,8 +26,8 @@ _ALL = (
                 kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)",
                 heads="^$|^(paper|set|6 ms|UART|pin|limit)",
             ),
-            "sheet": Section("tables:sheet_table"),
-            "speeds": Section("tables:speed_table"),
+                        "sheet": Section("tables:sheet_table", heads="^(?!touches|bound)"),
+            "speeds": Section("tables:speed_table", heads="^(?!.*δ)"),
             "defense": Section("tables:defense_table", kept="switch"),
             "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit", heads="^(?!indent)"),
             "failures": Section(
@@ -71,7 +71,9 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section("tables:front_table", kept=r"\*\*", heads="family|method|touch|miscounted|missed|barycenter"),
+            "front": Section(
+                "tables:front_table", kept=r"\*\*", heads="family|method|touch|miscounted|missed|barycenter"
+            ),
             "families": Section(
                 "tables:families_table",
                 kept=r"^\| (run, 6.4 mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
@@ -166,10 +168,12 @@ _ALL = (
             "failures": Section(
                 "tables:table",
                 kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed",
-                heads="knob|until|at|helps",
+                heads="knob|until|at$|helps",
             ),
             "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
-            "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)", heads="knob|why"),
+            "unnoticed": Section(
+                "tables:unnoticed", kept=r"^\| \[.*#(closing|light|diodes|broken|stuck|silence)\)", heads="knob|why"
+            ),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
@@ -181,7 +185,7 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-                        "fingers": Section("tables:fingers_section", kept="23x23|answer|runner", heads="^(?!pitch|bytes)"),
+            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner", heads="^(?!pitch|bytes)"),
             "bumper": Section("tables:bumper_section", kept="the answer", heads="^(?!pitch|bytes)"),
         },
         extra="chart",
@@ -208,11 +212,13 @@ _ALL = (
         minutes=5,
         sections={
             "layouts": Section("tables:layouts_table", kept="at one end|best of all", sample="tables:layouts_table"),
-            "places": Section("tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)", heads="^(?!over)"),
+            "places": Section(
+                "tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)", heads="^(?!over)"
+            ),
             "wrong": Section("tables:wrong_table", kept="30 %|drifted", heads="not|^error|radius|covers|reports"),
             "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|", heads="method|2 ms|15 ms"),
             "pairs": Section("tables:pairs_table", kept="60 mm"),
-            "limits": Section("tables:limits_table"),
+            "limits": Section("tables:limits_table", kept=NO_ROW),
             "breaks": Section(
                 "tables:breaks_table",
                 page="haptics_limits.md",
@@ -328,10 +334,7 @@ _ALL = (
             "bridges": Section(
                 "bridges:bridge_table", kept="1 ms, 0", page="boards.md", sample="bridges:bridge_sample"
             ),
-            "sides": Section("scans:sides_table", sample="scans:sides_sample", kept=NO_ROW),
-            "gain": Section(
-                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole"
-            ),
+            "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole"),
             "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
             "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
         },
@@ -345,7 +348,7 @@ _ALL = (
             "reader_rest": Section("tables:rest_table"),
             "reader_busy": Section("tables:busy_table"),
             "reader_loop": Section("tables:loop_table", kept=r"^\| nothing.*`native|computes.*`native`"),
-            "reader_links": Section("tables:links_table", kept=r"^\| 64 "),
+            "reader_links": Section("tables:links_table", kept=r"^\| 64 .*latest"),
         },
     ),
     Study(
@@ -369,7 +372,6 @@ _ALL = (
             "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
             "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16", heads="^(?!sheet)"),
             "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="^(?!sheet)"),
-            "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md", kept="16x16"),
         },
         compute="scripts/measure_rivals.py:compute",
         extra="boards",
@@ -480,7 +482,9 @@ _ALL = (
                 kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`",
                 heads="knob|up to|next|helps",
             ),
-                        "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) ", heads="scenes|second|IDF1"),
+            "scores": Section(
+                "tables:scores_table", kept=r"mean of all \| (25|100|10,000) ", heads="scenes|second|IDF1"
+            ),
             "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
             "recorded": Section(
                 "tables:recorded_table",
