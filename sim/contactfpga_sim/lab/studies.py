@@ -26,7 +26,7 @@ _ALL = (
                 kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)",
                 heads="^$|^(paper|set|6 ms|UART|pin|limit)",
             ),
-                        "sheet": Section("tables:sheet_table", heads="^(?!touches|bound)"),
+            "sheet": Section("tables:sheet_table", heads="^(?!touches|bound)"),
             "speeds": Section("tables:speed_table", heads="^(?!.*δ)"),
             "defense": Section("tables:defense_table", kept="switch"),
             "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit", heads="^(?!indent)"),
@@ -76,7 +76,7 @@ _ALL = (
             ),
             "families": Section(
                 "tables:families_table",
-                kept=r"^\| (run, 6.4 mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
+                kept=r"^\| run, 6.4 mm, (tiles|paper) \| \d",
             ),
             "methods": Section(
                 "tables:methods_table",
@@ -87,7 +87,7 @@ _ALL = (
             "floor": Section(
                 "limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm", heads="^(?!cover|felt|saved)"
             ),
-            "other_ways": Section("limits:rivals_section", kept="6.4 mm", heads="^(?!pitch|missed|lines)"),
+            "other_ways": Section("limits:rivals_table", kept="6.4 mm", heads="^(?!pitch|missed|lines|assumes)"),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -99,7 +99,12 @@ _ALL = (
         page="clock.md",
         minutes=1,
         sections={
-            "accuracy": Section("tables:accuracy_table", heads="^(?!error within)", sample="tables:slow_sample"),
+            "accuracy": Section(
+                "tables:accuracy_table",
+                kept=r"microframes|1 ms \||16 ms|network",
+                heads="^(?!error within)",
+                sample="tables:slow_sample",
+            ),
         },
     ),
     Study(
@@ -108,7 +113,7 @@ _ALL = (
         page="labelling.md",
         minutes=5,
         sections={
-            "closed": Section("tables:clocks_table", sample="tables:clocks_sample"),
+            "closed": Section("tables:clocks_table", heads="^(?!bound of (32|64))", sample="tables:clocks_sample"),
             "closed_size": Section("tables:size_table", of_netlists=True),
         },
         extra="boards",
@@ -121,11 +126,11 @@ _ALL = (
         sections={
             "closes": Section(
                 "caps:felt_table",
-                kept="6.4 mm|10 mm.*the paper",
+                kept=r"(6.4|10) mm.*the paper|6.4 mm.*(caps, gaps|tiles)",
                 heads="pitch|presses|50 %|99 %",
                 sample="caps:felt_sample",
             ),
-            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
+            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm \| [48]"),
             "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             "paper": Section(
                 "tables:paper_table",
@@ -133,7 +138,7 @@ _ALL = (
                 kept="misprint|wrong;|not reproduce|inconsistent|bottoms|fails|vacuous|low by",
                 sample="tables:paper_table",
             ),
-            "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
+            "rules": Section("tables:rules_table", page="paper.md", kept=r"\*\*"),
             "failing": Section("tables:failing_table", page="paper.md", kept=NO_ROW),
             "sense": Section("tables:sense_table", kept=r"^\| (halfspace|bonded), point \| R\* = 2 mm"),
             "thinning": Section(
@@ -168,7 +173,7 @@ _ALL = (
             "failures": Section(
                 "tables:table",
                 kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed",
-                heads="knob|until|at$|helps",
+                heads="knob|at$|helps",
             ),
             "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
             "unnoticed": Section(
@@ -186,7 +191,6 @@ _ALL = (
         minutes=10,
         sections={
             "fingers": Section("tables:fingers_section", kept="23x23|answer|runner", heads="^(?!pitch|bytes)"),
-            "bumper": Section("tables:bumper_section", kept="the answer", heads="^(?!pitch|bytes)"),
         },
         extra="chart",
     ),
@@ -198,8 +202,8 @@ _ALL = (
         sections={
             "worst": Section("tables:worst_text"),
             "flipped": Section("tables:designs_table", kept="of registers", heads="^(?!bits|flips)"),
-            "modules": Section("tables:modules_table", kept="(scan|label) .*`", heads="^(?!masked)"),
-            "ways": Section("tables:ways_table", kept="silently wrong"),
+            "modules": Section("tables:modules_table", kept=NO_ROW),
+            "ways": Section("tables:ways_table", kept=NO_ROW),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -222,8 +226,8 @@ _ALL = (
             "breaks": Section(
                 "tables:breaks_table",
                 page="haptics_limits.md",
-                kept=r"^\| \[",
-                heads="knob|until|at$|reported|helps",
+                kept=r"^\| \[.*not noticed",
+                heads="knob|at$|reported|helps",
             ),
             "breakpictures": Section(
                 "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
@@ -254,7 +258,7 @@ _ALL = (
             "kits": Section("tables:headline", page="../README.md"),
             "times": Section("tables:times_table"),
             "built": Section("tables:built_table"),
-            "pins": Section("tables:pins_table", kept="the kit|22 kΩ alone|reversal", heads="^(?!cells)"),
+            "pins": Section("tables:pins_table", kept=NO_ROW),
             "parts": Section(
                 "tables:parts_table",
                 kept=r"^\| fast \| beside",
@@ -371,7 +375,7 @@ _ALL = (
         sections={
             "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
             "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16", heads="^(?!sheet)"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="^(?!sheet)"),
+            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="labeller|builds"),
         },
         compute="scripts/measure_rivals.py:compute",
         extra="boards",
@@ -441,7 +445,7 @@ _ALL = (
         page="performance.md",
         minutes=60,
         sections={
-            "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole"),
+            "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole", heads="^(?!8x8)"),
             "faults": Section("tables:faults_table", of_netlists=True),
             "units_size": Section("tables:units_table", kept=r"^\| (1|6) ", page="units.md", of_netlists=True),
             "boards": Section("tables:boards_table", page="boards.md"),
@@ -485,7 +489,7 @@ _ALL = (
             "scores": Section(
                 "tables:scores_table", kept=r"mean of all \| (25|100|10,000) ", heads="scenes|second|IDF1"
             ),
-            "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
+            "ahead": Section("tables:ahead_table", kept=NO_ROW),
             "recorded": Section(
                 "tables:recorded_table",
                 kept=r"all \| `Tracker`",
