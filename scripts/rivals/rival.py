@@ -46,7 +46,7 @@ class Sheet:
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """A labeller of other people, put behind the port of docs/rivals.md."""
+    """A labeller of other people, put into the port of ``lone_cells.py``."""
 
     name: str
     blank_columns: int
