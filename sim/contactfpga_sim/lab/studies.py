@@ -48,7 +48,9 @@ _ALL = (
         sections={
             "outages": Section("tables:outages_table", kept="unplugged|sends nothing|another Skin"),
             "registration": Section(
-                "tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6", heads="^(?!wrongly|residual)"
+                "tables:registration_table",
+                kept=r"^\| (plane|cyl).*, with normals|^\|  \| 6 \| 0",
+                heads="^(?!wrongly|residual)",
             ),
             "folds": Section("tables:folds_table", kept=r"^\| 5 ", sample="tables:folds_sample"),
         },
@@ -113,8 +115,8 @@ _ALL = (
         page="labelling.md",
         minutes=5,
         sections={
-            "closed": Section("tables:clocks_table", heads="^(?!bound of (32|64))", sample="tables:clocks_sample"),
-            "closed_size": Section("tables:size_table", of_netlists=True),
+            "closed": Section("tables:clocks_table", kept=NO_ROW, sample="tables:clocks_sample"),
+            "closed_size": Section("tables:size_table", kept=r"^\| `\w+` \| 8 ", of_netlists=True),
         },
         extra="boards",
     ),
@@ -140,7 +142,7 @@ _ALL = (
             ),
             "rules": Section("tables:rules_table", page="paper.md", kept=r"\*\*"),
             "failing": Section("tables:failing_table", page="paper.md", kept=NO_ROW),
-            "sense": Section("tables:sense_table", kept=r"^\| (halfspace|bonded), point \| R\* = 2 mm"),
+            "sense": Section("tables:sense_table", kept=NO_ROW),
             "thinning": Section(
                 "tables:thinning_table",
                 kept=r"^\| (6|0.895|0.252) ms",
@@ -175,7 +177,7 @@ _ALL = (
                 kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed",
                 heads="knob|at$|helps",
             ),
-            "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
+            "closed": Section("tables:closed", kept=NO_ROW),
             "unnoticed": Section(
                 "tables:unnoticed", kept=r"^\| \[.*#(closing|light|diodes|broken|stuck|silence)\)", heads="knob|why"
             ),
@@ -220,7 +222,7 @@ _ALL = (
                 "tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)", heads="^(?!over)"
             ),
             "wrong": Section("tables:wrong_table", kept="30 %|drifted", heads="not|^error|radius|covers|reports"),
-            "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|", heads="method|2 ms|15 ms"),
+            "felt": Section("tables:felt_table", kept=NO_ROW),
             "pairs": Section("tables:pairs_table", kept="60 mm"),
             "limits": Section("tables:limits_table", kept=NO_ROW),
             "breaks": Section(
@@ -318,9 +320,9 @@ _ALL = (
         page="net.md",
         minutes=2,
         sections={
-            "batch": Section("tables:batch_table"),
-            "links": Section("tables:links_table", kept=r"^\| (1|16|64) ", heads="^(?!frames|in times)"),
-            "thousand": Section("tables:thousand_table", kept="network|readers"),
+            "batch": Section("tables:batch_table", heads="^(?!messages|ratio)"),
+            "links": Section("tables:links_table", kept=r"^\| (1|16|64) ", heads="links|of those|latency"),
+            "thousand": Section("tables:thousand_table", kept=NO_ROW),
         },
         pictures="tables:draw",
         extra="test",
@@ -336,7 +338,7 @@ _ALL = (
             "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
             "fast": Section("scans:latency_table", sample="scans:latency_sample"),
             "bridges": Section(
-                "bridges:bridge_table", kept="1 ms, 0", page="boards.md", sample="bridges:bridge_sample"
+                "bridges:bridge_table", kept="1 ms, 0.*reference", page="boards.md", sample="bridges:bridge_sample"
             ),
             "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole"),
             "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
@@ -350,7 +352,7 @@ _ALL = (
         minutes=5,
         sections={
             "reader_rest": Section("tables:rest_table"),
-            "reader_busy": Section("tables:busy_table"),
+            "reader_busy": Section("tables:busy_table", kept="latest", heads="^(?!call$)"),
             "reader_loop": Section("tables:loop_table", kept=r"^\| nothing.*`native|computes.*`native`"),
             "reader_links": Section("tables:links_table", kept=r"^\| 64 .*latest"),
         },
@@ -362,8 +364,8 @@ _ALL = (
         minutes=2,
         sections={
             "sizes": Section("tables:sizes_table"),
-            "reading": Section("tables:reading_table"),
-            "loss": Section("tables:loss_table"),
+            "reading": Section("tables:reading_table", kept=NO_ROW),
+            "loss": Section("tables:loss_table", kept="worst"),
         },
         extra="test",
     ),
@@ -479,12 +481,12 @@ _ALL = (
         page="tracking.md",
         minutes=25,
         sections={
-            "speed": Section("tables:speed_table"),
+            "speed": Section("tables:speed_table", kept=NO_ROW),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section(
                 "tables:breaks_table",
-                kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`",
-                heads="knob|up to|next|helps",
+                kept="(pass each|bounces|frames are lost).*`Tracker`",
+                heads="knob|up to|helps",
             ),
             "scores": Section(
                 "tables:scores_table", kept=r"mean of all \| (25|100|10,000) ", heads="scenes|second|IDF1"
@@ -520,8 +522,8 @@ _ALL = (
         page="view.md",
         minutes=4,
         sections={
-            "view_load": Section("tables:loads_table"),
-            "view_clicks": Section("tables:clicks_table", kept="gateware|^\\| all"),
+            "view_load": Section("tables:loads_table", heads="sheet|both"),
+            "view_clicks": Section("tables:clicks_table", kept=r"^\| all"),
         },
         compute="tables:compute",
         pictures="tables:draw",
