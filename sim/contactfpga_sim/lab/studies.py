@@ -23,7 +23,7 @@ _ALL = (
             ),
             "set": Section(
                 "tables:set_table",
-                kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)",
+                kept=r"^\| (reacts|speed stays|contact force|peak force)",
                 heads="^$|^(paper|set|6 ms|UART|pin|limit)",
             ),
             "sheet": Section("tables:sheet_table", heads="^(?!touches|bound)"),
@@ -73,22 +73,18 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section(
-                "tables:front_table", kept=r"\*\*", heads="family|method|touch|miscounted|missed|barycenter"
-            ),
+            "front": Section("tables:front_table", kept=r"\*\*", heads="family|touch|miscounted|barycenter"),
             "families": Section(
                 "tables:families_table",
                 kept=r"^\| run, 6.4 mm, (tiles|paper) \| \d",
             ),
             "methods": Section(
                 "tables:methods_table",
-                kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|",
+                kept=r"^\| (?!barycenter|single)\w+, 6.4 mm, tiles \|",
                 heads="method|touch|alone|miscounted|barycenter|LUT4",
             ),
             "host": Section("tables:host_table", kept=r"\| (10|29|92) \|", heads="^(?!labelled|faster)"),
-            "floor": Section(
-                "limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm", heads="^(?!cover|felt|saved)"
-            ),
+            "floor": Section("limits:floor_table", kept=NO_ROW),
             "other_ways": Section("limits:rivals_table", kept="6.4 mm", heads="^(?!pitch|missed|lines|assumes)"),
         },
         compute="tables:compute",
@@ -333,10 +329,10 @@ _ALL = (
         page="performance.md",
         minutes=5,
         sections={
-            "reference": Section("scans:reference_table", sample="scans:reference_sample"),
+            "reference": Section("scans:reference_table", heads="^(?!bytes)", sample="scans:reference_sample"),
             "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample", kept=NO_ROW),
             "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
-            "fast": Section("scans:latency_table", sample="scans:latency_sample"),
+            "fast": Section("scans:latency_table", heads="^(?!bytes|contact|frames)", sample="scans:latency_sample"),
             "bridges": Section(
                 "bridges:bridge_table", kept="1 ms, 0.*reference", page="boards.md", sample="bridges:bridge_sample"
             ),
@@ -424,7 +420,7 @@ _ALL = (
         sections={
             "needs": Section("tables:needs_table", kept="nominal|500|64x64, rows"),
             "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]", heads="^(?!circuit|what breaks)"),
-            "shorted": Section("tables:shorted_table", kept=r"^\| [012] ", sample="tables:shorted_table"),
+            "shorted": Section("tables:shorted_table", kept=r"^\| [01] ", sample="tables:shorted_table"),
             "summary": Section("tables:summary_table", kept=r"^\| all", needs=("ngspice",)),
             "agreement": Section("tables:agreement_table", kept=NO_ROW, needs=("ngspice",)),
         },
@@ -448,7 +444,7 @@ _ALL = (
         minutes=60,
         sections={
             "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole", heads="^(?!8x8)"),
-            "faults": Section("tables:faults_table", of_netlists=True),
+            "faults": Section("tables:faults_table", kept="none|guard|self_test|fast", of_netlists=True),
             "units_size": Section("tables:units_table", kept=r"^\| (1|6) ", page="units.md", of_netlists=True),
             "boards": Section("tables:boards_table", page="boards.md"),
         },
@@ -494,8 +490,7 @@ _ALL = (
             "ahead": Section("tables:ahead_table", kept=NO_ROW),
             "recorded": Section(
                 "tables:recorded_table",
-                kept=r"all \| `Tracker`",
-                heads="^(?!frames|tracker)",
+                kept=NO_ROW,
                 needs=("../shared/data",),
             ),
         },
