@@ -29,7 +29,7 @@ _ALL = (
             "sheet": Section("tables:sheet_table", heads="^(?!touches|bound)"),
             "speeds": Section("tables:speed_table", heads="^(?!.*δ)"),
             "defense": Section("tables:defense_table", kept="switch"),
-            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit", heads="^(?!indent)"),
+            "pushes": Section("tables:push_table", sample="tables:push_table", kept=NO_ROW),
             "failures": Section(
                 "tables:failure_table",
                 kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
@@ -280,7 +280,7 @@ _ALL = (
         minutes=1,
         sections={
             "diodes": Section("tables:diodes_table", sample="tables:diodes_table"),
-            "pulls": Section("tables:pulls_table", kept=r"^\| (4.7|10|22|47) k", sample="tables:pulls_table"),
+            "pulls": Section("tables:pulls_table", kept=r"^\| (10|22|47) k", sample="tables:pulls_table"),
             "series": Section("tables:series_table", kept=r"^\| (none|33|100)", sample="tables:series_table"),
         },
         pictures="tables:draw",
@@ -348,9 +348,9 @@ _ALL = (
         minutes=5,
         sections={
             "reader_rest": Section("tables:rest_table"),
-            "reader_busy": Section("tables:busy_table", kept="latest", heads="^(?!call$)"),
-            "reader_loop": Section("tables:loop_table", kept=r"^\| nothing.*`native|computes.*`native`"),
-            "reader_links": Section("tables:links_table", kept=r"^\| 64 .*latest"),
+            "reader_busy": Section("tables:busy_table", kept=r"^\| 1,000 .*latest", heads="^(?!calls)"),
+            "reader_loop": Section("tables:loop_table", kept=NO_ROW),
+            "reader_links": Section("tables:links_table", kept=NO_ROW),
         },
     ),
     Study(
