@@ -32,7 +32,7 @@ _ALL = (
             "pushes": Section("tables:push_table", sample="tables:push_table", kept=NO_ROW),
             "failures": Section(
                 "tables:failure_table",
-                kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
+                kept="nothing wrong|halfway between|patch's|nobody waits|dies before",
                 heads="^$|reacts|because|peak|reversals",
             ),
             "steps": Section("tables:step_table", kept=NO_ROW),
@@ -129,7 +129,7 @@ _ALL = (
                 sample="caps:felt_sample",
             ),
             "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm \| [48]"),
-            "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
+            "sags": Section("caps:sagging_table", page="paper.md", kept="6.4 mm", sample="caps:sagging_table"),
             "paper": Section(
                 "tables:paper_table",
                 page="paper.md",
@@ -188,7 +188,7 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner", heads="^(?!pitch|bytes)"),
+            "fingers": Section("tables:fingers_section", kept="23x23|answer", heads="^(?!pitch|bytes)"),
         },
         extra="chart",
     ),
@@ -331,7 +331,7 @@ _ALL = (
         sections={
             "reference": Section("scans:reference_table", heads="^(?!bytes)", sample="scans:reference_sample"),
             "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample", kept=NO_ROW),
-            "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
+            "report": Section("scans:report_table", sample="scans:report_sample", kept="reference", heads="^(?!sheet)"),
             "fast": Section("scans:latency_table", heads="^(?!bytes|contact|frames)", sample="scans:latency_sample"),
             "bridges": Section(
                 "bridges:bridge_table", kept="1 ms, 0.*reference", page="boards.md", sample="bridges:bridge_sample"
@@ -359,7 +359,7 @@ _ALL = (
         page="recordings.md",
         minutes=2,
         sections={
-            "sizes": Section("tables:sizes_table"),
+            "sizes": Section("tables:sizes_table", kept=r"^\| 10,"),
             "reading": Section("tables:reading_table", kept=NO_ROW),
             "loss": Section("tables:loss_table", kept="worst"),
         },
@@ -517,7 +517,7 @@ _ALL = (
         page="view.md",
         minutes=4,
         sections={
-            "view_load": Section("tables:loads_table", heads="sheet|both"),
+            "view_load": Section("tables:loads_table", kept="two", heads="sheet|both"),
             "view_clicks": Section("tables:clicks_table", kept=r"^\| all"),
         },
         compute="tables:compute",
