@@ -8,6 +8,7 @@ from pathlib import Path
 
 import matplotlib
 import pytest
+from study_pages import section
 import svg_texts
 
 from contactfpga import picture_style
@@ -50,8 +51,7 @@ def test_all_are_drawn(tmp_path):
 @pytest.mark.parametrize("port", ["contact", "last byte on the wire", "host's USB controller", "decision"])
 def test_times_are_those_of_the_page(port):
     """The median is shown, and in parentheses the worst."""
-    (row,) = re.findall(rf"^\| starter \| closed switch to the [^|]*{port}[^|]*\|(.*)\|$", (DOCS / "kits.md").read_text(
-        encoding="utf-8"), re.MULTILINE)  # fmt: skip
+    (row,) = re.findall(rf"^\| starter \| closed switch to the [^|]*{port}[^|]*\|(.*)\|$", section("kits.md", "times"), re.MULTILINE)  # fmt: skip
     median, _, worst = (round(float(cell)) for cell in row.split("|"))
     assert f"{median} µs ({worst})" in {one.text for one in words("together")}
 
