@@ -63,6 +63,15 @@ def test_a_long_table_is_in_a_file_beside_the_page(tmp_path):
     assert beside.whole(tmp_path / "page.md", "one") == LONG
 
 
+def test_a_wide_table_leaves_columns_to_its_file(tmp_path):
+    file = tmp_path / "tables" / "page-one.csv"
+    text = beside.part(LONG, "x|z", file, "b")
+    assert text.splitlines()[2:8] == ["| b |", "|---|", "| x y |", '| "z" |', "", text.splitlines()[7]]
+    assert text.splitlines()[7] == "All [3 rows, 2 columns](tables/page-one.csv)."
+    (tmp_path / "page.md").write_text(f"a\n<!-- figures: one -->\n{text}\n<!-- end -->\nb\n")
+    assert beside.whole(tmp_path / "page.md", "one") == LONG
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
