@@ -47,7 +47,7 @@ def test_links_on_another_machine_come_and_go_by_themselves(robot, endpoint, cap
             shown = json.loads(capsys.readouterr().out)
             assert [one["link"] for one in shown["contacts"]] == ["left", "right"]
             opened = Body.load(robot).open(timeout=LONG)
-            assert set(opened.read(LONG).answering) == {"left", "right"}
+            wait_until(lambda: set(opened.read(LONG).answering) == {"left", "right"}, LONG)
         with opened:
             wait_until(lambda: opened.latest().links["left"].status == "lost", LONG)
             snapshot = opened.read(LONG)

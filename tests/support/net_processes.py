@@ -15,28 +15,52 @@ from fake_board import FakeBoard
 CHUNK = 4096
 """Bytes that a cable takes at once."""
 
+LONG_S = 60.0
+"""How long a busy machine may let a process wait."""
+
+PATIENT = f"""
+import sys
+from contactfpga.robot.net import port, session
+port.FOUND_S, session.CONNECT_MS = {LONG_S}, {1000 * LONG_S:.0f}
+session.LEASE_MS = round(1000 * float(sys.argv.pop(1)))
+"""
+"""How each program begins: it waits long for others, and takes them for gone after its lease, the first argument."""
+
 ROUTER = """
-import sys, time
-from contactfpga.robot.net import session
+import time
 with session.listening(sys.argv[1]):
     print("ready", flush=True)
     time.sleep(600)
 """
 
 
+PUBLISHER = """
+from contactfpga.__main__ import main
+sys.exit(main())
+"""
+
+
 READER = """
-import dataclasses, json, sys, time
+import dataclasses, json, time
 import contactfpga
 board = contactfpga.open(sys.argv[1], timeout=60)
+clock, looked_s = board._link.clock, 0.0
+
+def look():
+    global looked_s
+    looked_s = clock()
+    return looked_s
+
+board._link.clock = look
 while True:
     found = None
     try:
-        found = board.latest(60, max_age_s=float(sys.argv[2]))
+        found, at_s = board.latest(60, max_age_s=float(sys.argv[2])), looked_s
     except contactfpga.NoData:
-        pass
-    now_s, stats = time.monotonic(), board.stats
+        at_s = clock()
+    stats = board.stats
     seen = stats.frames + stats.lost + stats.unexplained
-    line = [found and found.time_us, now_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
+    line = [found and found.time_us, at_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
     print(json.dumps(line), flush=True)
     time.sleep(0.005)
 """
@@ -47,6 +71,11 @@ def free_endpoint(protocol="tcp"):
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
+
+
+def patient(port):
+    """The ``zenoh://`` port, for a reader that waits long for a publisher that the machine lets wait."""
+    return f"{port}{'&' if '?' in port else '?'}wait={LONG_S:.0f}"
 
 
 def assert_loopback_alone(pid):
@@ -71,7 +100,7 @@ class Child:
         """Kill it; what it said."""
         with contextlib.suppress(ProcessLookupError):
             self.process.kill()
-        return self.process.communicate(timeout=30)[1]
+        return self.process.communicate(timeout=LONG_S)[1]
 
     def __enter__(self):
         return self
@@ -80,14 +109,15 @@ class Child:
         self.end()
 
 
-def router(endpoint):
+def router(endpoint, lease_s=LONG_S):
     """A Zenoh session that is nothing but a router."""
-    return Child("-c", ROUTER, endpoint)
+    return Child("-c", PATIENT + ROUTER, lease_s, endpoint)
 
 
-def publish(port, *options, others=(), wait=True):
+def publish(port, *options, others=(), wait=True, lease_s=LONG_S):
     """``contactfpga publish`` of a port and others."""
-    return Child("-m", "contactfpga", "publish", port, *others, "--timeout", 60, *options, wait=wait)
+    arguments = ("publish", port, *others, "--timeout", LONG_S, *options)
+    return Child("-c", PATIENT + PUBLISHER, lease_s, *arguments, wait=wait)
 
 
 class Sight(NamedTuple):
@@ -96,6 +126,7 @@ class Sight(NamedTuple):
     time_us: int | None
     """Of the latest frame; None: there was no data."""
     at_s: float
+    """When the reader last looked at the clock before it returned that frame: this program may rest after that."""
     seen: int
     """Frames that came or are known not to have come."""
     hellos: int
@@ -106,10 +137,16 @@ class Sight(NamedTuple):
 class Reader(Child):
     """A program that takes the latest frame of a port, none older than ``max_age_s``."""
 
-    def __init__(self, port, max_age_s):
-        super().__init__("-c", READER, port, max_age_s)
+    def __init__(self, port, max_age_s, lease_s):
+        super().__init__("-c", PATIENT + READER, lease_s, port, max_age_s)
         self.sights = [Sight(*json.loads(self.line))]
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+
+    def end(self):
+        self.process.kill()
+        self._listener.join()  # else both would read what it printed, and one after it is closed
+        return super().end()
 
     def _listen(self):
         self.sights += (Sight(*json.loads(line)) for line in self.process.stdout)
@@ -117,6 +154,8 @@ class Reader(Child):
 
 class Streaming(FakeBoard):
     """Some hundred frames per second, and hellos; its clock is that of the host, and ``sent`` holds their times."""
+
+    waits = False
 
     def __init__(self, skin, every_s=0.005):
         super().__init__(skin)
@@ -141,7 +180,10 @@ class Streaming(FakeBoard):
         return data + self.frame()
 
     def _write(self, data):
-        """A line does not wait: what nobody reads is lost, as in a UART."""
+        """A line does not wait: what nobody reads is lost, as in a UART; but where a test wants every frame to come."""
+        if self.waits:
+            super()._write(data)
+            return
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 

@@ -12,7 +12,7 @@ pytest.importorskip("viser")
 
 from contactfpga.robot.body import Body, BodyError, packed
 from contactfpga.robot.body.snapshot import on_link
-from contactfpga.tools.recordings import Recording, Session
+from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.bodies import BodyPlayer, pushes
 from contactfpga.tools.view.playback import Player
@@ -21,15 +21,18 @@ TIMES = "[[links]]\nlate_s = 0.2\nsilent_s = 0.4"
 
 
 def record(folder, about=None):
-    """The chest sends for 0.2 s, the arm for a second."""
+    """The chest sends for 0.2 s, the arm for a second; both clocks, which boards that are simulated have of their own,
+    begin at once, however late the program comes to each of them."""
     path = write_robot(folder)
     path.write_text(ROBOT.replace("[[links]]", TIMES))
     ports = {"arm": StreamPort(ROUND, frames=1000), "chest": StreamPort(FLAT, frames=200)}
-    with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
-        for name, port in ports.items():
-            session.add(port, name=name)
-        session.start()
-        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports.values()))
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setattr(recorder, "_epoch_ns", lambda board: 10**18)
+        with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
+            for name, port in ports.items():
+                session.add(port, name=name)
+            session.start()
+            wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports.values()))
     return path
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import contextlib
+import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -23,6 +24,9 @@ FOUND_S = 3.0
 """Timeout for the first message of a publisher."""
 GONE_S = 1.0
 """Silence after which a publisher is gone, whatever its token: anyone can declare a token."""
+LATE_S = 0.2
+"""How much longer than asked for a wait lasts if this process had to stand still: its silence is not the publisher's,
+whose messages may wait to be taken."""
 
 
 class ZenohPort:
@@ -39,6 +43,7 @@ class ZenohPort:
         self._waiting = 0
         self._stream = Stream(self.counters)
         self._asks: zenoh.Publisher | None = None
+        self._back_s = -math.inf  # when this process last went on after it had stood still
         try:
             self._session = session.connected(address.connect, address.config)
         except MissingExtra:
@@ -72,7 +77,7 @@ class ZenohPort:
         """Available bytes, after waiting at most ``timeout_s`` for the first."""
         with self._changed:
             if not self._pieces:
-                self._changed.wait(timeout_s)
+                self._wait(timeout_s)
             data = b""
             while self._pieces and not (data and self._pieces[0][1]):
                 piece, after_break = self._pieces.popleft()
@@ -86,9 +91,15 @@ class ZenohPort:
                 )
             return data
 
+    def _wait(self, timeout_s: float) -> None:
+        begun_s = time.monotonic()
+        self._changed.wait(timeout_s)
+        if (now_s := time.monotonic()) - begun_s > timeout_s + LATE_S:
+            self._back_s = now_s
+
     def _gone(self) -> bool:
         assert self._stream.heard_s is not None
-        silent_s, wait_s = time.monotonic() - self._stream.heard_s, self._address.wait_s
+        silent_s, wait_s = time.monotonic() - max(self._stream.heard_s, self._back_s), self._address.wait_s
         return silent_s > (max(wait_s, QUIET_S) if self._stream.ended else wait_s + GONE_S)
 
     def write(self, data: bytes) -> None:
