@@ -18,16 +18,9 @@ CHUNK = 4096
 LONG_S = 60.0
 """How long a busy machine may let a process wait."""
 
-PATIENT = f"""
-import sys
-from contactfpga.robot.net import port, session
-port.FOUND_S, session.CONNECT_MS = {LONG_S}, {1000 * LONG_S:.0f}
-session.LEASE_MS = round(1000 * float(sys.argv.pop(1)))
-"""
-"""How each program begins: it waits long for others, and takes them for gone after its lease, the first argument."""
-
 ROUTER = """
-import time
+import sys, time
+from contactfpga.robot.net import session
 with session.listening(sys.argv[1]):
     print("ready", flush=True)
     time.sleep(600)
@@ -35,13 +28,14 @@ with session.listening(sys.argv[1]):
 
 
 PUBLISHER = """
+import sys
 from contactfpga.__main__ import main
 sys.exit(main())
 """
 
 
 READER = """
-import dataclasses, json, time
+import dataclasses, json, sys, time
 import contactfpga
 board = contactfpga.open(sys.argv[1], timeout=60)
 clock, looked_s = board._link.clock, 0.0
@@ -71,6 +65,15 @@ def free_endpoint(protocol="tcp"):
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
+
+
+def patience(lease_s=LONG_S):
+    """How a program begins that waits long for others, and takes them for gone after its lease."""
+    return f"""
+from contactfpga.robot import net
+import contactfpga.robot.net.port, contactfpga.robot.net.session
+net.port.FOUND_S, net.session.CONNECT_MS, net.session.LEASE_MS = {LONG_S}, {LONG_S:.0f}_000, {round(1000 * lease_s)}
+"""
 
 
 def patient(port):
@@ -111,13 +114,13 @@ class Child:
 
 def router(endpoint, lease_s=LONG_S):
     """A Zenoh session that is nothing but a router."""
-    return Child("-c", PATIENT + ROUTER, lease_s, endpoint)
+    return Child("-c", patience(lease_s) + ROUTER, endpoint)
 
 
 def publish(port, *options, others=(), wait=True, lease_s=LONG_S):
     """``contactfpga publish`` of a port and others."""
     arguments = ("publish", port, *others, "--timeout", LONG_S, *options)
-    return Child("-c", PATIENT + PUBLISHER, lease_s, *arguments, wait=wait)
+    return Child("-c", patience(lease_s) + PUBLISHER, *arguments, wait=wait)
 
 
 class Sight(NamedTuple):
@@ -138,7 +141,7 @@ class Reader(Child):
     """A program that takes the latest frame of a port, none older than ``max_age_s``."""
 
     def __init__(self, port, max_age_s, lease_s):
-        super().__init__("-c", PATIENT + READER, lease_s, port, max_age_s)
+        super().__init__("-c", patience(lease_s) + READER, port, max_age_s)
         self.sights = [Sight(*json.loads(self.line))]
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
