@@ -15,10 +15,11 @@ from contactfpga.errors import AddressError, PortNotFound
 from contactfpga_sim.model.board.flexitac import MARK, FlexitacSheet
 
 PITCH_MM = 3.0
+LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
 
 
 class Touch:
-    """Discs of radius 2 cells at (row, column), from :meth:`begin` on."""
+    """Discs of radius 2 cells at (row, column), from ``since`` on, which move for half a second."""
 
     def __init__(self, *places, columns_per_s=0.0):
         self.places, self.columns_per_s, self.since = places, columns_per_s, math.inf
@@ -27,7 +28,7 @@ class Touch:
         rows, columns = np.mgrid[:16, :32]
         force = np.zeros((16, 32))
         for row, column in self.places if seconds >= self.since else ():
-            now = column + self.columns_per_s * (seconds - self.since)
+            now = column + self.columns_per_s * min(seconds - self.since, 0.5)
             force[(rows - row) ** 2 + (columns - now) ** 2 <= 4] = 1.0
         return force
 
@@ -36,13 +37,29 @@ def address_of(sheet):
     return f"flexitac://{sheet.port}?frames=10"
 
 
+def waiting(board):
+    """The frames that wait, with a moment after they came and before the next one did."""
+    frames = []
+    while True:
+        before = time.monotonic()
+        try:
+            frames.append(board.next(0))
+        except contactfpga.ReadTimeout:
+            return frames, before
+
+
 def frames_of(board, sheet, touch, count):
-    """The frame before a touch, and so many from then on."""
-    frames = [board.next(3.0)]
-    started = time.monotonic()
+    """The frame before a touch, and all from then on, at least so many. Their times are those of the test's clock."""
+    board.next(LONG)
+    _, earliest = waiting(board)
+    frames = [board.next(LONG)]
+    latest = time.monotonic()
     touch.since = sheet.seconds
-    frames += [board.next(3.0) for _ in range(count)]
-    assert (frames[-1].time_us - frames[0].time_us) / 1e6 == pytest.approx(time.monotonic() - started, abs=0.1)
+    frames += [board.next(LONG) for _ in range(count)]
+    rest, asked = waiting(board)
+    frames += [*rest, board.next(LONG)]
+    passed = (frames[-1].time_us - frames[0].time_us) / 1e6
+    assert asked - latest - 0.05 <= passed <= time.monotonic() - earliest + 0.05
     return frames
 
 
@@ -76,10 +93,10 @@ def test_zones_are_those_of_another_labeller_on_random_frames():
 
 def test_a_request_is_answered_by_a_frame_that_began_later():
     with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet)) as board:
-        board.next(3.0)
+        board.next(LONG)
         for _ in range(3):
             asked = board.clock()
-            zones = board.read(2.0)
+            zones = board.read(LONG)
             assert board.clock() - asked > 0.01  # a frame that was on its way is no answer
         assert zones.time_us > 0
 
@@ -113,7 +130,8 @@ def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
     touched = [frame for frame in frames if len(frame)]
     assert len(touched) > 40
     assert all([(zone.x_mm, zone.y_mm) for zone in frame] == [(48.0, 24.0)] for frame in touched)
-    assert 5 < sum(stats.damaged.values()) < 40
+    damaged = sum(stats.damaged.values())
+    assert 0.08 < damaged / (damaged + stats.frames) < 0.4
 
 
 def test_a_wrong_byte_is_one_cell_of_one_frame_or_costs_the_frame():

@@ -203,8 +203,9 @@ class Relay:
         self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
         self._whole = threading.Event()
         self._whole.set()
-        self._sockets = []
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._sockets, self._carriers = [], []
+        self._server = threading.Thread(target=self._serve, daemon=True)
+        self._server.start()
 
     def cut(self):
         self._whole.clear()
@@ -233,7 +234,8 @@ class Relay:
                     continue
                 self._sockets += [near, far]
                 for source, sink in ((near, far), (far, near)):
-                    threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+                    self._carriers.append(threading.Thread(target=self._carry, args=(source, sink), daemon=True))
+                    self._carriers[-1].start()
 
     def _carry(self, source, sink):
         with contextlib.suppress(OSError):
@@ -247,7 +249,11 @@ class Relay:
         return self
 
     def __exit__(self, *_):
+        with contextlib.suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)  # ends its thread, which may just be opening more
+        self._server.join()
         self.cut()
-        self._listener.close()
-        for one in self._sockets:
+        for one in self._carriers:
+            one.join()
+        for one in (self._listener, *self._sockets):
             one.close()

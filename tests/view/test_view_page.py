@@ -78,7 +78,7 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     shown, visitor = seen
     shown.hand.click(30, 50)
     shown.hand.click(30, 110)
-    visitor.page.wait_for_selector("text=2 contacts", timeout=30_000)
+    visitor.page.wait_for_selector("text=2 contacts", timeout=60_000)
     width, height, shown_wide = visitor.page.evaluate(
         "[window.__viserMutable.canvas.width, window.__viserMutable.canvas.height, window.box()[2]]"
     )
@@ -90,7 +90,7 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     assert wide == width
     assert high == pytest.approx(height + 4 * 1.6 * 14 * width / shown_wide, abs=2)
     visitor.page.keyboard.press("l")
-    visitor.page.wait_for_selector("text=Nothing touches", timeout=30_000)
+    visitor.page.wait_for_selector("text=Nothing touches", timeout=60_000)
     assert shown.hand.fingers == []
 
 
