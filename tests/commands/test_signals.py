@@ -72,7 +72,7 @@ def test_a_command_listens_before_it_loads_numpy(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(LOOKS)
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     command = [sys.executable, "-m", "contactfpga", "zones", "sim://"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, env=environment(PYTHONPATH=path))
+    done = subprocess.run(command, capture_output=True, text=True, timeout=250, env=environment(PYTHONPATH=path))
     assert (done.stdout, done.stderr) == (f"{[interrupt.__name__] * 2}\n", "")
 
 
@@ -116,7 +116,7 @@ def test_a_signal_while_a_library_of_c_plus_plus_loads(library, number, tmp_path
     (tmp_path / "sitecustomize.py").write_text(CUTS_OFF.replace("LIBRARY", library).replace("NUMBER", str(int(number))))
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     command = [sys.executable, "-m", "contactfpga", "plot", "nothing.mcap"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, env=environment(PYTHONPATH=path))
+    done = subprocess.run(command, capture_output=True, text=True, timeout=250, env=environment(PYTHONPATH=path))
     assert (done.returncode, done.stderr) == (STATUSES[number], "")
 
 
@@ -184,7 +184,7 @@ def body():
 def test_a_signal_that_others_make_something_of(how, number):
     program = STARTS.replace("WORK", BROKEN[how]).replace("NUMBER", str(int(number)))
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=100, env=environment()
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=250, env=environment()
     )
     assert (done.returncode, done.stderr) == (STATUSES[number], "")
 
@@ -220,7 +220,7 @@ def test_a_signal_while_python_runs_a_text(how, number, tmp_path):
         [sys.executable, "-m", "started"],
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=250,
         env=environment(PYTHONPATH=os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])),
     )
     assert (done.returncode, done.stderr) == (0 if how == "usual end" else STATUSES[number], "")

@@ -79,7 +79,7 @@ def test_no_line_is_wider_than_the_terminal(name, columns, files):
 @pytest.mark.parametrize("name", sample(COMMANDS, quick=["zones of 64x64", "doctor", "an error"], slow=["replay"]))
 def test_no_character_ends_a_command(name, files):
     command = [sys.executable, "-m", "contactfpga.tools.cli", *named(name, files)]
-    result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=120)
+    result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=250)
     assert b"codec" not in result.stdout + result.stderr
     assert result.returncode == (name == "an error"), result.stderr
     (result.stdout + result.stderr).decode("ascii")

@@ -106,5 +106,5 @@ def test_output_that_goes_nowhere(streams, say, status, errors):
     buffered = {name: value for name, value in environment().items() if name != "PYTHONUNBUFFERED"}
     shell = f'set -o pipefail; "$@" {streams}'
     command = ["bash", "-c", shell, "bash", sys.executable, "-c", PRINTS.replace("SAY", say)]
-    done = subprocess.run(command, input="", capture_output=True, text=True, env=buffered, timeout=100, check=False)
+    done = subprocess.run(command, input="", capture_output=True, text=True, env=buffered, timeout=250, check=False)
     assert (done.returncode, done.stderr) == (status, errors)

@@ -50,7 +50,7 @@ class Keys:
 
     def make(self, *commands):
         for command in commands:
-            subprocess.run(command.split(), cwd=self.folder, check=True, capture_output=True, timeout=60)
+            subprocess.run(command.split(), cwd=self.folder, check=True, capture_output=True, timeout=250)
 
     def config(self, name, *changes, endpoint=None):
         """A file of the example, with changes: (text, what stands in its place)."""
@@ -89,7 +89,7 @@ STRANGERS = [
 def test_certificates_and_users_as_in_the_example(keys, monkeypatch):
     other = keys.folder / "other"
     other.mkdir()
-    subprocess.run(AUTHORITY.split(), cwd=other, check=True, capture_output=True, timeout=60)
+    subprocess.run(AUTHORITY.split(), cwd=other, check=True, capture_output=True, timeout=250)
     shutil.copy(other / "authority.pem", keys.folder / "other.pem")
     with (
         Streaming(SKIN) as streaming,

@@ -34,17 +34,18 @@ class FirstKept(net_port.ZenohPort):
 @pytest.mark.parametrize("block", [False, True], ids=["drop", "block"])
 def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoint):
     monkeypatch.setattr(net_port, "ZenohPort", FirstKept)
-    source = SmallPort()
     with (
+        Awake() as awake,
         session.listening(f"{endpoint}#so_sndbuf=4096") as network,
         Relay(endpoint, BYTES_S) as relay,
-        published(source, network, "slow", block=block) as publisher,
+        published(source := SmallPort(now=awake.seconds), network, "slow", block=block) as publisher,
         contactfpga.open(f"zenoh://slow?connect={relay.endpoint}&wait=60", timeout=LONG) as board,
     ):
         unknown = settled(source, board)
         sent = source.sent
         source.go(2000.0)
-        wait_until(lambda: source.sent - sent >= 3000, LONG)
+        # For 1.5 s; while this process has to wait, none comes, and none is lost.
+        wait_until(lambda: source.sent - sent >= 3000 and (block or board.stats.net.lost_messages > 10), LONG)
         source.go(0.0)
         relay.bytes_s = 10**7
         assert settled(source, board) == unknown, "every frame came, or is counted"

@@ -85,7 +85,7 @@ def test_a_long_table_is_in_a_file_beside_the_page(tmp_path):
 def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):
     (tmp_path / "bad.toml").write_text("rows = 0")
     command = [sys.executable, "-m", f"contactfpga_sim.{module}", *arguments]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=250)
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert done.returncode in (1, 2)

@@ -35,7 +35,7 @@ def install(tmp_path):
 
 
 def run(command, log):
-    return subprocess.run(command, capture_output=True, text=True, env={"PYTHONPATH": str(log.parent)}, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, env={"PYTHONPATH": str(log.parent)}, timeout=250)
 
 
 def test_pips_words_go_to_a_file(install):
