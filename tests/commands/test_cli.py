@@ -233,7 +233,9 @@ def test_help_loads_no_command(python):
 
 def test_json_needs_no_display(board, loaded):
     assert (
-        loaded(f"from contactfpga.tools import cli\ncli.main(['zones', '--once', '--json', '{board.path}'])")
+        loaded(
+            f"from contactfpga.tools import cli\ncli.main(['zones', '--once', '--json', '--timeout', '60', '{board.path}'])"
+        )
         == "serialx"
     )
 
