@@ -2,10 +2,12 @@
 
 import pytest
 
-from contactfpga.tools.recordings import link_recorder
+from contactfpga.tools.recordings import link_recorder, recorder
 
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch):
-    """What waits at the end of a recording has time to become messages, on a busy machine as well."""
+    """On a busy machine as well, what waits at the end of a recording has time to become messages, and a new file waits
+    for its hello."""
     monkeypatch.setattr(link_recorder, "END_S", 60.0)
+    monkeypatch.setattr(recorder, "PATIENCE_S", 60.0)
