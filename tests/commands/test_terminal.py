@@ -34,9 +34,9 @@ def files(tmp_path_factory):
 
 COMMANDS = {
     "zones": ["zones", "--once", "sim://?scene=palm"],
-    "zones of 64x64": ["zones", "--once", "FILES/big"],
-    "zones of 64x64 cells": ["zones", "--once", "FILES/cells"],
-    "wire": ["wire", "--once", "FILES/cells"],
+    "zones of 64x64": ["zones", "--once", "--timeout", "60", "FILES/big"],
+    "zones of 64x64 cells": ["zones", "--once", "--timeout", "60", "FILES/cells"],
+    "wire": ["wire", "--once", "--timeout", "60", "FILES/cells"],
     "doctor": ["doctor", "--seconds", "0.01", "sim://"],
     "replay": ["replay", "FILES/frames.npy"],
     "arm": ["study", "arm", "--places", "4", "--output", "FILES/arm"],

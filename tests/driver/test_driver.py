@@ -28,6 +28,7 @@ def test_read_zones_gives_the_zone_in_cells_and_mm(board):
     assert zones.total_zones == 1
 
 
+@pytest.mark.usefixtures("_asks_once")
 def test_port_stays_open_between_reads(board):
     first = contactfpga.read_zones(board.path, timeout=LONG)
     kept = driver._boards[board.path]
@@ -37,6 +38,7 @@ def test_port_stays_open_between_reads(board):
     assert board.asked == 3  # two to learn what is on the way, then one each
 
 
+@pytest.mark.usefixtures("_asks_once")
 def test_frames_older_than_the_call_are_passed_over(board):
     contactfpga.read_zones(board.path, timeout=LONG)
     opened = driver._boards[board.path]
@@ -85,7 +87,7 @@ def test_an_answer_to_the_program_before_is_not_taken_for_one_to_this(board):
 def test_a_request_that_is_lost_is_sent_again(board):
     with contactfpga.open(board.path, timeout=LONG) as opened:
         board.answers = False
-        asked = board.asked
+        asked, begun = board.asked, time.monotonic()
 
         def answer_later():
             wait_until(lambda: board.asked > asked)
@@ -93,7 +95,8 @@ def test_a_request_that_is_lost_is_sent_again(board):
 
         with background(answer_later):
             opened.read(LONG)
-        assert board.asked == asked + 2
+        # Where the machine lets the answer wait, each quarter of a second once more.
+        assert 2 <= board.asked - asked <= 2 + (time.monotonic() - begun) / 0.25
 
 
 @pytest.mark.parametrize("timeout", [0, -1, float("nan"), float("inf"), "1", None, True])

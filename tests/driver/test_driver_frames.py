@@ -14,7 +14,7 @@ from model_board import SCAN_US
 
 import contactfpga
 
-pytestmark = pytest.mark.usefixtures("_closed_ports")
+pytestmark = pytest.mark.usefixtures("_closed_ports", "_asks_once")
 
 SKIN = contactfpga.Skin()
 LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy

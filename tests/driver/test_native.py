@@ -26,7 +26,10 @@ from contactfpga import Skin
 from contactfpga.driver import driver, health, native
 from contactfpga.driver.native_link import NativeLink
 
-pytestmark = pytest.mark.skipif(bool(native.missing()), reason=native.missing())
+pytestmark = [
+    pytest.mark.skipif(bool(native.missing()), reason=native.missing()),
+    pytest.mark.usefixtures("_asks_once"),
+]
 LONG = 60.0
 
 
