@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import collections
 import contextlib
-import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -25,8 +24,8 @@ FOUND_S = 3.0
 GONE_S = 1.0
 """Silence after which a publisher is gone, whatever its token: anyone can declare a token."""
 LATE_S = 0.2
-"""How much longer than asked for a wait lasts if this process had to stand still: its silence is not the publisher's,
-whose messages may wait to be taken."""
+"""How much longer than asked for a wait lasts if this process stood still, as one that is stopped or gets no processor.
+That is no silence of the publisher's, whose messages may wait to be taken."""
 
 
 class ZenohPort:
@@ -43,7 +42,8 @@ class ZenohPort:
         self._waiting = 0
         self._stream = Stream(self.counters)
         self._asks: zenoh.Publisher | None = None
-        self._back_s = -math.inf  # when this process last went on after it had stood still
+        self._still_s = 0.0  # for which this process stood still since the last message
+        self._still_after_s: float | None = None  # when that message came
         try:
             self._session = session.connected(address.connect, address.config)
         except MissingExtra:
@@ -92,14 +92,17 @@ class ZenohPort:
             return data
 
     def _wait(self, timeout_s: float) -> None:
-        begun_s = time.monotonic()
+        begun_s, heard_s = time.monotonic(), self._stream.heard_s
         self._changed.wait(timeout_s)
-        if (now_s := time.monotonic()) - begun_s > timeout_s + LATE_S:
-            self._back_s = now_s
+        late_s = time.monotonic() - begun_s - timeout_s
+        if late_s > LATE_S and self._stream.heard_s == heard_s:
+            self._still_s = late_s + (self._still_s if self._still_after_s == heard_s else 0.0)
+            self._still_after_s = heard_s
 
     def _gone(self) -> bool:
-        assert self._stream.heard_s is not None
-        silent_s, wait_s = time.monotonic() - max(self._stream.heard_s, self._back_s), self._address.wait_s
+        heard_s, wait_s = self._stream.heard_s, self._address.wait_s
+        assert heard_s is not None
+        silent_s = time.monotonic() - heard_s - (self._still_s if self._still_after_s == heard_s else 0.0)
         return silent_s > (max(wait_s, QUIET_S) if self._stream.ended else wait_s + GONE_S)
 
     def write(self, data: bytes) -> None:
