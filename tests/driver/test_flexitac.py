@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from fake_board import wait_until
 from scipy import ndimage
 
 import contactfpga
@@ -99,6 +100,17 @@ def test_a_request_is_answered_by_a_frame_that_began_later():
             zones = board.read(LONG)
             assert board.clock() - asked > 0.01  # a frame that was on its way is no answer
         assert zones.time_us > 0
+
+
+def test_it_says_hello_by_itself_as_boards_do():
+    """Else a reader in the network would know no times after a break, and get no frames any more."""
+    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet)) as board:
+        board.next(LONG)
+        frames, hellos = board.stats.frames, board.stats.hellos
+        wait_until(lambda: board.stats.hellos >= hellos + 3)
+        assert board.stats.frames - frames > 50, "two per second"
+        stats = board.stats
+    assert (stats.lost, stats.restarts, stats.unexplained, sum(stats.damaged.values())) == (0, 0, 0, 0)
 
 
 def test_a_touch_that_slides_is_one_track():

@@ -3,11 +3,12 @@ ROS 2 and the view."""
 
 import collections
 import json
+import termios
 import time
 
 import numpy as np
 import pytest
-from fake_board import patiently
+from fake_board import patiently, wait_until
 
 import contactfpga
 from contactfpga_sim.model.board.flexitac import COLUMNS, ROWS, FlexitacSheet
@@ -24,11 +25,25 @@ def touched(seconds):
     return ((rows - ROW) ** 2 + (columns - COLUMN) ** 2 <= 4) * float(seconds > 1.0)
 
 
+class Sheet(FlexitacSheet):
+    """One that a test can begin again with."""
+
+    def begin(self):
+        """As if nobody had read yet: what was sent is dropped, and then some more."""
+        self.seconds = 0.0
+        wait_until(lambda: termios.tcflush(self._slave, termios.TCIFLUSH) or self.seconds > 0.1)
+
+
 @pytest.fixture
-def address():
+def sheet():
     """Of 514 bytes of a frame, one is lost in one of 6 frames, and one is wrong in one of 10."""
-    with FlexitacSheet(touched, lost=1 / 3000, wrong=1 / 5000) as sheet:
-        yield f"flexitac://{sheet.port}?frames=10"
+    with Sheet(touched, lost=1 / 3000, wrong=1 / 5000) as sheet:
+        yield sheet
+
+
+@pytest.fixture
+def address(sheet):
+    return f"flexitac://{sheet.port}?frames=10"
 
 
 def usual(frames):
@@ -44,10 +59,14 @@ def of_json(text):
     return [[(zone["x_mm"], zone["y_mm"], zone["area_cells"]) for zone in line["zones"]] for line in lines]
 
 
-def for_seconds(run, *words):
-    """What a command says that takes so many seconds; more where the machine lets the sheet wait meanwhile."""
+def for_seconds(run, sheet, *words, recorded=None):
+    """What a command says that takes so many seconds, and may record into a file; more seconds where the machine lets
+    the sheet wait meanwhile."""
 
     def said(seconds):
+        sheet.begin()
+        if recorded is not None:
+            recorded.unlink(missing_ok=True)
         status, said, errors = run(*words, "--timeout", "60", "--seconds", seconds)
         assert status == 0, errors
         return said
@@ -55,16 +74,16 @@ def for_seconds(run, *words):
     return patiently(said, lambda said: sum(map(bool, of_json(said))) > 100, (3, 12, 48))
 
 
-def test_zones_and_tracks_by_command(address, run):
-    said = for_seconds(run, "zones", address, "--tracks", "--json")
+def test_zones_and_tracks_by_command(address, sheet, run):
+    said = for_seconds(run, sheet, "zones", address, "--tracks", "--json")
     assert usual(of_json(said)) == (*PLACE_MM, CELLS)
     ids = [track["id"] for line in map(json.loads, said.splitlines()) for track in line["tracks"]]
     assert collections.Counter(ids).most_common(1)[0][1] > 60
 
 
-def test_a_recording_by_command_is_shown_again(address, run, tmp_path):
+def test_a_recording_by_command_is_shown_again(address, sheet, run, tmp_path):
     file = tmp_path / "flexitac.rec"
-    said = for_seconds(run, "zones", address, "--json", "--record", file)
+    said = for_seconds(run, sheet, "zones", address, "--json", "--record", file, recorded=file)
     status, again, errors = run("zones", f"replay://{file}", "--json")
     assert status == 0, errors
     seen = {frame["time_us"]: frame["zones"] for frame in map(json.loads, said.splitlines())}
@@ -73,10 +92,11 @@ def test_a_recording_by_command_is_shown_again(address, run, tmp_path):
     assert usual(of_json(again)) == (*PLACE_MM, CELLS)
 
 
-def test_recorded_as_mcap_and_exported(address, run, tmp_path):
+def test_recorded_as_mcap_and_exported(address, sheet, run, tmp_path):
     pytest.importorskip("mcap")
 
     def exported(seconds):
+        sheet.begin()
         file, table = tmp_path / f"{seconds}.mcap", tmp_path / f"{seconds}.csv"
         status, _, errors = run("record", file, address, "--timeout", "60", "--seconds", seconds)
         assert status == 0, errors
@@ -99,10 +119,11 @@ def zones_of(board, count):
     return found
 
 
-def test_over_the_network(address):
+def test_over_the_network(address, monkeypatch):
     pytest.importorskip("zenoh")
-    from net_processes import free_endpoint, patient, publish
+    from net_processes import free_endpoint, patient, publish, wait_long
 
+    wait_long(monkeypatch)
     with publish(address, "--listen", free_endpoint()) as publisher:
         assert publisher.line.startswith("zenoh://"), publisher.end()
         with contactfpga.open(patient(publisher.line), timeout=60.0) as board:

@@ -1,9 +1,7 @@
 """What the tests of boards in the network share."""
 
 import pytest
-from net_processes import LONG_S, free_endpoint
-
-from contactfpga.robot.net import port, session
+from net_processes import free_endpoint, wait_long
 
 
 @pytest.fixture
@@ -14,7 +12,5 @@ def endpoint():
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch):
-    """Who is there is found, connected and kept, however late; a test of who is not sets its own limits."""
-    monkeypatch.setattr(port, "FOUND_S", LONG_S)
-    monkeypatch.setattr(session, "CONNECT_MS", round(1000 * LONG_S))
-    monkeypatch.setattr(session, "LEASE_MS", round(1000 * LONG_S))
+    """A test of who is not there sets its own limits."""
+    wait_long(monkeypatch)

@@ -76,6 +76,15 @@ net.port.FOUND_S, net.session.CONNECT_MS, net.session.LEASE_MS = {LONG_S}, {LONG
 """
 
 
+def wait_long(monkeypatch):
+    """The same for this process: who is there is found, connected and kept, however late."""
+    from contactfpga.robot.net import port, session
+
+    monkeypatch.setattr(port, "FOUND_S", LONG_S)
+    monkeypatch.setattr(session, "CONNECT_MS", round(1000 * LONG_S))
+    monkeypatch.setattr(session, "LEASE_MS", round(1000 * LONG_S))
+
+
 def patient(port):
     """The ``zenoh://`` port, for a reader that waits long for a publisher that the machine lets wait."""
     return f"{port}{'&' if '?' in port else '?'}wait={LONG_S:.0f}"
