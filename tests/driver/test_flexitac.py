@@ -66,7 +66,7 @@ def frames_of(board, sheet, touch, count):
 
 def test_two_touches_are_two_zones_where_they_are():
     touch = Touch((4, 6), (10, 25))
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         assert (board.sheet.rows, board.sheet.columns, board.sheet.pitch_x_mm) == (16, 32, PITCH_MM)
         frames, stats = frames_of(board, sheet, touch, 20), board.stats
     assert len(frames[0]) == 0
@@ -93,7 +93,7 @@ def test_zones_are_those_of_another_labeller_on_random_frames():
 
 
 def test_a_request_is_answered_by_a_frame_that_began_later():
-    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         board.next(LONG)
         for _ in range(3):
             asked = board.clock()
@@ -104,7 +104,7 @@ def test_a_request_is_answered_by_a_frame_that_began_later():
 
 def test_it_says_hello_by_itself_as_boards_do():
     """Else a reader in the network would know no times after a break, and get no frames any more."""
-    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         board.next(LONG)
         frames, hellos = board.stats.frames, board.stats.hellos
         wait_until(lambda: board.stats.hellos >= hellos + 3)
@@ -116,7 +116,7 @@ def test_it_says_hello_by_itself_as_boards_do():
 def test_a_touch_that_slides_is_one_track():
     tracker = Tracker()
     touch = Touch((8, 4), columns_per_s=20.0)
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         frames = frames_of(board, sheet, touch, 50)
     events = [(event.kind, event.id) for frame in frames for event in tracker.update(frame).events]
     assert [event for event in events if event[0] != "move"] == [("down", 1)]
@@ -126,7 +126,7 @@ def test_a_touch_that_slides_is_one_track():
 def test_a_recording_of_it_gives_the_same_zones(tmp_path):
     file = tmp_path / "flexitac.rec"
     touch = Touch((4, 6))
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file) as board:
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file, timeout=LONG) as board:
         seen = frames_of(board, sheet, touch, 20)
     with contactfpga.open(f"replay://{file}") as board:
         again = {zones.frame.sequence: zones.records.tolist() for zones in board}
@@ -137,7 +137,7 @@ def test_a_recording_of_it_gives_the_same_zones(tmp_path):
 def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
     """Of frames with 514 bytes, 1 of 2,000 bytes lost damages one in four."""
     touch = Touch((8, 16))
-    with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         frames, stats = frames_of(board, sheet, touch, 60), board.stats
     touched = [frame for frame in frames if len(frame)]
     assert len(touched) > 40
