@@ -92,11 +92,11 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     shown, visitor = seen
     shown.hand.click(30, 50)
     shown.hand.click(30, 110)
-    visitor.page.wait_for_selector("text=2 contacts", timeout=60_000)
+    visitor.page.wait_for_selector("text=2 contacts", timeout=120_000)
     width, height, shown_wide = visitor.page.evaluate(
         "[window.__viserMutable.canvas.width, window.__viserMutable.canvas.height, window.box()[2]]"
     )
-    with visitor.page.expect_download(timeout=60_000) as kept:
+    with visitor.page.expect_download(timeout=120_000) as kept:
         visitor.page.keyboard.press("p")
     kept.value.save_as(tmp_path / "kept.png")
     assert kept.value.suggested_filename == "contactfpga.png"
@@ -104,7 +104,7 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     assert wide == width
     assert high == pytest.approx(height + 4 * 1.6 * 14 * width / shown_wide, abs=2)
     visitor.page.keyboard.press("l")
-    visitor.page.wait_for_selector("text=Nothing touches", timeout=60_000)
+    visitor.page.wait_for_selector("text=Nothing touches", timeout=120_000)
     assert shown.hand.fingers == []
 
 
@@ -123,8 +123,8 @@ def test_a_page_is_dark_for_who_likes_it(seen, scheme):
     shown, visitor = seen
     page = visitor.page.context.browser.new_page(viewport={"width": 400, "height": 300}, color_scheme=scheme)
     try:
-        page.goto(shown.url)
-        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached", timeout=60_000)
+        page.goto(shown.url, timeout=120_000)
+        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached", timeout=120_000)
         red, green, blue = page.evaluate("getComputedStyle(document.body).backgroundColor.match(/[0-9]+/g).map(Number)")
         assert (red + green + blue < 150) == (scheme == "dark")
     finally:
