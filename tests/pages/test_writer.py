@@ -94,7 +94,7 @@ def test_a_wide_table_leaves_columns_to_its_file(tmp_path):
 def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):
     (tmp_path / "bad.toml").write_text("rows = 0")
     command = [sys.executable, "-m", f"contactfpga_sim.{module}", *arguments]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=250)
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert done.returncode in (1, 2)
