@@ -9,11 +9,12 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.driver.clock import MOST_S, HostClock, Timeline, continues
+from contactfpga.driver.clock import MOST_S, ClockFit, HostClock, Timeline, continues
 from contactfpga.driver.events import Lines, UnitLine
 from contactfpga.driver.reads import Reads
 from contactfpga.driver.requests import Requests
@@ -30,7 +31,7 @@ from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.wire.units import KIND_UNITS
 from contactfpga.zones.run import Run, frame_of
-from contactfpga.zones.units import UnitSamples
+from contactfpga.zones.units import UnitHistory, UnitSamples
 from contactfpga.zones.zone import HostLine, Zones
 
 _FRAME_KINDS = set(protocol.KINDS.values())
@@ -45,6 +46,30 @@ class Arrival:
     """Every :meth:`Conversation.ask` whose ticket is not above this one came before the frame was scanned."""
 
 
+class Steady(NamedTuple):
+    """What frames mean as long as each continues the last one: then they change nothing but counters and clocks."""
+
+    time_us: int
+    """Of the last frame, since power-up."""
+    before: Frame
+    """The last frame."""
+    came_s: float
+    """When it came."""
+    fit: ClockFit
+    """Of the clocks, after it."""
+    byte_s: float
+    """What a byte takes on the wire."""
+    sheet: Sheet
+    faults: tuple[str, ...]
+    """Of flagged frames."""
+    history: UnitHistory | None
+
+    def zones(self, frame: Frame, time_us: int, before: Frame, line: HostLine) -> Zones:
+        """Of a frame that continues the last one, perhaps with others between, which is not counted; ``before``: the
+        one before it."""
+        return Zones(frame, self.sheet, time_us, before, line, self.faults, self.history)
+
+
 Event = Arrival | Hello | Faults | SelfTestSlot | UnitSamples | SkinMismatch | VersionMismatch
 
 FEW, FEW_IN_RUN = 16, 8
@@ -55,11 +80,17 @@ class Conversation:
     """One port's side of it.
 
     ``port``: its name, for messages. ``expected``: the Skin the board must be built from; None: any. ``live``: a board
-    is at the other end; else the bytes are a recording, and their times are no arrival times.
+    is at the other end; else the bytes are a recording, and their times are no arrival times. ``fit`` makes the fit of its
+    clocks.
     """
 
     def __init__(
-        self, port: str, expected: Skin | None = None, live: bool = True, rng: random.Random | None = None
+        self,
+        port: str,
+        expected: Skin | None = None,
+        live: bool = True,
+        rng: random.Random | None = None,
+        fit: Callable[[], ClockFit] = ClockFit,
     ) -> None:
         self.port = port
         self.stats = Stats()
@@ -77,7 +108,7 @@ class Conversation:
         self._live = live
         self._requests = Requests(rng)
         self._timeline = Timeline(self.stats, live)
-        self._clock = HostClock(live)
+        self._clock = HostClock(fit() if live else None)
         self._reader = protocol.HelloReader()
         self.decodes: tuple[Widths, bytes] | None = None
         """What frames are decoded with, and what their check begins with; None where they come only one by one."""
@@ -162,25 +193,14 @@ class Conversation:
         self._rest = rest
         self.stats.bytes += missing
 
-    def steady(self) -> tuple[float, ...] | None:
-        """What :attr:`Timeline.last` says of the last frame, what :meth:`ClockFit.bounds` says, and what a byte takes
-        on the wire in s; None where a frame that continues the last one might change anything else than counters."""
+    def steady(self) -> Steady | None:
+        """None where a frame that continues the last one might change anything else than counters and clocks."""
         last, fit = self._timeline.last, self._clock.fit
-        bounds = None if fit is None else fit.bounds()
-        if last is None or bounds is None or self.lines.fading or self.decodes is None:
+        if last is None or fit is None or not fit.begun or self.lines.fading or self.decodes is None:
             return None
-        return *last, *bounds, self._clock.byte_s
-
-    def frame_from(self, frame: Frame, time_us: int, before: Frame | None, line_s: float, arrived_s: float) -> Zones:
-        """One that continues the last one while all is :meth:`steady`, perhaps with others between; it is not counted.
-        ``before``: the one before it, if that is another than the last one; ``line_s``: as for
-        :meth:`ClockFit.line_from`."""
-        fit = self._clock.fit
         assert self._widths is not None
-        assert fit is not None
-        faults, before = self.lines.names("fault" in frame.flags), before or self._timeline.before
-        line = fit.line_from(line_s, arrived_s)
-        return Zones(frame, self._widths.sheet, time_us, before, line, faults, self.units.history)
+        names = self.lines.names(flagged=True)
+        return Steady(*last, fit, self._clock.byte_s, self._widths.sheet, names, self.units.history)
 
     def pass_time(self, now: float, paused: bool) -> None:
         """Nothing came until now. Who reads sees to it that nobody ``paused`` for long, as :meth:`doubt` wants."""

@@ -19,10 +19,13 @@ import numpy as np
 
 from contactfpga.driver import forks
 from contactfpga.driver.address import Serial, parse
+from contactfpga.driver.clock import ClockFit
+from contactfpga.driver.conversation import Steady
 from contactfpga.driver.reads import Read, Reads
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import FIELDS, PacketTable
 from contactfpga.zones.run import frame_of
+from contactfpga.zones.zone import HostLine
 
 LIBRARY = Path(__file__).with_name("_reader.so")
 """File of the library, put there by the installation."""
@@ -33,7 +36,8 @@ CHUNK = 16_384
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
 _READ = struct.Struct("d4q")
-_NEWEST = struct.Struct("Qqqdd")
+_LINE = struct.Struct("qddd")
+_NEWEST = struct.Struct("Qqqdqddd")
 _FRAME = struct.Struct("?7x8q")
 
 
@@ -58,13 +62,6 @@ class Base(ctypes.Structure):
         ("time_us", ctypes.c_int64),
         ("heard", ctypes.c_int64),
         ("came_s", ctypes.c_double),
-        ("base_us", ctypes.c_int64),
-        ("piece", ctypes.c_int64),
-        ("base_s", ctypes.c_double),
-        ("height_s", ctypes.c_double),
-        ("slope", ctypes.c_double),
-        ("fitted_s", ctypes.c_double),
-        ("newest_s", ctypes.c_double),
         ("byte_s", ctypes.c_double),
     ]
 
@@ -77,11 +74,9 @@ class Newest(NamedTuple):
     time_us: int
     """Since power-up."""
     before: bool
-    """Whether the frame before it came after the last packet that was taken."""
-    at_s: float
-    """When it came."""
-    line_s: float
-    """Time of the newest arrival of the fit of clocks by then."""
+    """Whether the frame before it came after :meth:`Port.settle`."""
+    line: HostLine
+    """When it came, and its time on the host's clock."""
 
 
 class Library:
@@ -108,8 +103,14 @@ class Library:
         self.notice = function(keeps, "notice", ctypes.c_int, address, double)
         self.failure = function(keeps, "failure", ctypes.c_int, address)
         self.take = function(keeps, "take", None, address, address, ctypes.c_size_t)
-        self.settle = function(keeps, "settle", None, address, ctypes.POINTER(Base))
+        self.settle = function(keeps, "settle", None, address, ctypes.POINTER(Base), address)
         self.newest = function(keeps, "newest", ctypes.c_int, address, number, address)
+        self.fit_size = function(keeps, "fit_size", ctypes.c_size_t)
+        self.fit_begin = function(keeps, "fit_begin", None, address)
+        self.fit_forget = function(keeps, "fit_forget", None, address)
+        self.fit_arrived = function(keeps, "fit_arrived", None, address, ctypes.c_size_t, *[address] * 4)
+        self.fit_answered = function(keeps, "fit_answered", None, address, ctypes.c_int64, double)
+        self.fit_line = function(keeps, "fit_line", ctypes.c_int, address, address)
 
 
 @functools.lru_cache(maxsize=1)
@@ -140,6 +141,43 @@ def refusal(port: object) -> str:
     return missing()
 
 
+class NativeFit(ClockFit):
+    """The same in C, which the thread goes on with by itself: see :meth:`Port.settle`."""
+
+    def __init__(self) -> None:
+        self._library = library()
+        self.memory = ctypes.create_string_buffer(self._library.fit_size())
+        self._next = ctypes.create_string_buffer(_LINE.size)
+        self._library.fit_begin(self.memory)
+
+    def forget(self) -> None:
+        self._library.fit_forget(self.memory)
+
+    def arrived(self, time_us: int, arrived_s: float, wire_s: float) -> None:
+        host = (ctypes.c_double * 2)(arrived_s, wire_s)
+        self._library.fit_arrived(
+            self.memory, 1, ctypes.byref(ctypes.c_int64(time_us)), host, ctypes.byref(host, _WORD), None
+        )
+
+    def answered(self, time_us: int, asked_s: float) -> None:
+        self._library.fit_answered(self.memory, time_us, asked_s)
+
+    def arrived_in_turn(
+        self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        came = times_us.astype(np.int64), arrived_s.astype(float), wire_s.astype(float)  # in one piece each
+        lines = np.empty((len(times_us), 4))
+        self._library.fit_arrived(self.memory, len(lines), *(values.ctypes.data for values in (*came, lines)))
+        return lines.view(np.int64)[:, 0], lines[:, 1], lines[:, 2], lines[:, 3]
+
+    @property
+    def begun(self) -> bool:
+        return bool(self._library.fit_line(self.memory, self._next))
+
+    def line(self, arrived_s: float) -> HostLine | None:
+        return HostLine(arrived_s, *_LINE.unpack(self._next)) if self.begun else None
+
+
 class Port:
     """A port that the thread reads; with a descriptor of -1 it gets what :meth:`feed` gives."""
 
@@ -153,7 +191,6 @@ class Port:
         self.taken = 0
         """Packets that were taken, and those that were overwritten before."""
         self._bytes = 0  # the same
-        self._base = Base()
         self._make_room()
         forks.watch(self)
 
@@ -273,22 +310,26 @@ class Port:
 
     # ---- the newest frame
 
-    def settle(self, steady: tuple[float, ...] | None) -> None:
+    def settle(self, steady: Steady | None) -> None:
         """What :meth:`contactfpga.driver.conversation.Conversation.steady` says after what was taken."""
-        base = self._base
-        base.steady, base.packets = steady is not None, self.taken
-        if steady is not None:
-            base.time_us, base.heard, base.came_s, base.base_us, base.piece, *rest = steady
-            base.base_s, base.height_s, base.slope, base.fitted_s, base.newest_s, base.byte_s = rest
-        self._library.settle(self._address, ctypes.byref(base))
+        base, memory = Base(packets=self.taken), None
+        if steady is not None and isinstance(steady.fit, NativeFit):
+            memory = steady.fit.memory
+            base.steady, base.time_us, base.heard = 1, steady.time_us, steady.before.heard
+            base.came_s, base.byte_s = steady.came_s, steady.byte_s
+        self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
         """The newest frame, whose fields and records :meth:`frame` gives then; None where it is not newer than this
-        packet. Raises :class:`Unsettled` where what came does not tell it."""
+        packet, which is one that was taken before :meth:`settle` or came later. Raises :class:`Unsettled` where what
+        came does not tell it. Not for several threads at once."""
         found = self._library.newest(self._address, packets, self._newest_at)
         if found < 0:
             raise Unsettled
-        return Newest(*_NEWEST.unpack_from(self._newest_view)) if found else None
+        if not found:
+            return None
+        number, time_us, before, *line = _NEWEST.unpack_from(self._newest_view)
+        return Newest(number, time_us, bool(before), HostLine(*line))
 
     def frame(self) -> Any:
         """The newest frame of the last :meth:`newest`, as it came over the wire."""
