@@ -76,14 +76,16 @@ static double slope_of(int index) {
 /* Adds to each slope's sum the height now of the highest line of it below the points; sign -1: of the lowest one above,
  * upside down. */
 static void add_least(const points *from, double now_s, double sign, double *sums) {
-    for (int i = 0; i < SLOPES; i++) {
-        double least = INFINITY, slope = sign * slope_of(i);
-        for (int64_t j = 0; j < from->count; j++) {
-            double height = sign * from->at[j].excess_s - slope * (from->at[j].device_s - now_s);
-            least = height < least ? height : least;
+    double slopes[SLOPES], least[SLOPES];
+    for (int i = 0; i < SLOPES; i++) slopes[i] = sign * slope_of(i), least[i] = INFINITY;
+    for (int64_t j = 0; j < from->count; j++) {
+        double excess_s = sign * from->at[j].excess_s, run_s = from->at[j].device_s - now_s;
+        for (int i = 0; i < SLOPES; i++) {
+            double height = excess_s - slopes[i] * run_s;
+            least[i] = height < least[i] ? height : least[i];
         }
-        sums[i] += least;
     }
+    for (int i = 0; i < SLOPES; i++) sums[i] += least[i];
 }
 
 static double median_of(double *values, int64_t count) {

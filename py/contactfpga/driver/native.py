@@ -21,7 +21,7 @@ from contactfpga.driver import forks
 from contactfpga.driver.address import Serial, parse
 from contactfpga.driver.clock import ClockFit
 from contactfpga.driver.conversation import Steady
-from contactfpga.driver.reads import Read, Reads
+from contactfpga.driver.reads import READ, Reads
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import FIELDS, PacketTable
 from contactfpga.zones.run import frame_of
@@ -35,7 +35,6 @@ CHUNK = 16_384
 
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
-_READ = struct.Struct("d4q")
 _LINE = struct.Struct("qddd")
 _NEWEST = struct.Struct("Qqqdqddd")
 _FRAME = struct.Struct("?7x8q")
@@ -268,7 +267,6 @@ class Port:
         """For the newest frame and the one before it."""
         self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
         self._newest_view = self._newest.data
-        self._newest_words = self._newest.view(np.int64)
         self._newest_at = self._newest.ctypes.data
 
     # ---- what came
@@ -285,7 +283,7 @@ class Port:
             return None
         columns = self._columns
         reads = _TAKEN.size
-        fields = reads + count * _READ.size
+        fields = reads + count * READ.itemsize
         starts = fields + packets * FIELDS.itemsize
         sizes = starts + (packets + 1) * _WORD
         carried = sizes + packets * _WORD
@@ -297,8 +295,9 @@ class Port:
             found = np.frombuffer(memory, FIELDS, packets, fields)
             table = PacketTable(found, np.frombuffer(memory, np.int64, packets + 1, starts), rows)
         came = Reads(
-            Read(0.0, first_byte, first_packet, 0, 0),
-            list(_READ.iter_unpack(memory.data[reads:fields])),
+            first_byte,
+            first_packet,
+            np.frombuffer(memory, READ, count, reads),
             memory[data:end].tobytes(),
             self._decodes,
             table,
@@ -328,8 +327,8 @@ class Port:
             raise Unsettled
         if not found:
             return None
-        number, time_us, before, *line = _NEWEST.unpack_from(self._newest_view)
-        return Newest(number, time_us, bool(before), HostLine(*line))
+        values = _NEWEST.unpack_from(self._newest_view)
+        return Newest(values[0], values[1], bool(values[2]), HostLine._make(values[3:]))
 
     def frame(self) -> Any:
         """The newest frame of the last :meth:`newest`, as it came over the wire."""
@@ -346,9 +345,9 @@ class Port:
         start = _NEWEST.size + 2 * FIELDS.itemsize
         if index:
             start += _FRAME.unpack_from(self._newest_view, _NEWEST.size)[-1] * self._columns * _WORD
-        start //= _WORD
-        records = self._newest_words[start : start + fields[-1] * self._columns].reshape(-1, self._columns).copy()
-        return frame_of(fields, records, self._decodes[0].sheet)
+        shape = fields[-1], self._columns
+        copied = bytearray(self._newest_view[start : start + shape[0] * shape[1] * _WORD])
+        return frame_of(fields, np.ndarray(shape, np.int64, copied), self._decodes[0].sheet)
 
 
 class Unsettled(Exception):

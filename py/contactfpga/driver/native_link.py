@@ -27,7 +27,7 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
-SERVE_S = 0.5
+SERVE_S = 2.0
 """Interval of taking what came while nobody calls; logs are as late as this. A file of recorded bytes has
 :data:`contactfpga.driver.link.READ_S`."""
 
