@@ -80,8 +80,8 @@ class Conversation:
     """One port's side of it.
 
     ``port``: its name, for messages. ``expected``: the Skin the board must be built from; None: any. ``live``: a board
-    is at the other end; else the bytes are a recording, and their times are no arrival times. ``fit`` makes the fit of its
-    clocks.
+    is at the other end; else the bytes are a recording, and their times are no arrival times. ``fit`` makes the fit of
+    its clocks.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Conversation:
         self._timeline = Timeline(self.stats, live)
         self._clock = HostClock(fit() if live else None)
         self._reader = protocol.HelloReader()
-        self.decodes: tuple[Widths, bytes] | None = None
+        self.frame_format: tuple[Widths, bytes] | None = None
         """What frames are decoded with, and what their check begins with; None where they come only one by one."""
         self._widths: Widths | None = None
         self._rest = b""
@@ -159,11 +159,11 @@ class Conversation:
         packets = self._split(data, now)
         if decoded is not None and len(decoded.packets) != len(packets):
             decoded = None
-        same = self.decodes
+        same = self.frame_format
         events: list[Event | Run] = []
         at = 0
         while at < len(packets):
-            known = decoded if decoded is not None and self.decodes == same else None
+            known = decoded if decoded is not None and self.frame_format == same else None
             at += self._take_some(packets[at:], now, events, known and known.part(at, len(packets)))
         self._end(now)
         return events
@@ -184,11 +184,11 @@ class Conversation:
             if reads.paused(at):
                 self.doubt(now)
             self._noticed = now
-            decoded = reads.decoded_at(at) if self.decodes == reads.decodes else None
+            decoded = reads.decoded_at(at) if self.frame_format == reads.frame_format else None
             yield now, self.receive_runs(reads.data_of(at), now, decoded)
             at += 1
 
-    def lost_track(self, rest: bytes, missing: int) -> None:
+    def skip(self, missing: int, rest: bytes) -> None:
         """Count ``missing`` bytes that were overwritten; ``rest`` is the packet that the next read completes."""
         self._rest = rest
         self.stats.bytes += missing
@@ -196,7 +196,7 @@ class Conversation:
     def steady(self) -> Steady | None:
         """None where a frame that continues the last one might change anything else than counters and clocks."""
         last, fit = self._timeline.last, self._clock.fit
-        if last is None or fit is None or not fit.begun or self.lines.fading or self.decodes is None:
+        if last is None or fit is None or not fit.begun or self.lines.fading or self.frame_format is None:
             return None
         assert self._widths is not None
         names = self.lines.names(flagged=True)
@@ -222,7 +222,7 @@ class Conversation:
         and many enough; ``at`` where there are not."""
         first = reads.packets_before(at)
         end = reads.last_within(at, ends[first + 1] if first + 1 < len(ends) else first)
-        if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.decodes != reads.decodes:
+        if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.frame_format != reads.frame_format:
             return at
         if not self._requests.idle or self.lines.fading or not self._clock.begun:
             return at
@@ -276,7 +276,7 @@ class Conversation:
         """
         before, widths = self._before(), self._widths
         table, ends, follows = None, [0], False
-        if len(packets) >= FEW and widths is not None and self.decodes is not None:
+        if len(packets) >= FEW and widths is not None and self.frame_format is not None:
             table = many.decode(packets, widths, before) if decoded is None else decoded
             ends, follows = self._stretches(table.packets, now)
         at = 0
@@ -365,7 +365,7 @@ class Conversation:
         self.stats.foreign_version += 1
         if not old.hello:
             return None
-        self.hello = self.sheet = self._widths = self.decodes = None
+        self.hello = self.sheet = self._widths = self.frame_format = None
         self._timeline = Timeline(self.stats, self._live)
         self._clock.forget()
         return VersionMismatch(
@@ -388,7 +388,7 @@ class Conversation:
             event = self._take_hello(told, now)
             widths = self._widths
             many_at_once = widths is not None and widths.report.zones and not widths.sheet.ghosts
-            self.decodes = (widths, self._before()) if widths is not None and many_at_once else None
+            self.frame_format = (widths, self._before()) if widths is not None and many_at_once else None
             return event
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):

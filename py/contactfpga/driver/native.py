@@ -24,6 +24,7 @@ from contactfpga.driver.conversation import Steady
 from contactfpga.driver.reads import READ, Reads
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import FIELDS, PacketTable
+from contactfpga.wire.protocol import Frame
 from contactfpga.zones.run import frame_of
 from contactfpga.zones.zone import HostLine
 
@@ -38,6 +39,7 @@ _TAKEN = struct.Struct("8Q")
 _LINE = struct.Struct("qddd")
 _NEWEST = struct.Struct("Qqqdqddd")
 _FRAME = struct.Struct("?7x8q")
+_NEWEST_AND_FRAME = struct.Struct("Qqqdqddd?7x8q")
 
 
 class Sheet(ctypes.Structure):
@@ -72,10 +74,12 @@ class Newest(NamedTuple):
     """Its number, from 1: that of its packet since the port was opened."""
     time_us: int
     """Since power-up."""
-    before: bool
-    """Whether the frame before it came after :meth:`Port.settle`."""
+    after_another: bool
+    """Whether the frame before it came after :meth:`Port.settle`: :meth:`Port.before` gives it."""
     line: HostLine
     """When it came, and its time on the host's clock."""
+    frame: Frame
+    """As it came over the wire."""
 
 
 class Library:
@@ -237,13 +241,13 @@ class Port:
         """errno of a port that is lost, -1 at its end, 0 as long as it goes on."""
         return int(self._library.failure(self._address))
 
-    def decode(self, decodes: tuple[Widths, bytes] | None) -> None:
-        """What frames are from now on; see :attr:`contactfpga.driver.conversation.Conversation.decodes`."""
-        if decodes == self._decodes:
+    def decode(self, frame_format: tuple[Widths, bytes] | None) -> None:
+        """What frames are from now on; see :attr:`contactfpga.driver.conversation.Conversation.frame_format`."""
+        if frame_format == self._decodes:
             return
         told = Sheet()
-        if decodes is not None:
-            widths, before = decodes
+        if frame_format is not None:
+            widths, before = frame_format
             sheet = widths.sheet
             told = Sheet(
                 1,
@@ -261,7 +265,7 @@ class Port:
             self._columns = 3
         self._make_room()
         self._library.sheet(self._address, ctypes.byref(told))
-        self._decodes = decodes
+        self._decodes = frame_format
 
     def _make_room(self) -> None:
         """For the newest frame and the one before it."""
@@ -319,32 +323,26 @@ class Port:
         self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
-        """The newest frame, whose fields and records :meth:`frame` gives then; None where it is not newer than this
-        packet, which is one that was taken before :meth:`settle` or came later. Raises :class:`Unsettled` where what
-        came does not tell it. Not for several threads at once."""
+        """The newest frame; None where it is not newer than this packet, which is one that was taken before
+        :meth:`settle` or came later. Raises :class:`Unsettled` where what came does not tell it. Not for several
+        threads at once."""
         found = self._library.newest(self._address, packets, self._newest_at)
-        if found < 0:
-            raise Unsettled
-        if not found:
+        if found <= 0:
+            if found:
+                raise Unsettled
             return None
-        values = _NEWEST.unpack_from(self._newest_view)
-        return Newest(values[0], values[1], bool(values[2]), HostLine._make(values[3:]))
+        values = _NEWEST_AND_FRAME.unpack_from(self._newest_view)
+        frame = self._frame(values[8:], _NEWEST.size + 2 * FIELDS.itemsize)
+        return Newest(values[0], values[1], values[2] == 1, HostLine._make(values[3:8]), frame)
 
-    def frame(self) -> Any:
-        """The newest frame of the last :meth:`newest`, as it came over the wire."""
-        return self._frame(0)
+    def before(self) -> Frame:
+        """The frame before that of the last :meth:`newest`."""
+        first, second = _FRAME.iter_unpack(self._newest_view[_NEWEST.size : _NEWEST.size + 2 * FIELDS.itemsize])
+        return self._frame(second, _NEWEST.size + 2 * FIELDS.itemsize + first[-1] * self._columns * _WORD)
 
-    def frame_before(self) -> Any:
-        """The frame before :meth:`frame`."""
-        return self._frame(1)
-
-    def _frame(self, index: int) -> Any:
+    def _frame(self, fields: tuple[int, ...], start: int) -> Frame:
+        """Of these fields, with the records that begin at ``start``."""
         assert self._decodes is not None
-        place = _NEWEST.size + index * FIELDS.itemsize
-        fields = _FRAME.unpack_from(self._newest_view, place)
-        start = _NEWEST.size + 2 * FIELDS.itemsize
-        if index:
-            start += _FRAME.unpack_from(self._newest_view, _NEWEST.size)[-1] * self._columns * _WORD
         shape = fields[-1], self._columns
         copied = bytearray(self._newest_view[start : start + shape[0] * shape[1] * _WORD])
         return frame_of(fields, np.ndarray(shape, np.int64, copied), self._decodes[0].sheet)

@@ -121,7 +121,7 @@ class NativeLink(Link):
     def _take_reads(self, reads: Reads, begun: bytes, missing: int) -> None:
         said = self._said
         if missing:
-            said.lost_track(begun, missing)
+            said.skip(missing, begun)
         if self._record is not None:
             for at in range(len(reads)):
                 self._record(reads.data_of(at), reads.at_s[at])
@@ -131,7 +131,7 @@ class NativeLink(Link):
                 if isinstance(event, (Arrival, Run)):
                     self._last_s = at_s
         with self._showing:
-            self._core.decode(said.decodes)
+            self._core.decode(said.frame_format)
 
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
         with self.changed:
@@ -209,12 +209,12 @@ class NativeLink(Link):
                 return None if queue else seen
             if not queue.show(found.packets + frames):
                 return found.packets
-            frame, before = core.frame(), steady.before
-            if found.before:
+            before = steady.before
+            if found.after_another:
                 known, shown = self._shown
-                before = shown if shown is not None and known == found.packets - 1 else core.frame_before()
-            self._shown = found.packets, frame
-        return steady.zones(frame, found.time_us, before, found.line)
+                before = shown if shown is not None and known == found.packets - 1 else core.before()
+            self._shown = found.packets, found.frame
+        return steady.zones(found.frame, found.time_us, before, found.line)
 
     def _settle(self) -> None:
         with self.changed:

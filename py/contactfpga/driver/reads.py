@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import functools
+
 import numpy as np
 
 from contactfpga.driver.clock import MOST_S
@@ -24,7 +25,7 @@ class Reads:
 
     ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes.
     ``decoded``: of every packet, with (n,) ``sizes`` in bytes, whether it is a whole frame by what
-    :attr:`contactfpga.driver.conversation.Conversation.decodes` said, ``decodes``, and then its fields.
+    :attr:`contactfpga.driver.conversation.Conversation.frame_format` said, ``frame_format``, and then its fields.
     """
 
     def __init__(
@@ -33,15 +34,15 @@ class Reads:
         packets_before: int,
         reads: np.ndarray,
         data: bytes,
-        decodes: tuple[Widths, bytes] | None,
+        frame_format: tuple[Widths, bytes] | None,
         decoded: PacketTable | None,
         sizes: np.ndarray,
     ):
         self.at_s: list[float] = reads["at_s"].tolist()
-        self.decodes, self.decoded = decodes, decoded
+        self.frame_format, self.decoded = frame_format, decoded
         self._reads, self._data, self._sizes = reads, data, sizes
-        self._bytes = [0, *(reads["bytes"] - bytes_before).tolist()]
-        self._packets = [0, *(reads["packets"] - packets_before).tolist()]
+        self._bytes: list[int] = [0, *(reads["bytes"] - bytes_before).tolist()]
+        self._packets: list[int] = [0, *(reads["packets"] - packets_before).tolist()]
 
     def __len__(self) -> int:
         return len(self.at_s)
