@@ -2,7 +2,8 @@
 
 That thread notes when bytes came and decodes frames (:mod:`contactfpga.driver.native`). Whoever calls takes what came
 and has the conversation say what it means, as it does for a :class:`~contactfpga.driver.link.Link` with a thread in
-Python. While nobody calls, a thread does so some times a second.
+Python. While nobody calls, a thread does so every two seconds. The newest frame is known before what came was taken, as
+long as each frame continues the one before.
 """
 
 from __future__ import annotations
@@ -60,9 +61,9 @@ class _Settled(NamedTuple):
 
     steady: Steady
     packets: int
-    """Taken by then."""
-    frames: int
-    """Less packets: a frame that continues those has its packet's number and this."""
+    """That were taken."""
+    more_frames: int
+    """Number of the last frame less that of its packet, and the same for all frames that continue it."""
 
 
 class NativeLink(Link):
@@ -188,8 +189,8 @@ class NativeLink(Link):
             self.check_open()
 
     def _newest(self, queue: FrameQueue) -> Zones | int | None:
-        """The newest frame, none that the queue has had; the number of packets after which it comes; or None where the
-        queue has to be looked at. Raises :class:`Unsettled` where what came does not tell it."""
+        """The newest frame, none that the queue has had; where there is none yet, the number of the packet that it comes
+        after; None where the queue has to be looked at. Raises :class:`Unsettled` where what came does not tell it."""
         try:
             return self._show(queue)
         except Unsettled:
@@ -203,11 +204,11 @@ class NativeLink(Link):
                 raise Unsettled
             if queue.others:
                 return None
-            steady, packets, frames = settled
-            seen = max(packets, queue.seen - frames)
+            steady, packets, more_frames = settled
+            seen = max(packets, queue.seen - more_frames)
             if (found := core.newest(seen)) is None:
                 return None if queue else seen
-            if not queue.show(found.packets + frames):
+            if not queue.show(found.packets + more_frames):
                 return found.packets
             before = steady.before
             if found.after_another:
