@@ -189,8 +189,8 @@ class NativeLink(Link):
             self.check_open()
 
     def _newest(self, queue: FrameQueue) -> Zones | int | None:
-        """The newest frame, none that the queue has had; where there is none yet, the number of the packet that it comes
-        after; None where the queue has to be looked at. Raises :class:`Unsettled` where what came does not tell it."""
+        """The newest frame, none that the queue has had; if there is none yet, the number of the packet after which it
+        comes; None where the queue has to be looked at. Raises :class:`Unsettled` where what came does not tell it."""
         try:
             return self._show(queue)
         except Unsettled:
