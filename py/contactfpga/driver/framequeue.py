@@ -52,8 +52,8 @@ class FrameQueue:
         else:
             self.others += 1
         self._drop_shown()
-        while len(self) > self.maxsize:
-            self.dropped += self._drop(len(self) - self.maxsize)
+        while self._held > self.maxsize:
+            self.dropped += self._drop(self._held - self.maxsize)
 
     def put_back(self, zones: Zones) -> None:
         """Have this frame come next."""
@@ -95,7 +95,6 @@ class FrameQueue:
 
     def first_error(self) -> ContactFPGAError | None:
         """The error that comes next, if one does; it stays."""
-        self._drop_shown()
         return self._items[0] if self._items and isinstance(self._items[0], ContactFPGAError) else None
 
     def skip_to(self, zones: Zones) -> None:
@@ -103,14 +102,15 @@ class FrameQueue:
         if not any(item is zones for item in self._items):
             return
         while self._items[0] is not zones:
-            self._drop(len(self))
+            self._drop(self._held)
         self._drop(1)
 
     def keep_last(self) -> None:
         """Drop all but what came last, or up to the first error, which is raised."""
-        while len(self) > 1:
+        self._drop_shown()
+        while self._held > 1:
             error = self.first_error()
-            self._drop(len(self) - 1)
+            self._drop(self._held - 1)
             if error is not None:
                 raise error
         self._unwrap()  # so that the others do not become Python's numbers with it
@@ -118,7 +118,7 @@ class FrameQueue:
     def drop_older(self, moment: float) -> None:
         """Drop a frame that waits alone and came before that moment."""
         self._drop_shown()
-        item = self._items[0] if len(self) == 1 else None
+        item = self._items[0] if self._held == 1 else None
         if isinstance(item, Zones) and item.arrived_s is not None and item.arrived_s < moment:
             self.clear()
 
@@ -127,6 +127,11 @@ class FrameQueue:
         self._items.clear()
         self._gone = self._came
         self._taken = self.others = 0
+
+    @property
+    def _held(self) -> int:
+        """What waits, and what was shown and is not dropped yet, which another thread changes at any moment."""
+        return self._came - self._gone + self.others
 
     def _drop(self, most: int) -> int:
         """Drop what comes first, and of a run at most ``most`` frames; returns how many frames were dropped."""
