@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import dataclasses
 import gc
+import itertools
 import os
 import random
 import signal
@@ -332,6 +333,28 @@ def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
         port.close()
         os.close(master)
         os.close(slave)
+
+
+def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(board):
+    """Even where it tells more of the clocks: each comes in another piece of their fit."""
+    with opened(board) as host:
+        host.read(LONG)
+        board.answers = False
+        board.send(board.frame())
+        times, others, count = [host.latest(LONG).time_us], host.subscribe(), host.stats.frames
+        with host._link.changed:
+            for _ in range(3):
+                board.time_us += 300_000
+                board.send(board.frame())
+                thread = threading.Thread(target=lambda: times.append(host.latest(LONG).time_us), daemon=True)
+                thread.start()
+                thread.join(5.0)
+                assert not thread.is_alive(), "it waits for the lock"
+        assert [after - before for before, after in itertools.pairwise(times)] == [300_096] * 3
+        assert [others.next(LONG).time_us for _ in range(3)] == times[1:]
+        with pytest.raises(contactfpga.ReadTimeout):
+            host.next(0.01)
+        assert host.stats.frames == count + 3
 
 
 @pytest.mark.slow
