@@ -348,9 +348,9 @@ _ALL = (
         minutes=5,
         sections={
             "reader_rest": Section("tables:rest_table"),
-            "reader_busy": Section("tables:busy_table", kept=r"^\| 1,000 .*latest", heads="^(?!calls)"),
-            "reader_loop": Section("tables:loop_table", kept=NO_ROW),
-            "reader_links": Section("tables:links_table", kept=NO_ROW),
+            "reader_busy": Section("tables:busy_table", kept="latest", heads="^(?!calls)"),
+            "reader_loop": Section("tables:loop_table", kept="a thread"),
+            "reader_links": Section("tables:links_table", kept=r"^\| 64 \| `latest"),
         },
     ),
     Study(
