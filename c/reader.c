@@ -23,6 +23,7 @@
 
 #define CONTACTFPGA_FAST
 #include "contactfpga.h"
+#include "clockfit.h"
 
 enum {
     MOST_PORTS = 1024,
@@ -40,7 +41,6 @@ enum {
     NOISE = 2   /* more came without a delimiter than a packet has */
 };
 #define PAUSED_S 8.0 /* as contactfpga.driver.clock.MOST_S */
-#define PIECE_S 0.25 /* as contactfpga.driver.clock.PIECE_S */
 
 /* The same as contactfpga.wire.many.FIELDS. */
 typedef struct {
@@ -66,10 +66,7 @@ typedef struct {
     int64_t steady; /* whether frames that continue the last one may be shown */
     uint64_t packets;
     int64_t time_us, heard; /* of the last frame, since power-up */
-    double at_s;            /* when it came */
-    /* Of its fit of clocks (contactfpga.driver.clock.ClockFit), as far as it says which arrivals change nothing. */
-    int64_t base_us, piece;
-    double base_s, height_s, slope, fitted_s, newest_s, byte_s;
+    double at_s, byte_s;    /* when it came; what a byte takes on the wire */
 } base;
 
 /* What sheets are made of. */
@@ -81,7 +78,8 @@ typedef struct {
 typedef struct {
     uint64_t packets; /* this frame's number, from 1 */
     int64_t time_us, before; /* before: whether the one before it follows */
-    double at_s, line_s;     /* when it came, and the newest arrival of the fit by then */
+    double at_s;             /* when it came */
+    host_line line;             /* of the read that brought it */
 } newest;
 
 typedef struct {
@@ -107,9 +105,11 @@ typedef struct {
     bool paused, gap;
     double noticed_s;
     base base;
-    bool clean, spent; /* all packets since the base continue; an arrival changed the fit */
-    int64_t time_us;   /* of the last frame */
-    double newest_s, line_s, at_s;
+    bool clean;      /* all packets since the base continue; what follows is of the last one */
+    int64_t time_us;
+    double at_s;
+    host_line line;     /* of its read */
+    fit fit;         /* after it */
     uint8_t *bytes;
     packet *packets;
     int64_t *records; /* four for each */
@@ -228,11 +228,11 @@ static packet decode(port *p, uint64_t end) {
     return found;
 }
 
-/* Whether the frames of the newest read continue those before them, and how their arrival agrees with the fit. */
+/* Whether the frames of the newest read continue those before them; and what their arrival says of the clocks. */
 static void judge(port *p, uint64_t first, const read_ *came) {
     p->clean = p->clean && !came->odd;
     if (!p->clean || first == came->packets) return;
-    p->clean = !p->spent && came->at_s - p->at_s <= PAUSED_S;
+    p->clean = came->at_s - p->at_s <= PAUSED_S;
     for (uint64_t i = first; p->clean && i < came->packets; i++) {
         const fields *frame = &p->packets[i % PACKETS].frame;
         int64_t step = (frame->time_us - p->time_us) & ((int64_t)CONTACTFPGA__WRAP_US - 1);
@@ -240,14 +240,9 @@ static void judge(port *p, uint64_t first, const read_ *came) {
         p->time_us += step;
     }
     if (!p->clean) return;
-    const base *fit = &p->base;
-    double device_s = (double)(p->time_us - fit->base_us) / 1e6;
-    double wire_s = (double)(p->packets[(came->packets - 1) % PACKETS].size + 1) * fit->byte_s;
-    double excess_s = came->at_s - wire_s - fit->base_s - device_s;
-    double bound_s = fit->height_s + fit->slope * (device_s - fit->fitted_s);
-    p->spent = floor(device_s / PIECE_S) > (double)fit->piece || bound_s - excess_s > 0;
-    p->line_s = p->newest_s;
-    p->newest_s = device_s;
+    double wire_s = (double)(p->packets[(came->packets - 1) % PACKETS].size + 1) * p->base.byte_s;
+    p->line = fit_line(&p->fit);
+    fit_arrived(&p->fit, p->time_us, came->at_s, wire_s);
     p->at_s = came->at_s;
 }
 
@@ -583,6 +578,7 @@ int cfpga_notice(port *p, double at_s) {
     notice(p, at_s);
     int found = p->paused;
     p->paused = false;
+    p->clean = p->clean && !found;
     pthread_mutex_unlock(&p->lock);
     return found;
 }
@@ -640,19 +636,20 @@ void cfpga_take(port *p, uint8_t *out, size_t room) {
     if (held_back(p) && p->descriptor >= 0) wake_thread();
     p->tail = to;
     p->reads_tail += told.reads;
+    p->clean = p->clean && !p->gap;
     p->gap = false;
     pthread_mutex_unlock(&p->lock);
 }
 
-/* What Python found after it took what came: from here on frames may be shown. */
-void cfpga_settle(port *p, const base *known) {
+/* What Python found after it took what came, and its fit of clocks where that is steady: from here on frames may be
+ * shown. */
+void cfpga_settle(port *p, const base *known, const fit *clocks) {
     pthread_mutex_lock(&p->lock);
     p->base = *known;
     p->clean = known->steady && p->tail.packets == known->packets && !p->gap;
-    p->spent = false;
     p->time_us = known->time_us;
-    p->newest_s = known->newest_s;
     p->at_s = known->at_s;
+    if (p->clean) p->fit = *clocks;
     uint64_t first = p->tail.packets;
     for (uint64_t i = p->reads_tail; i < p->reads_head; i++) {
         const read_ *came = &p->reads[i % READS];
@@ -674,15 +671,14 @@ static uint8_t *put_records(const port *p, uint64_t index, uint8_t *out) {
     return out;
 }
 
-/* The newest frame, if it is newer than ``packets``: 1. 0: there is none yet. -1: Python has to look for itself.
+/* The newest frame, if it is newer than ``packets``, which is not below the base's: 1. 0: there is none yet. -1: Python has to look for itself.
  * ``out`` has room for a struct newest, two frames and the records of both. */
 int cfpga_newest(port *p, uint64_t packets, uint8_t *out) {
     pthread_mutex_lock(&p->lock);
-    bool after = p->head.packets > p->base.packets;
-    int found = !p->clean || p->failure || p->closing ? -1 : p->head.packets > packets && after;
+    int found = !p->clean || p->failure || p->closing ? -1 : p->head.packets > packets;
     if (found == 1) {
         uint64_t index = p->head.packets - 1;
-        newest told = {index + 1, p->time_us, index > p->base.packets, p->at_s, p->line_s};
+        newest told = {index + 1, p->time_us, index > p->base.packets, p->at_s, p->line};
         memcpy(out, &told, sizeof told);
         uint8_t *end = put_frame(p, index, out + sizeof told);
         end = put_frame(p, told.before ? index - 1 : index, end);
@@ -691,4 +687,37 @@ int cfpga_newest(port *p, uint64_t packets, uint8_t *out) {
     }
     pthread_mutex_unlock(&p->lock);
     return found;
+}
+
+/* ---- a fit of clocks for the Python driver alone, in memory of its own; not for several threads at once ---- */
+
+size_t cfpga_fit_size(void) {
+    return sizeof(fit);
+}
+
+void cfpga_fit_begin(fit *f) {
+    fit_begin(f);
+}
+
+void cfpga_fit_forget(fit *f) {
+    fit_forget(f);
+}
+
+/* Of the frames one after the other; before each its line goes to ``before``, where there is room and one came before. */
+void cfpga_fit_arrived(fit *f, size_t count, const int64_t *times_us, const double *arrived_s, const double *wire_s,
+    host_line *before) {
+    for (size_t i = 0; i < count; i++) {
+        if (before) before[i] = fit_line(f);
+        fit_arrived(f, times_us[i], arrived_s[i], wire_s[i]);
+    }
+}
+
+void cfpga_fit_answered(fit *f, int64_t time_us, double asked_s) {
+    fit_answered(f, time_us, asked_s);
+}
+
+/* Whether a frame came, and the line of those that come next. */
+int cfpga_fit_line(const fit *f, host_line *out) {
+    *out = fit_line(f);
+    return f->pieces.count > 0;
 }

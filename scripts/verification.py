@@ -22,23 +22,8 @@ CLAIMS = ROOT / "docs" / "tables" / "verification.csv"
 
 HEAD = """# Verification
 
-For people who doubt this project or change it: how far its parts were checked, and where each claim has its tests. You
-do not need it to use a sheet. To decide whether to trust a figure, read [Status](status.md).
-
-## What was compared with what
-
-| part | compared with | on what |
-|---|---|---|
-| golden model | scipy and OpenCV, which share no code with it | all frames of small sheets, recordings, random frames |
-| gateware, simulated | the golden model, in each clock, at each stage | all options in pairs, sheets of the pages |
-| gateware, proved | its claims, for any input | [small sizes](formal.md) |
-| netlist | the golden model, both output pins in each clock | small sheets on the ECP5 |
-| bitstream | the golden model, in the same way | [small sheets on the iCE40](bitstream.md) |
-| board | nothing: none was programmed | |
-| sheet | its layout files, traced back to the wiring table; nothing was ordered | the kits and other sizes |
-| host | the simulated board's stream, damaged at random | driver, recordings, network, ROS 2 |
-| physics of cover and arm | other integrations, boundary elements, MuJoCo | the [cover](cover.md), the [arm](arm.md) |
-| tests | [faults planted at random](mutants.md) | gateware |
+For people who doubt this project or change it: where each claim has its tests, and what has none. You do not need it to
+use a sheet. [Status](status.md) says what was compared with what, and whether to trust a figure.
 
 ## How to check a claim
 

@@ -62,7 +62,7 @@ def run(capsys):
 def python():
     """Runs code in a Python of its own: ``python(code, *arguments)`` returns the process that ended."""
 
-    def python(code, *arguments, timeout=100):
+    def python(code, *arguments, timeout=250):
         command = [sys.executable, "-c", code, *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, timeout=timeout)
 

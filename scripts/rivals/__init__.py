@@ -1,1 +1,1 @@
-"""Other people's labellers, measured like ours. docs/rivals.md describes the port that they are put behind."""
+"""Other people's labellers, measured like ours. ``rival.py`` describes the port that they are put into."""

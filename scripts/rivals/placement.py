@@ -55,7 +55,7 @@ def _to_rtlil(verilog: str) -> str:
 
 
 class _Behind(wiring.Component):
-    """The port of docs/rivals.md, with the converted rival behind it."""
+    """The port of a rival, with the converted rival inside."""
 
     def __init__(self, sheet: Sheet):
         ports = {name: In(1) for name in ("rst", "pressed")}

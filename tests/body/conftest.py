@@ -9,6 +9,6 @@ def robot(tmp_path):
 
 @pytest.fixture
 def patient(robot):
-    """The same, for threads on a machine that is busy."""
-    robot.write_text(ROBOT.replace("[[links]]", "[[links]]\nlate_s = 1.0\nsilent_s = 1.5"))
+    """The same, for threads of which a busy machine lets each wait for seconds."""
+    robot.write_text(ROBOT.replace("[[links]]", "[[links]]\nlate_s = 4.0\nsilent_s = 5.0"))
     return robot

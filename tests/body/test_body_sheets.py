@@ -1,7 +1,7 @@
 """Sheets at one FPGA as links of a body, and over the network."""
 
 import pytest
-from net_processes import free_endpoint, publish
+from net_processes import free_endpoint, patient, publish, wait_long
 
 import contactfpga
 from contactfpga.robot.body import Body
@@ -32,12 +32,13 @@ def test_two_links_share_a_port(tmp_path):
 
 
 @pytest.mark.slow
-def test_one_publisher_has_both_sheets():
+def test_one_publisher_has_both_sheets(monkeypatch):
     pytest.importorskip("zenoh")
+    wait_long(monkeypatch)
     endpoint = free_endpoint()
     with publish(PORT.format(0), "--listen", endpoint, others=[PORT.format(1)]) as publisher:
         lines = [publisher.line, publisher.process.stdout.readline().strip()]
         assert lines == [f"zenoh://contactfpga/{name}?connect={endpoint}" for name in ("chest", "back")]
         for line, rows in zip(lines, (16, 12), strict=True):
-            with contactfpga.open(line, timeout=60) as board:
+            with contactfpga.open(patient(line), timeout=60) as board:
                 assert (board.sheet.rows, len(board.read(timeout=60))) == (rows, 1)

@@ -12,6 +12,6 @@ def chromium():
 
     switches = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"]
     with sync_playwright() as playwright:
-        program = playwright.chromium.launch(executable_path=browser.program(), args=switches)
+        program = playwright.chromium.launch(executable_path=browser.program(), args=switches, timeout=120_000)
         yield program
         program.close()

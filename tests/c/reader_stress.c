@@ -51,12 +51,16 @@ static void *feed_line(void *nothing) {
 static void *look(void *nothing) {
     static uint8_t out[1 << 17];
     sheet told = {1, 16, 16, 8, 0, 0, 0, 64, 0x1234};
-    base known;
-    memset(&known, 0, sizeof known);
+    base known = {1, 0, 0, 0, 0.0, 1e-6};
+    static fit clocks;
+    int64_t time_us = 1;
+    double arrived_s = 2.0, wire_s = 1e-3;
+    cfpga_fit_begin(&clocks);
+    cfpga_fit_arrived(&clocks, 1, &time_us, &arrived_s, &wire_s, NULL);
     while (!done) {
         cfpga_newest(line, 0, out);
         cfpga_notice(line, now_s());
-        cfpga_settle(line, &known);
+        cfpga_settle(line, &known, &clocks);
         cfpga_sheet(line, &told);
         cfpga_wait(line, 1000000000, 1, 0.001);
     }

@@ -38,11 +38,11 @@ def ask(tmp_path_factory):
     """Requests and commands by the header: of (number, what, value, hello, pulsed), ``what`` -1 for a request."""
     folder = tmp_path_factory.mktemp("ask")
     (folder / "ask.c").write_text(ASK)
-    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", folder / "ask", folder / "ask.c"], check=True, timeout=60)
+    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", folder / "ask", folder / "ask.c"], check=True, timeout=250)
 
     def run(asked):
         lines = "".join(" ".join(str(int(word)) for word in one) + "\n" for one in asked)
-        done = subprocess.run([folder / "ask"], input=lines, capture_output=True, text=True, check=True, timeout=60)
+        done = subprocess.run([folder / "ask"], input=lines, capture_output=True, text=True, check=True, timeout=250)
         return [bytes.fromhex(line) for line in done.stdout.splitlines()]
 
     return run
@@ -95,7 +95,7 @@ int main(void) {
 """
     (tmp_path / "v.c").write_text(code.replace("\\\\n", "\\n"))
     command = [part for part in COMPILERS["gcc"] if part != "-Wextra"]
-    subprocess.run([*command, f"-I{FOLDER}", "-o", tmp_path / "v", tmp_path / "v.c"], check=True, timeout=60)
+    subprocess.run([*command, f"-I{FOLDER}", "-o", tmp_path / "v", tmp_path / "v.c"], check=True, timeout=250)
     rng, lines, meant = random.Random(4), [], []
     for _ in range(400):
         facts = UnitFacts(rng.randint(1, 8), rng.randint(1, 28), rng.randint(0, 4), rng.randint(1, 31), 1, 1)
@@ -105,7 +105,7 @@ int main(void) {
         lines.append(" ".join(map(str, (*shape, what, place, steps))) + "\n")
         meant.append(f"1 {found}" if (found := by_driver(facts, what, place, steps)) is not None else "0 0")
     done = subprocess.run(
-        [tmp_path / "v"], input="".join(lines), capture_output=True, text=True, check=True, timeout=60
+        [tmp_path / "v"], input="".join(lines), capture_output=True, text=True, check=True, timeout=250
     )
     assert done.stdout.splitlines() == meant
 

@@ -26,7 +26,7 @@ def compiled(compiler, program, *options):
     if not shutil.which(compiler):
         pytest.skip(f"{compiler} is not installed")
     command = [compiler, *OPTIONS, *options, STRESS, "-lm", "-o", program]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=250, check=False)
 
 
 @pytest.mark.parametrize("compiler", sample(["gcc", "clang"], quick=["gcc"], slow=["clang"]))

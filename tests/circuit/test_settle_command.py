@@ -69,6 +69,17 @@ def test_every_value_of_the_circuit_has_an_option_that_counts(capsys):
         assert asked(capsys, flag, str(value))[1]["circuit"]["diode"][name] == value
 
 
+def test_an_option_says_what_the_class_says_of_its_value():
+    parser = cli._parser().topics["settle"]
+    parser.complete()
+    told = {action.dest: action.help for action in parser._actions}
+    assert told["crossing_pf"] == (
+        "Capacitance of a row to a column at their crossing, with an open switch, in pF (default: 2)."
+    )
+    assert told["pin_ma"].endswith("with its usual drive strength (default: 8).")  # the first sentence alone
+    assert told["diode_grading"] == "M (schottky: 0.5)."
+
+
 def test_a_sheet_that_cannot_work_says_which_and_what_helps(capsys):
     status, answer = asked(capsys, "--column-pull-ohm", "700")
     assert status == UNSOLVED

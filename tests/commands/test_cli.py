@@ -232,10 +232,8 @@ def test_help_loads_no_command(python):
 
 
 def test_json_needs_no_display(board, loaded):
-    assert (
-        loaded(f"from contactfpga.tools import cli\ncli.main(['zones', '--once', '--json', '{board.path}'])")
-        == "serialx"
-    )
+    command = ["zones", "--once", "--json", "--timeout", "60", board.path]
+    assert loaded(f"from contactfpga.tools import cli\ncli.main({command})") == "serialx"
 
 
 @pytest.mark.slow

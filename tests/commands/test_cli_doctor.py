@@ -3,10 +3,11 @@
 import dataclasses
 import json
 import os
+import threading
 import time
 
 import pytest
-from fake_board import FakeBoard, background, wait_until
+from fake_board import FakeBoard, background, patiently, wait_until
 
 import contactfpga
 from contactfpga.driver import finding, health
@@ -19,8 +20,7 @@ SKIN = contactfpga.Skin()
 
 
 def test_doctor_finds_nothing_wrong(board, run):
-    with stream_of_frames(board):
-        status, out, _ = run("doctor", "--seconds", 0.01, "--timeout", 30, board.path)
+    status, out, _ = doctored(run, board, "--seconds", 0.01)
     assert status == 0, out
     assert f"ok    {board.path} may be read and written" in out
     facts = "16x16, pitch 10 x 10 mm, plane, connectivity 8, report 'moments'"
@@ -28,31 +28,41 @@ def test_doctor_finds_nothing_wrong(board, run):
     assert "0 lost, 0 damaged" in out
 
 
-def stream_of_frames(board, skip=0):
-    """Sends frames for a while once the board was asked; ``skip`` sequence numbers are left out on the way."""
+def doctored(run, board, *arguments, skip=0):
+    """What the command says of a board that sends frames for a while once it was asked; ``skip`` sequence numbers are
+    left out on the way. Once more where the machine lets the command wait, so that it opens the port behind them."""
 
-    def send():
-        wait_until(lambda: board.sent >= 2)  # both answers that opening the port takes
-        time.sleep(0.1)
-        for index in range(200):
-            if index == 100:
-                for _ in range(skip):
-                    board.frame()
-            board.send(board.frame())
+    def said(pause_s):
+        sent, ended = board.sent, threading.Event()
 
-    return background(send)
+        def send():
+            wait_until(lambda: board.sent >= sent + 2)  # both answers that opening the port takes
+            time.sleep(pause_s)
+            for index in range(200):
+                if index == 100:
+                    for _ in range(skip):
+                        board.frame()
+                board.send(board.frame())
+            while not ended.wait(0.01):  # for one that is late
+                board.send(board.frame())
+
+        with background(send):
+            try:
+                return run("doctor", *arguments, "--timeout", 60, board.path)
+            finally:
+                ended.set()
+
+    return patiently(said, lambda found: f"{skip} lost, 0 damaged, 0 restarts" in found[1], (0.1, 2.0, 10.0))
 
 
 def test_doctor_counts_what_is_lost(board, run):
-    with stream_of_frames(board, skip=7):
-        status, out, _ = run("doctor", "--seconds", 0.015, "--timeout", 30, board.path)
+    status, out, _ = doctored(run, board, "--seconds", 0.015, skip=7)
     assert status == 1
     assert "fault 7 lost, 0 damaged" in out
 
 
 def test_doctor_prints_one_json_object(board, run):
-    with stream_of_frames(board, skip=7):
-        status, out, errors = run("doctor", "--json", "--seconds", 0.015, "--timeout", 30, board.path)
+    status, out, errors = doctored(run, board, "--json", "--seconds", 0.015, skip=7)
     found = json.loads(out)
     assert (status, found["faults"], errors) == (1, 1, "")
     assert {"verdict": "fault", "sentence": "7 lost, 0 damaged, 0 restarts of the board"} in found["findings"]
@@ -69,7 +79,11 @@ def test_doctor_prints_json_of_a_port_that_is_not_there(run):
 
 
 def test_doctor_takes_a_board_without_frames_for_a_fault(board, run):
-    status, out, errors = run("doctor", "--timeout", 0.3, board.path)
+    status, out, errors = patiently(
+        lambda timeout_s: run("doctor", "--timeout", timeout_s, board.path),
+        lambda found: "says hello" in found[1],
+        (0.3, 3.0, 30.0),
+    )
     assert (status, errors) == (1, "")
     assert f"ok    {board.path} says hello" in out
     assert out.splitlines()[-1].startswith("fault ")
@@ -96,8 +110,7 @@ def test_doctor_compares_clocks(board_s, host_s, told):
 def test_doctor_takes_ghosts_for_no_fault(run):
     with FakeBoard(contactfpga.Skin(diodes="none", connectivity=4)) as board:
         board.moments = [(1, 0, 0), (1, 5, 0)]
-        with stream_of_frames(board):
-            status, out, _ = run("doctor", "--seconds", 0.01, "--timeout", 30, board.path)
+        status, out, _ = doctored(run, board, "--seconds", 0.01)
     assert status == 0, out
     assert "the last frame has zones that may be ghosts" in out
 

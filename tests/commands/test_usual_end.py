@@ -41,12 +41,12 @@ def test_it_is_the_usual_end(words, number, tmp_path):
     with FakeBoard(CELLS) as board:
         board.stream = board.frame
         named = {"PORT": board.path, "FILE": tmp_path / "x.mcap"}
-        arguments = [str(named.get(word, word)) for word in [*words.split(), "--timeout", "30"]]
+        arguments = [str(named.get(word, word)) for word in [*words.split(), "--timeout", "60"]]
         terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *arguments], 80)
         try:
             wait_until(lambda: terminal.process.poll() is not None or RUNNING[words] in terminal.said, 60)
             terminal.process.send_signal(number)
-            status, said = terminal.wait(30), terminal.said[-2000:]
+            status, said = terminal.wait(60), terminal.said[-2000:]
         finally:
             terminal.process.kill()
     assert status == 0, said
@@ -106,5 +106,5 @@ def test_output_that_goes_nowhere(streams, say, status, errors):
     buffered = {name: value for name, value in environment().items() if name != "PYTHONUNBUFFERED"}
     shell = f'set -o pipefail; "$@" {streams}'
     command = ["bash", "-c", shell, "bash", sys.executable, "-c", PRINTS.replace("SAY", say)]
-    done = subprocess.run(command, input="", capture_output=True, text=True, env=buffered, timeout=30, check=False)
+    done = subprocess.run(command, input="", capture_output=True, text=True, env=buffered, timeout=250, check=False)
     assert (done.returncode, done.stderr) == (status, errors)

@@ -3,6 +3,7 @@
 import pytest
 
 from contactfpga.driver import driver, native
+from contactfpga.driver.requests import Requests
 
 WITH_EITHER = ("test_driver", "test_driver_frames", "test_silence", "test_recording")
 
@@ -15,6 +16,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         ]
         readers.append(pytest.param("thread", marks=pytest.mark.slow))
         metafunc.parametrize("default_reader", readers, indirect=True)
+
+
+@pytest.fixture
+def _asks_once(monkeypatch):
+    """A board that has to wait answers late, and not twice, as where it is asked again: its frames are counted."""
+    monkeypatch.setattr(Requests, "retry_s", property(lambda self: 60.0, lambda self, seconds: None), raising=False)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from fake_board import wait_until
 from scipy import ndimage
 
 import contactfpga
@@ -15,10 +16,11 @@ from contactfpga.errors import AddressError, PortNotFound
 from contactfpga_sim.model.board.flexitac import MARK, FlexitacSheet
 
 PITCH_MM = 3.0
+LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
 
 
 class Touch:
-    """Discs of radius 2 cells at (row, column), from :meth:`begin` on."""
+    """Discs of radius 2 cells at (row, column), from ``since`` on, which move for half a second."""
 
     def __init__(self, *places, columns_per_s=0.0):
         self.places, self.columns_per_s, self.since = places, columns_per_s, math.inf
@@ -27,7 +29,7 @@ class Touch:
         rows, columns = np.mgrid[:16, :32]
         force = np.zeros((16, 32))
         for row, column in self.places if seconds >= self.since else ():
-            now = column + self.columns_per_s * (seconds - self.since)
+            now = column + self.columns_per_s * min(seconds - self.since, 0.5)
             force[(rows - row) ** 2 + (columns - now) ** 2 <= 4] = 1.0
         return force
 
@@ -36,19 +38,35 @@ def address_of(sheet):
     return f"flexitac://{sheet.port}?frames=10"
 
 
+def waiting(board):
+    """The frames that wait, with a moment after they came and before the next one did."""
+    frames = []
+    while True:
+        before = time.monotonic()
+        try:
+            frames.append(board.next(0))
+        except contactfpga.ReadTimeout:
+            return frames, before
+
+
 def frames_of(board, sheet, touch, count):
-    """The frame before a touch, and so many from then on."""
-    frames = [board.next(3.0)]
-    started = time.monotonic()
+    """The frame before a touch, and all from then on, at least so many. Their times are those of the test's clock."""
+    board.next(LONG)
+    _, earliest = waiting(board)
+    frames = [board.next(LONG)]
+    latest = time.monotonic()
     touch.since = sheet.seconds
-    frames += [board.next(3.0) for _ in range(count)]
-    assert (frames[-1].time_us - frames[0].time_us) / 1e6 == pytest.approx(time.monotonic() - started, abs=0.1)
+    frames += [board.next(LONG) for _ in range(count)]
+    rest, asked = waiting(board)
+    frames += [*rest, board.next(LONG)]
+    passed = (frames[-1].time_us - frames[0].time_us) / 1e6
+    assert asked - latest - 0.05 <= passed <= time.monotonic() - earliest + 0.05
     return frames
 
 
 def test_two_touches_are_two_zones_where_they_are():
     touch = Touch((4, 6), (10, 25))
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         assert (board.sheet.rows, board.sheet.columns, board.sheet.pitch_x_mm) == (16, 32, PITCH_MM)
         frames, stats = frames_of(board, sheet, touch, 20), board.stats
     assert len(frames[0]) == 0
@@ -75,19 +93,30 @@ def test_zones_are_those_of_another_labeller_on_random_frames():
 
 
 def test_a_request_is_answered_by_a_frame_that_began_later():
-    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet)) as board:
-        board.next(3.0)
+    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
+        board.next(LONG)
         for _ in range(3):
             asked = board.clock()
-            zones = board.read(2.0)
+            zones = board.read(LONG)
             assert board.clock() - asked > 0.01  # a frame that was on its way is no answer
         assert zones.time_us > 0
+
+
+def test_it_says_hello_by_itself_as_boards_do():
+    """Else a reader in the network would know no times after a break, and get no frames any more."""
+    with FlexitacSheet(Touch((8, 8))) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
+        board.next(LONG)
+        frames, hellos = board.stats.frames, board.stats.hellos
+        wait_until(lambda: board.stats.hellos >= hellos + 3)
+        assert board.stats.frames - frames > 50, "two per second"
+        stats = board.stats
+    assert (stats.lost, stats.restarts, stats.unexplained, sum(stats.damaged.values())) == (0, 0, 0, 0)
 
 
 def test_a_touch_that_slides_is_one_track():
     tracker = Tracker()
     touch = Touch((8, 4), columns_per_s=20.0)
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         frames = frames_of(board, sheet, touch, 50)
     events = [(event.kind, event.id) for frame in frames for event in tracker.update(frame).events]
     assert [event for event in events if event[0] != "move"] == [("down", 1)]
@@ -97,7 +126,7 @@ def test_a_touch_that_slides_is_one_track():
 def test_a_recording_of_it_gives_the_same_zones(tmp_path):
     file = tmp_path / "flexitac.rec"
     touch = Touch((4, 6))
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file) as board:
+    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file, timeout=LONG) as board:
         seen = frames_of(board, sheet, touch, 20)
     with contactfpga.open(f"replay://{file}") as board:
         again = {zones.frame.sequence: zones.records.tolist() for zones in board}
@@ -108,12 +137,13 @@ def test_a_recording_of_it_gives_the_same_zones(tmp_path):
 def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
     """Of frames with 514 bytes, 1 of 2,000 bytes lost damages one in four."""
     touch = Touch((8, 16))
-    with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet)) as board:
+    with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         frames, stats = frames_of(board, sheet, touch, 60), board.stats
     touched = [frame for frame in frames if len(frame)]
     assert len(touched) > 40
     assert all([(zone.x_mm, zone.y_mm) for zone in frame] == [(48.0, 24.0)] for frame in touched)
-    assert 5 < sum(stats.damaged.values()) < 40
+    damaged = sum(stats.damaged.values())
+    assert 0.08 < damaged / (damaged + stats.frames) < 0.4
 
 
 def test_a_wrong_byte_is_one_cell_of_one_frame_or_costs_the_frame():

@@ -28,7 +28,7 @@ def child(work, end=sys.exit):
     if not number:
         work()
         end(0)
-    until = time.monotonic() + 20
+    until = time.monotonic() + 100
     while time.monotonic() < until:
         ended, status = os.waitpid(number, os.WNOHANG)
         if ended:
@@ -61,7 +61,7 @@ def run(program, *arguments):
 def test_a_child_has_no_board_and_ends_as_usual(board):
     board.hello_s = 0.1
     program = """
-board = contactfpga.open(port)
+board = contactfpga.open(port, timeout=60)
 frames = board.subscribe()
 calls = [board.read, board.next, board.latest, board.batch, board.clock, lambda: board.command(1), board.self_test,
          lambda: board.sheet, lambda: board.silence, board.subscribe, board.events, frames.next,
@@ -77,14 +77,18 @@ def work():
         pass
 
 print([child(work), child(work, os._exit), child(lambda: None)])
-zones = board.read()
+zones = board.read(60)
 board.close()
 print(len(zones), board.stats.lost, sum(board.stats.damaged.values()))
-again = contactfpga.open(port)
+again = contactfpga.open(port, timeout=60)
 """
-    asked = board.asked
-    assert run(program, board.path) == "[0, 0, 0]\n1 0 0\n"
-    assert board.asked - asked <= 6, "a child asked"
+    for _ in range(3):  # where the machine is busy the parent asks again for an answer that is late
+        asked = board.asked
+        assert run(program, board.path) == "[0, 0, 0]\n1 0 0\n"
+        if board.asked - asked <= 6:
+            break
+    else:
+        pytest.fail("a child asked")
 
 
 @pytest.mark.slow
@@ -93,13 +97,13 @@ def test_children_of_a_busy_board_end_at_any_moment(board):
     board.stream = board.frame
     board.hello_s = 0.05
     program = """
-board = contactfpga.open(port)
+board = contactfpga.open(port, timeout=60)
 done = threading.Event()
 counts = [0, 0, 0]
 
 def keep(number, call):
     while not done.is_set():
-        call(5.0)
+        call(60.0)
         counts[number] += 1
 
 def work():
@@ -112,8 +116,9 @@ threads = [threading.Thread(target=keep, args=(number, call))
 for thread in threads:
     thread.start()
 found = [child(work) for _ in range(15)]
-before = list(counts)
-time.sleep(0.5)
+before, until = list(counts), time.monotonic() + 60
+while not all(now > then for now, then in zip(counts, before)) and time.monotonic() < until:
+    time.sleep(0.01)
 print(set(found), all(now > then for now, then in zip(counts, before)))
 done.set()
 for thread in threads:
@@ -125,7 +130,7 @@ board.close()
 
 def test_a_port_that_read_zones_keeps_open_is_the_parents(board):
     program = """
-contactfpga.read_zones(port)
+contactfpga.read_zones(port, 60)
 
 def work():
     try:
@@ -135,25 +140,25 @@ def work():
     else:
         raise AssertionError("the child reads the parent's port")
 
-print(child(work), len(contactfpga.read_zones(port)))
+print(child(work), len(contactfpga.read_zones(port, 60)))
 """
     assert run(program, board.path) == "0 1\n"
 
 
 def test_a_child_may_open_a_board_of_its_own(board):
     program = """
-own = contactfpga.open(port)
+own = contactfpga.open(port, timeout=60)
 other = contactfpga.open("sim://")
 
 def work():
     refused(other.read)
     with contactfpga.open("sim://") as board:
         board.read()
-    with contactfpga.open(sys.argv[2]) as board:
-        board.read()
+    with contactfpga.open(sys.argv[2], timeout=60) as board:
+        board.read(60)
     own.close()
 
-print(child(work), len(own.read()))
+print(child(work), len(own.read(60)))
 """
     with FakeBoard(Skin()) as second:
         assert run(program, board.path, second.path) == "0 1\n"
@@ -163,7 +168,7 @@ print(child(work), len(own.read()))
 def test_children_of_multiprocessing(board, how):
     program = """
 import multiprocessing
-board = contactfpga.open(port)
+board = contactfpga.open(port, timeout=60)
 fork = multiprocessing.get_context("fork")
 
 def work(number):
@@ -176,16 +181,16 @@ if sys.argv[2] == "Pool":
 else:
     process = fork.Process(target=work, args=(0,))
     process.start()
-    process.join(20)
+    process.join(100)
     print(process.exitcode)
-print(len(board.read()))
+print(len(board.read(60)))
 """
     assert run(program, board.path, how) == {"Process": "0\n1\n", "Pool": "[0, 1, 2, 3]\n1\n"}[how]
 
 
 def test_the_parents_port_is_given_back_though_a_child_goes_on(board):
     program = """
-board = contactfpga.open(port)
+board = contactfpga.open(port, timeout=60)
 (said, says), (out, into) = os.pipe(), os.pipe()
 number = os.fork()
 if not number:
@@ -195,7 +200,7 @@ if not number:
     os._exit(0)
 os.read(said, 1)
 board.close()
-print(len(contactfpga.open(port).read()))
+print(len(contactfpga.open(port, timeout=60).read(60)))
 """
     assert run(program, board.path) == "1\n"
 
@@ -203,12 +208,12 @@ print(len(contactfpga.open(port).read()))
 def test_what_is_recorded_is_written_once(board, tmp_path):
     file = tmp_path / "bytes.rec"
     program = """
-board = contactfpga.open(port, record=sys.argv[2])
+board = contactfpga.open(port, timeout=60, record=sys.argv[2])
 for _ in range(20):
-    board.read()
+    board.read(60)
 assert not os.path.getsize(sys.argv[2]), "nothing waits to be written, so that this test tests nothing"
 print([child(lambda: None), child(board.close)])
-board.read()
+board.read(60)
 board.close()
 print(board.stats.bytes)
 """
@@ -242,7 +247,7 @@ def test_a_recording_in_a_child_is_the_parents(board, tmp_path):
 from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.session import Session
 session = Session(sys.argv[2])
-session.add(port)
+session.add(port, timeout=60)
 session.start()
 print({child(session.stop) for _ in range(4)}, session.running)
 session.stop()
@@ -261,7 +266,7 @@ from contactfpga.robot.body import Body
 from contactfpga.robot.body import OpenBody
 body = OpenBody(Body.load(port), opened=Plugged().opened)
 snapshots = body.subscribe()
-body.read()
+body.read(60)
 
 def work():
     for call in (body.read, body.latest, body.next, body.subscribe, snapshots.next):
@@ -270,7 +275,7 @@ def work():
     body.close()
 
 print({child(work) for _ in range(6)})
-body.next()
+body.next(60)
 body.close()
 """
     assert run(program, write_robot(tmp_path)) == "{0}\n"
@@ -279,14 +284,14 @@ body.close()
 @pytest.mark.slow
 def test_a_reader_over_a_network_in_a_child(board):
     pytest.importorskip("zenoh", reason="the extra `net` is not installed")
-    from net_processes import free_endpoint, publish
+    from net_processes import free_endpoint, patience, patient, publish
 
-    program = """
-board = contactfpga.open(port, timeout=30.0)
+    program = f"""{patience()}
+board = contactfpga.open(port, timeout=60)
 print(child(lambda: refused(board.read)), child(board.close), child(lambda: refused(board.next), os._exit))
-print(len(board.read(30.0)))
+print(len(board.read(60)))
 board.close()
 """
     endpoint = free_endpoint()
     with publish(board.path, "--key", "forked", "--listen", endpoint):
-        assert run(program, f"zenoh://forked?connect={endpoint}") == "0 0 0\n1\n"
+        assert run(program, patient(f"zenoh://forked?connect={endpoint}")) == "0 0 0\n1\n"

@@ -140,11 +140,14 @@ class Newest:
 
     def newest(self, link, queue):
         try:
-            if (zones := link._newest(queue)) is not None:
-                self.shown += 1
-                return zones
+            found = link._newest(queue)
         except Unsettled:
-            pass
+            found = None
+        if isinstance(found, Zones):
+            self.shown += 1
+            return found
+        if isinstance(found, int):
+            return None
         link.catch_up()
         return self.taken(queue)
 

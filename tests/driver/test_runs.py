@@ -170,6 +170,39 @@ def times(items):
     return [item if isinstance(item, Exception) else item.time_us for item in items]
 
 
+@pytest.mark.parametrize("maxsize", [1, 7, 10_000])
+def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rng):
+    """Whether it waits already or is yet to come."""
+    queue, plain, came, seen = FrameQueue(maxsize, came=5), [], 5, 5
+    for item in runs_and_frames(rng, 300):
+        if isinstance(item, Exception):
+            continue
+        queue.put(item)
+        frames = list(item) if isinstance(item, Run) else [item]
+        plain += [(came + index, zones) for index, zones in enumerate(frames, 1)]
+        came += len(frames)
+        plain = [one for one in plain if one[0] > seen][-maxsize:]
+        seen = came - len(plain) if seen < came else seen
+        match rng.randrange(5):
+            case 0:
+                number = rng.randint(max(1, seen - 3), came + 30)
+                assert queue.show(number) == (number > seen)
+                seen = max(seen, number)
+                plain = [one for one in plain if one[0] > seen]
+                if isinstance(item, Zones) and rng.random() < 0.5:
+                    queue.skip_to(item)
+                    seen, plain = max(seen, came), []
+            case 1 if plain:
+                seen, zones = plain.pop(0)
+                assert queue.pop().time_us == zones.time_us
+            case 2:
+                found = [zones for one in queue.pop_frames() for zones in (one if isinstance(one, Run) else [one])]
+                assert times(found) == times([zones for _, zones in plain])
+                seen, plain = max(seen, came), []
+        assert (len(queue), queue.seen) == (len(plain), seen)
+    assert times(iter(queue.pop, None)) == times([zones for _, zones in plain])
+
+
 @pytest.mark.parametrize("maxsize", [1, 7, 100, 10_000])
 def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
     queue, plain, dropped = FrameQueue(maxsize), [], 0

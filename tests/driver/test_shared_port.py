@@ -241,9 +241,9 @@ def test_sheets_at_a_serial_port(capsys):
     thread.start()
     try:
         port = os.ttyname(slave)
-        with contactfpga.open(f"{port}#0", timeout=20) as chest, contactfpga.open(f"{port}#1", timeout=20) as back:
+        with contactfpga.open(f"{port}#0", timeout=60) as chest, contactfpga.open(f"{port}#1", timeout=60) as back:
             for number, board in enumerate((chest, back)):
-                assert board.read(20.0)[0].sum_x == 10 + number
+                assert board.read(60.0)[0].sum_x == 10 + number
             assert not chest.stats.damaged
         main(["doctor", f"{port}#1", "--timeout", "1", "--seconds", "0.1"])
         assert f"ok    {port} may be read and written" in capsys.readouterr().out

@@ -1,6 +1,6 @@
 """A robot in MuJoCo that wears sheets: which switch a ball closes, with what force, and what the driver says of it."""
 
-import textwrap
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -144,11 +144,8 @@ def test_a_link_that_the_model_lacks_is_refused_by_name(tmp_path):
         Sheets(model, mujoco.MjData(model), robot(tmp_path))
 
 
-def test_the_wrapper_on_the_page_feels(tmp_path):
-    page = (Path(__file__).parents[2] / "docs" / "mujoco.md").read_text()
-    block = page[page.rindex("    import numpy as np") :]
-    names = {}
-    exec(textwrap.dedent(block), names)
+def test_the_wrapper_of_the_example_feels(tmp_path):
+    names = runpy.run_path(str(Path(__file__).parents[2] / "examples/arm/felt.py"))
     toml = robot(tmp_path)
     model, data = pressed(toml, [("link", 40.0, 70.0, 3.0)])
     felt = names["Felt"](model, data, toml, "link")

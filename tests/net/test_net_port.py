@@ -302,6 +302,28 @@ def test_a_token_that_is_withdrawn_ends_a_publisher_only_if_it_is_silent(network
     assert "is gone" in after(read, clock, 0.0)
 
 
+def test_what_is_silent_while_this_process_stands_still_is_not_gone(network, read, clock, monkeypatch):
+    """As a stopped program, or one that gets no processor: what was sent meanwhile comes after it has looked."""
+
+    def waits(more_s):
+        lasts = lambda timeout_s: setattr(clock, "now_s", clock.now_s + timeout_s + more_s)  # noqa: E731
+        monkeypatch.setattr(read._changed, "wait", lasts)
+
+    for sequence in (3, 4):
+        waits(100.0)
+        for _ in range(3):
+            assert after(read, clock, 0.0) == b""
+        network.arrive(Message(1, sequence, sequence, 0, 0, b"y").encode())
+        assert read.read(0.0) == b"y"
+    assert after(read, clock, 0.0) == b""
+    waits(0.1)
+    assert after(read, clock, 60.8) == b"", "that it stood still before is counted once"
+    waits(0.3)
+    assert after(read, clock, 0.0) == b""
+    waits(0.1)
+    assert "is gone" in after(read, clock, 0.1), "and the rest of the time is not"
+
+
 def test_whoever_forges_a_message_and_a_token_keeps_nobody_out(network, opened, clock):
     """What a reader does who is there first: a forged message, then the publisher, whose messages come in beats."""
     network.arrive(Message(7, 1 << 63, 1 << 63, 0, 0, b"forged").encode())

@@ -19,7 +19,9 @@ LONG = 60.0
 MOST_S = 0.1
 """The age that the reader allows."""
 SLOW_S = 0.35
-"""By how much more a frame may be late before this test counts it as old: a busy machine."""
+"""By how much more a frame may be late before this test counts it as old: how well the clocks are known."""
+LEASE_S = 1.0
+"""Silence after which Zenoh takes a process for gone, as outside of tests."""
 
 
 def stand_still(child, seconds):
@@ -40,9 +42,8 @@ def settle(board, reader):
     more, board.stream = board.stream, b""
     time.sleep(0.3)
     hellos = reader.sights[-1].hellos
-    board.send(board.hello())
-    wait_until(lambda: reader.sights[-1].hellos > hellos, LONG)
-    time.sleep(0.3)
+    # Over and over, as the line loses what a publisher that has to wait does not take.
+    wait_until(lambda: board.send(board.hello()) or reader.sights[-1].hellos > hellos, LONG, pause_s=0.3)
     return more
 
 
@@ -52,7 +53,7 @@ def go_on(board, reader, since_s):
     for one in reader.sights:
         if one.at_s > since_s and one.time_us is not None:
             assert one.time_us in board.sent_us
-            assert one.at_s - (board.begun_s + one.time_us / 1e6) < MOST_S + SLOW_S
+            assert abs(one.at_s - (board.begun_s + one.time_us / 1e6)) < MOST_S + SLOW_S
 
 
 @pytest.mark.slow
@@ -61,9 +62,9 @@ def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted(endp
     port = f"zenoh://contactfpga/left-forearm?connect={endpoint}&wait=60"
     with (
         Streaming(SKIN, every_s=0.01) as board,
-        router(endpoint) as one_router,
-        publish(board.path, "--connect", endpoint) as publisher,
-        Reader(port, MOST_S) as reader,
+        router(endpoint, LEASE_S) as one_router,
+        publish(board.path, "--connect", endpoint, lease_s=LEASE_S) as publisher,
+        Reader(port, MOST_S, LEASE_S) as reader,
     ):
         board.stream = settle(board, reader)
         before = unknown(board, reader)
@@ -85,10 +86,10 @@ def test_random_histories_of_processes(seed):
     """Killed and started again, standing still, cut off: one thing after the other, some before the last is over."""
     rng, endpoint = random.Random(seed), free_endpoint()
     with Streaming(SKIN, every_s=0.01) as board, Relay(endpoint) as cable, contextlib.ExitStack() as stack:
-        routing = stack.enter_context(router(endpoint))
-        publishing = stack.enter_context(publish(board.path, "--connect", endpoint))
+        routing = stack.enter_context(router(endpoint, LEASE_S))
+        publishing = stack.enter_context(publish(board.path, "--connect", endpoint, lease_s=LEASE_S))
         port = f"zenoh://contactfpga/left-forearm?connect={cable.endpoint}&wait=600"
-        reader = stack.enter_context(Reader(port, MOST_S))
+        reader = stack.enter_context(Reader(port, MOST_S, LEASE_S))
         board.stream = settle(board, reader)
         before = unknown(board, reader)
         publishers = 1
@@ -96,12 +97,12 @@ def test_random_histories_of_processes(seed):
             what = rng.choice(["publisher", "router", "cable", "stop", "stop"])
             if what == "publisher":
                 publishing.end()
-                publishing = stack.enter_context(publish(board.path, "--connect", endpoint))
+                publishing = stack.enter_context(publish(board.path, "--connect", endpoint, lease_s=LEASE_S))
                 publishers += 1
             elif what == "router":
                 routing.end()
                 time.sleep(rng.choice([0.0, 1.5]))
-                routing = stack.enter_context(router(endpoint))
+                routing = stack.enter_context(router(endpoint, LEASE_S))
             elif what == "cable":
                 cable.cut()
                 time.sleep(rng.choice([0.1, 1.5]))

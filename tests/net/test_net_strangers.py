@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, wait_until
-from net_processes import Streaming, publish, router
+from net_processes import Streaming, patient, publish, router
 
 import contactfpga
 from contactfpga.robot.net import session
@@ -25,8 +25,8 @@ pytestmark = pytest.mark.usefixtures("_closed_ports")
 SKIN = contactfpga.Skin(name="left forearm")
 KEY = "contactfpga/left-forearm"
 LONG = 60.0
-SLOW_S = 2.0
-"""By how much longer than a second a busy machine may take."""
+TRIES = 4
+"""On a busy machine one of so many takes no longer than it should."""
 
 
 def first_message(network):
@@ -41,15 +41,17 @@ def first_message(network):
 @pytest.mark.parametrize("far", [1, 1 << 20, 1 << 63])
 def test_one_forged_message_of_any_number_silences_no_reader(far, endpoint):
     with Streaming(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
-        with contactfpga.open(publisher.line, timeout=LONG) as reader, session.connected(endpoint) as stranger:
-            read = first_message(stranger)
-            forged = Message(read.publisher, read.sequence + far, read.offset + far, read.read_us, 0, b"\0forged\0")
-            stranger.put(f"{KEY}/bytes", forged.encode())
-            wait_until(lambda: reader.stats.net.refused > 0, LONG)
-            begun_s = time.monotonic()
-            zones = reader.read(LONG)
-            assert time.monotonic() - begun_s < 1.0 + SLOW_S
-            assert zones.time_us in board.sent_us
+        with contactfpga.open(patient(publisher.line), timeout=LONG) as reader, session.connected(endpoint) as stranger:
+            took_s = []
+            while not took_s or (min(took_s) > 1.5 and len(took_s) < TRIES):
+                read, refused = first_message(stranger), reader.stats.net.refused
+                forged = Message(read.publisher, read.sequence + far, read.offset + far, read.read_us, 0, b"\0forged\0")
+                stranger.put(f"{KEY}/bytes", forged.encode())
+                wait_until(lambda refused=refused: reader.stats.net.refused > refused, LONG)
+                begun_s = time.monotonic()
+                assert reader.read(LONG).time_us in board.sent_us
+                took_s.append(time.monotonic() - begun_s)
+            assert min(took_s) < 1.5
             frames = reader.stats.frames
             wait_until(lambda: reader.next(LONG) and reader.stats.frames > frames + 50, LONG)
 
@@ -57,18 +59,21 @@ def test_one_forged_message_of_any_number_silences_no_reader(far, endpoint):
 def test_a_forged_token_keeps_no_publisher_from_starting_and_hides_no_death(endpoint):
     with Streaming(SKIN) as board, router(endpoint), session.connected(endpoint) as stranger:
         stranger.liveliness().declare_token(f"{KEY}/alive/00000000deadbeef")
-        with publish(board.path, "--connect", endpoint) as publisher:
-            assert publisher.line.startswith("zenoh://"), publisher.end()
-            number = first_message(stranger).publisher
-            token = stranger.liveliness().declare_token(f"{KEY}/alive/{number:016x}")
-            with contactfpga.open(publisher.line, timeout=LONG) as reader:
-                assert reader.read(LONG)
-                publisher.end()
-                ended_s = time.monotonic()
-                with pytest.raises(contactfpga.PortLost, match="its publisher ended"):
-                    collections.deque((reader.next(LONG) for _ in itertools.count()), maxlen=0)
-                assert time.monotonic() - ended_s < 1.5 + SLOW_S
-            token.undeclare()
+        took_s = []
+        while not took_s or (min(took_s) > 2.0 and len(took_s) < TRIES):
+            with publish(board.path, "--connect", endpoint) as publisher:
+                assert publisher.line.startswith("zenoh://"), publisher.end()
+                number = first_message(stranger).publisher
+                token = stranger.liveliness().declare_token(f"{KEY}/alive/{number:016x}")
+                with contactfpga.open(publisher.line, timeout=LONG) as reader:
+                    assert reader.read(LONG)
+                    publisher.end()
+                    ended_s = time.monotonic()
+                    with pytest.raises(contactfpga.PortLost, match="its publisher ended"):
+                        collections.deque((reader.next(LONG) for _ in itertools.count()), maxlen=0)
+                    took_s.append(time.monotonic() - ended_s)
+                token.undeclare()
+        assert min(took_s) < 2.0
 
 
 # ---- the Unix socket that is the default
@@ -89,7 +94,7 @@ def test_by_default_a_board_is_read_through_a_socket_in_a_folder_of_this_user_al
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
         psutil = pytest.importorskip("psutil")
         assert psutil.Process(publisher.process.pid).net_connections("inet") == []
-        with contactfpga.open(publisher.line, timeout=LONG) as reader:
+        with contactfpga.open(patient(publisher.line), timeout=LONG) as reader:
             assert reader.read(LONG).time_us in board.sent_us
         if os.getuid() == 0:
             connect = f"socket.socket(socket.AF_UNIX).connect({str(folder / 'zenoh.sock')!r})"
@@ -107,12 +112,12 @@ def test_a_socket_that_a_killed_publisher_left_is_taken_over_and_a_second_publis
             said = capsys.readouterr().err
             assert said.endswith(f"connect to the publisher that listens there: --connect {own_endpoint()}\n")
             with publish(other.path, "--connect", own_endpoint()) as second:
-                with contactfpga.open("zenoh://contactfpga/chest", timeout=LONG) as reader:
+                with contactfpga.open(patient("zenoh://contactfpga/chest"), timeout=LONG) as reader:
                     assert reader.name == "chest"
                 assert second.line.startswith("zenoh://contactfpga/chest?connect=unixsock-stream/")
         publisher.end()
         assert (runtime / "contactfpga" / "zenoh.sock").exists()
-        with publish(board.path) as again, contactfpga.open(again.line, timeout=LONG) as reader:
+        with publish(board.path) as again, contactfpga.open(patient(again.line), timeout=LONG) as reader:
             assert reader.read(LONG)
 
 

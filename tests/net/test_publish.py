@@ -4,14 +4,16 @@ import collections
 import itertools
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, background, wait_until
-from net_processes import Relay, Streaming, assert_loopback_alone, free_endpoint, publish, router
+from net_processes import Relay, Streaming, assert_loopback_alone, free_endpoint, patient, publish, router
 
 import contactfpga
+from contactfpga.robot.net import port as net_port
 from contactfpga.robot.net import session
 from contactfpga.tools import cli
 from contactfpga.tools.commands import publish as command
@@ -35,40 +37,33 @@ def port(endpoint, wait_s=None):
     return f"zenoh://contactfpga/left-forearm?connect={endpoint}" + (f"&wait={wait_s}" if wait_s is not None else "")
 
 
-def take(board, seconds, sent_us):
-    """Frames for some time, each of which the board sent, in order."""
-    until, times = time.monotonic() + seconds, []
-    while time.monotonic() < until:
-        try:
-            times.append(board.next(0.2).time_us)
-        except contactfpga.ReadTimeout:
-            continue
+def take(board, count, sent_us):
+    """So many frames, each of which the board sent, in order."""
+    times = [board.next(LONG).time_us for _ in range(count)]
     assert set(times) <= sent_us
     assert times == sorted(set(times))
-    return times
 
 
 def take_until(board, condition, sent_us):
-    found = []
-    wait_until(lambda: found.extend(take(board, 0.1, sent_us)) or condition(), LONG)
-    return found
+    wait_until(lambda: take(board, 5, sent_us) or condition(), LONG)
 
 
 def test_a_published_board_is_a_board(streaming, endpoint):
     with publish(streaming.path, "--listen", endpoint) as publisher:
         assert publisher.line == port(endpoint)
-        with contactfpga.open(publisher.line, SKIN, timeout=LONG) as board:
+        streaming.waits = True
+        with contactfpga.open(patient(publisher.line), SKIN, timeout=LONG) as board:
             assert board.name == "left forearm"
             before = board.clock()
             zones = board.read(LONG)
             assert zones.arrived_s > before
             assert zones[0].area_cells == 4
-            assert len(take(board, 0.5, streaming.sent_us)) > 5
-            with contactfpga.open(publisher.line, timeout=LONG) as second:
+            take(board, 50, streaming.sent_us)
+            with contactfpga.open(patient(publisher.line), timeout=LONG) as second:
                 assert second.read(LONG) is not None
+            wait_until(lambda: board.stats.net.messages > 5)
             stats = board.stats.to_dict()
         assert (stats["lost"], stats["damaged"], stats["net"]["lost_messages"]) == (0, {}, 0)
-        assert stats["net"]["messages"] > 5
         assert_loopback_alone(publisher.process.pid)
         publisher.process.send_signal(signal.SIGINT)
         assert publisher.process.wait(LONG) == 0
@@ -87,7 +82,10 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
     with other, publish(streaming.path, "--listen", endpoint, others=[other.path]) as publisher:
         lines = [publisher.line, publisher.process.stdout.readline().strip()]
         assert lines == [port(endpoint), f"zenoh://contactfpga/chest?connect={endpoint}"]
-        with contactfpga.open(lines[0], timeout=LONG) as board, contactfpga.open(lines[1], timeout=LONG) as chest:
+        with (
+            contactfpga.open(patient(lines[0]), timeout=LONG) as board,
+            contactfpga.open(lines[1], timeout=LONG) as chest,
+        ):
             assert chest.sheet.rows == 9
             other.unplug()
             assert "is gone" in (said := publisher.process.stderr.readline())
@@ -95,21 +93,27 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
             assert_given_back(publisher.process.pid, other.path)
             with pytest.raises(contactfpga.PortLost):
                 collections.deque((chest.next(LONG) for _ in itertools.count()), maxlen=0)
-            assert len(take(board, 0.5, streaming.sent_us)) > 5
+            take(board, 20, streaming.sent_us)
         publisher.process.send_signal(signal.SIGINT)
         assert publisher.process.wait(LONG) == 1
 
 
 @pytest.mark.slow
-def test_a_killed_publisher_shows_within_a_second(streaming, endpoint):
-    with router(endpoint), publish(streaming.path, "--connect", endpoint) as publisher:
-        with contactfpga.open(publisher.line, timeout=LONG) as board:
-            take(board, 0.3, streaming.sent_us)
-            os.kill(publisher.process.pid, signal.SIGKILL)
-            killed_s = time.monotonic()
-            with pytest.raises(contactfpga.PortLost, match="its publisher ended, or the network is broken"):
-                collections.deque((board.next(LONG) for _ in itertools.count()), maxlen=0)
-            assert time.monotonic() - killed_s < 5.0, "0.5 s of patience, and what a busy machine takes"
+def test_a_killed_publisher_shows_within_a_second(streaming, endpoint, monkeypatch):
+    """0.5 s of patience, and what the network takes; in one of several tries, as this machine may be busy."""
+    took_s = []
+    with router(endpoint):
+        while not took_s or (min(took_s) > 1.0 and len(took_s) < 5):
+            with publish(streaming.path, "--connect", endpoint) as publisher:
+                with contactfpga.open(publisher.line, timeout=LONG) as board:
+                    take(board, 1, streaming.sent_us)
+                    os.kill(publisher.process.pid, signal.SIGKILL)
+                    killed_s = time.monotonic()
+                    with pytest.raises(contactfpga.PortLost, match="its publisher ended, or the network is broken"):
+                        collections.deque((board.next(LONG) for _ in itertools.count()), maxlen=0)
+                    took_s.append(time.monotonic() - killed_s)
+        assert min(took_s) < 1.0
+        monkeypatch.setattr(net_port, "FOUND_S", 0.5)
         with pytest.raises(contactfpga.PortNotFound, match=r"nobody publishes it; is `contactfpga publish` running"):
             contactfpga.open(publisher.line)
 
@@ -119,7 +123,7 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
     with router(endpoint):
         with publish(streaming.path, "--connect", endpoint) as publisher:
             board = contactfpga.open(port(endpoint, wait_s=60), timeout=LONG)
-            take(board, 0.3, streaming.sent_us)
+            take(board, 20, streaming.sent_us)
         publisher.end()
         frames = board.stats.frames
         with board, publish(streaming.path, "--connect", endpoint):
@@ -133,7 +137,7 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
 def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming, endpoint):
     with router(endpoint) as first, publish(streaming.path, "--connect", endpoint):
         with contactfpga.open(port(endpoint, wait_s=60), timeout=LONG) as board:
-            take(board, 0.3, streaming.sent_us)
+            take(board, 20, streaming.sent_us)
             first.end()
             frames = board.stats.frames
             with router(endpoint):
@@ -147,41 +151,50 @@ def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming, endpoint):
 def test_a_link_that_flaps_loses_frames_and_counts_them(streaming, endpoint):
     with publish(streaming.path, "--listen", endpoint), Relay(endpoint) as relay:
         with contactfpga.open(port(relay.endpoint, wait_s=60), timeout=LONG) as board:
-            for pause_s in (0.1, 1.0):
-                take(board, 0.3, streaming.sent_us)
+            for pause_s in (0.1, 1.0, 3.0, 9.0):
+                take(board, 20, streaming.sent_us)
                 relay.cut()
                 time.sleep(pause_s)
                 relay.mend()
                 frames = board.stats.frames
                 take_until(board, lambda frames=frames: board.stats.frames > frames + 20, streaming.sent_us)
+                if pause_s >= 1.0 and board.stats.net.lost_messages:
+                    break  # else the publisher had to wait all that time
             assert board.stats.net.lost_messages > 0
             assert board.stats.net.publishers == 1
             assert board.stats.lost > 0
             assert board.stats.restarts == 0
 
 
-def test_boards_that_go_together_are_told_together(capsys):
+def test_boards_that_go_together_are_told_together(capsys, monkeypatch):
     """As the sheets of one FPGA do, which share what became of their port."""
+    monkeypatch.setattr(command, "SHOWN_S", 0.5)
     of_both, of_one = contactfpga.PortLost("A is gone"), contactfpga.PortLost("B is gone")
     closed = []
 
     class Gone:
-        def __init__(self, failure=None):
-            self.failure, self.close = failure, lambda: closed.append(self)
+        def __init__(self, failure, together):
+            self.failure, self.together, self.close = failure, together, lambda: closed.append(self)
 
         def run(self, stop):
+            self.together.wait(LONG)
             if self.failure is None:
                 stop.wait(LONG)
             else:
                 raise self.failure
 
     def publish_all(*failures):
-        assert command._publish({one: one for one in map(Gone, failures)}) == 1
+        together = threading.Barrier(len(failures))
+        gone = [Gone(failure, together) for failure in failures]
+        assert command._publish(dict(zip(gone, gone))) == 1
         return capsys.readouterr().err
 
     assert publish_all(of_both, of_both) == "contactfpga: A is gone\n"
-    assert publish_all(of_both, of_both, of_one).splitlines() == ["contactfpga: A is gone", "contactfpga: B is gone"]
-    with background(lambda: time.sleep(1) or signal.raise_signal(signal.SIGINT)), interrupt._listening():
+    said = publish_all(of_both, of_both, of_one).splitlines()
+    assert sorted(said) == ["contactfpga: A is gone", "contactfpga: B is gone"]
+    told, tell = threading.Event(), interrupt.failed
+    monkeypatch.setattr(interrupt, "failed", lambda reason: (tell(reason), told.set()))
+    with interrupt._listening(), background(lambda: told.wait(LONG) and signal.raise_signal(signal.SIGINT)):
         said = publish_all(of_both, None)
     assert said == "contactfpga: A is gone; the others go on\n"
     assert len(closed) == 7
@@ -195,7 +208,7 @@ def test_a_port_that_is_named_twice_is_told_as_that(streaming, tmp_path, capsys)
         assert capsys.readouterr().err == said
 
 
-def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys, endpoint):
+def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys, endpoint, monkeypatch):
     with router(endpoint):
         assert cli.main(["publish", streaming.path, "--listen", endpoint, "--timeout", "60"]) == 1
     errors = capsys.readouterr().err
@@ -212,6 +225,7 @@ def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys,
     ):
         assert cli.main(["publish", *arguments]) != 0
         assert said in capsys.readouterr().err
+    monkeypatch.setattr(session, "CONNECT_MS", 600)
     with pytest.raises(contactfpga.PortNotFound, match=r"cannot connect there.*is `contactfpga publish` running there"):
         contactfpga.open(port(free_endpoint()))
 

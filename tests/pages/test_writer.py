@@ -63,6 +63,15 @@ def test_a_long_table_is_in_a_file_beside_the_page(tmp_path):
     assert beside.whole(tmp_path / "page.md", "one") == LONG
 
 
+def test_a_wide_table_leaves_columns_to_its_file(tmp_path):
+    file = tmp_path / "tables" / "page-one.csv"
+    text = beside.part(LONG, "x|z", file, "b")
+    assert text.splitlines()[2:8] == ["| b |", "|---|", "| x y |", '| "z" |', "", text.splitlines()[7]]
+    assert text.splitlines()[7] == "All [3 rows, 2 columns](tables/page-one.csv)."
+    (tmp_path / "page.md").write_text(f"a\n<!-- figures: one -->\n{text}\n<!-- end -->\nb\n")
+    assert beside.whole(tmp_path / "page.md", "one") == LONG
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
@@ -85,7 +94,7 @@ def test_a_long_table_is_in_a_file_beside_the_page(tmp_path):
 def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):
     (tmp_path / "bad.toml").write_text("rows = 0")
     command = [sys.executable, "-m", f"contactfpga_sim.{module}", *arguments]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=250)
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert done.returncode in (1, 2)

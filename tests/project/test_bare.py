@@ -18,7 +18,7 @@ def bare(*command, **variables):
         env=os.environ | {"PYTHON": sys.executable} | variables,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=250,
     )
 
 
@@ -41,7 +41,7 @@ def test_a_run_says_in_one_line_what_it_skipped():
     # ngspice is the absent tool, as the folder of links is all that is left of PATH.
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "0", "tests/circuit/test_spice.py"]
     done = subprocess.run(
-        command, cwd=ROOT, env=os.environ | {"PATH": "/nowhere"}, capture_output=True, text=True, timeout=120
+        command, cwd=ROOT, env=os.environ | {"PATH": "/nowhere"}, capture_output=True, text=True, timeout=250
     )
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("Skipped: ")]
     assert "ngspice is not installed (" in line

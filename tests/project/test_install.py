@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from fake_board import patiently
 from terminals import OnTerminal
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +35,7 @@ def install(tmp_path):
 
 
 def run(command, log):
-    return subprocess.run(command, capture_output=True, text=True, env={"PYTHONPATH": str(log.parent)}, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, env={"PYTHONPATH": str(log.parent)}, timeout=250)
 
 
 def test_pips_words_go_to_a_file(install):
@@ -57,9 +58,13 @@ def test_a_failure_shows_the_end_of_them_and_where_they_are(install):
 
 def test_a_terminal_sees_how_far_it_is(install):
     command, log = install
-    terminal = OnTerminal(command, 80, PYTHONPATH=str(log.parent), PAUSE="1.2")
-    assert terminal.wait() == 0
-    said = terminal.said
+
+    def shown(pause_s):
+        terminal = OnTerminal(command, 80, PYTHONPATH=str(log.parent), PAUSE=str(pause_s))
+        assert terminal.wait(200) == 0
+        return terminal.said
+
+    said = patiently(shown, lambda said: "fetching, 40" in said and "unpacking, 40" in said, (1.2, 6.0, 36.0))
     assert "fetching, 40 packages, " in said
     assert "unpacking, 40 packages, " in said
     assert "Collecting" not in said

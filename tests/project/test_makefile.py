@@ -29,7 +29,7 @@ def clone(folder):
 
 def make(folder, *arguments):
     command = ["make", *arguments]
-    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=250)
 
 
 NAMES = ["a$(touch owned)b", "a`touch owned`b", 'a"b', "a'b", "a b", "a\tb", "a\nb", "a#b", "a:b"]

@@ -38,7 +38,7 @@ def loaded_by(module: str) -> set[str]:
         "new = set(sys.modules) - before; "
         "print(*{n.partition('.')[0] for n in new if getattr(sys.modules[n], '__file__', None)})"
     )
-    run = subprocess.run([sys.executable, "-I", "-c", program], capture_output=True, text=True, timeout=60)
+    run = subprocess.run([sys.executable, "-I", "-c", program], capture_output=True, text=True, timeout=250)
     assert run.returncode == 0, run.stderr
     return set(run.stdout.split()) - sys.stdlib_module_names
 

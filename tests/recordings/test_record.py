@@ -1,7 +1,7 @@
 """What `contactfpga record` writes, replay and Recording read."""
 
 import itertools
-import threading
+from types import SimpleNamespace
 
 import pytest
 from fake_board import FakeBoard, wait_until
@@ -10,7 +10,7 @@ from recorded_stream import StreamPort, recorded, replayed
 import contactfpga
 from contactfpga import Skin
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings import Recording, recorder
 from contactfpga.tools.recordings.session import Session
 
 SKIN = Skin()
@@ -52,6 +52,17 @@ def test_frames_come_with_their_times(tmp_path):
     assert times == sorted(times)
     device = [zones.time_us / 1e6 for _, _, zones in every]
     assert [t - times[50] for t in times[50:]] == pytest.approx([t - device[50] for t in device[50:]], abs=0.002)
+
+
+def test_its_times_do_not_move_where_the_program_rests_between_two_clocks(monkeypatch):
+    now_s, rests_s = [7.0], iter([0.0, 3.0, 0.5])
+
+    def look():
+        now_s[0] += next(rests_s, 0.0)
+        return now_s[0]
+
+    monkeypatch.setattr(recorder.time, "time_ns", lambda: 10**18 + round(look() * 1e9))
+    assert recorder._epoch_ns(SimpleNamespace(clock=look)) == 10**18
 
 
 @pytest.mark.parametrize(("start_s", "end_s"), [(0.0, 0.1), (0.234, 0.5), (0.59, None), (1.0, None)])
@@ -137,11 +148,8 @@ def run(*arguments):
 
 def test_the_command_says_what_it_wrote(board, tmp_path, capsys):
     file = tmp_path / "touches.mcap"
-    board.stream = b""
-    hold = threading.Thread(target=lambda: [board.send(board.frame()) for _ in range(600)])
-    hold.start()
+    board.stream = board.frame
     assert run(file, board.path, "--seconds", 0.05, "--timeout", LONG) == 0
-    hold.join()
     said = capsys.readouterr().out
     assert f"{file}: 0." in said
     assert "MB an hour" in said

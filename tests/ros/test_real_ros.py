@@ -59,7 +59,7 @@ def running(command, variables):
 
 def heard(ros, domain, *orders, seconds=12):
     command = [ros.python, LISTENER, seconds, *orders]
-    done = subprocess.run([*map(str, command)], env=ros.variables(domain), capture_output=True, text=True, timeout=120)
+    done = subprocess.run([*map(str, command)], env=ros.variables(domain), capture_output=True, text=True, timeout=250)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 

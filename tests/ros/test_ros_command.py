@@ -17,7 +17,10 @@ def refused(capsys, *arguments):
 def test_it_publishes_for_as_long_as_it_is_asked(board, capsys):
     pytest.importorskip("cyclonedds")
     board.stream = board.frame
-    assert cli.main(["ros", board.path, "--domain", "88", "--namespace", "arm", "--seconds", "0.3"]) == 0
+    assert (
+        cli.main(["ros", board.path, "--domain", "88", "--namespace", "arm", "--seconds", "0.3", "--timeout", "60"])
+        == 0
+    )
     assert "publishing /arm/zones and the other topics to this computer; Ctrl-C ends it" in capsys.readouterr().out
 
 
@@ -54,7 +57,9 @@ def test_numbers_out_of_range_are_refused_as_they_are_read(capsys, arguments, sa
 def test_units_of_a_board_that_has_none_are_refused(board, capsys, tmp_path):
     pytest.importorskip("cyclonedds")
     (tmp_path / "units.toml").write_text("[[unit]]\npoint_m = [0, 0, 0]\naxis = [0, 0, 1]\n")
-    status, text = refused(capsys, board.path, "--domain", "88", "--units", str(tmp_path / "units.toml"))
+    status, text = refused(
+        capsys, board.path, "--domain", "88", "--timeout", "60", "--units", str(tmp_path / "units.toml")
+    )
     assert (status, "this board has no pressure units" in text) == (1, True)
 
 

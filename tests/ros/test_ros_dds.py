@@ -52,7 +52,7 @@ def of_subscriber(kind):
 
 
 def taken(reader):
-    until = time.monotonic() + 20
+    until = time.monotonic() + 60
     while not (found := reader.take(10)):
         assert time.monotonic() < until, "nothing came"
         time.sleep(0.005)

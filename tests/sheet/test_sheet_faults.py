@@ -114,6 +114,6 @@ def test_the_same_skin_gives_the_same_bytes(folder, tmp_path):
     )
     for seed in ("1", "2"):
         env = os.environ | {"PYTHONHASHSEED": seed}
-        subprocess.run([sys.executable, "-c", script, str(other)], check=True, env=env, timeout=60)
+        subprocess.run([sys.executable, "-c", script, str(other)], check=True, env=env, timeout=250)
         for path in other.iterdir():
             assert path.read_bytes() == (folder / path.name).read_bytes(), path.name

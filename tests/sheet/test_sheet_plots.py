@@ -62,7 +62,7 @@ def plotted(folder):
         pytest.skip("KiCad 6 is not installed")
     out = folder / "kicad"
     out.mkdir()
-    subprocess.run([check.PYTHON, "-c", PLOT, str(folder / "sheet.kicad_pcb"), f"{out}/"], check=True, timeout=120)
+    subprocess.run([check.PYTHON, "-c", PLOT, str(folder / "sheet.kicad_pcb"), f"{out}/"], check=True, timeout=250)
     return out
 
 

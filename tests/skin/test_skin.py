@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from refused_skins import CLOSED, REFUSED, REVERSAL
 
 from contactfpga import ContactFPGAError, Skin, SkinError
+from contactfpga.choices import converters, debounces, labellers, reports, scans
 
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
 
@@ -133,6 +135,17 @@ def test_every_field_has_a_default_and_a_refusal():
     touched = {name for changes, _ in REFUSED for name in changes}
     assert touched == {field.name for field in dataclasses.fields(Skin)}
     Skin()
+
+
+def test_the_names_of_choices_are_those_that_types_know():
+    for names, known in (
+        (labellers.LabellerName, labellers.LABELLERS),
+        (scans.ScanName, scans.SCANS),
+        (debounces.DebounceName, debounces.DEBOUNCES),
+        (converters.ConverterName, converters.CONVERTERS),
+        (reports.ReportName, reports.REPORTS),
+    ):
+        assert get_args(names) == tuple(known)
 
 
 def test_the_reference_skin():

@@ -1,8 +1,10 @@
 """Files, recordings and ports of strangers name modules: none is imported unless the user says so."""
 
 import base64
+import dataclasses
 import json
 import sys
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from every_command import called, leaves, options, positional
 
 import contactfpga
 from contactfpga import Skin, SkinError
-from contactfpga.choices.choice import FIELDS
+from contactfpga.choices.choice import FIELDS, Choice
 from contactfpga.robot.body import Body, BodyError
 from contactfpga.skin.several import Several
 from contactfpga.tools import cli
@@ -50,7 +52,10 @@ def skin(mark, tmp_path):
 
 
 def test_every_field_that_may_name_a_module_is_judged():
-    named = {name for name in Skin.__dataclass_fields__ if "Name |" in str(Skin.__dataclass_fields__[name].type)}
+    kinds = {field.name: get_args(field.type) for field in dataclasses.fields(Skin)}
+    named = {
+        name for name, of in kinds.items() if any(isinstance(kind, type) and issubclass(kind, Choice) for kind in of)
+    }
     assert named == set(FIELDS)
 
 

@@ -1,21 +1,17 @@
 """What the page on labelling states of closed sheets."""
 
-from pathlib import Path
-
 import pytest
-from study_pages import outdated
+from study_pages import outdated, section
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.closed import tables
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/labelling.md"
-
 
 def test_the_clocks_of_run_are_up_to_date():
     labeller = LABELLERS["run"]
     cells = (*tables.names(labeller, 8), *tables.worst(labeller, 8), *tables.most(labeller, 8))
-    assert writer.line(cells) in PAGE.read_text(encoding="utf-8").splitlines()
+    assert writer.line(cells) in section("labelling.md", "closed").splitlines()
 
 
 def test_the_bound_of_run_is_the_goal():

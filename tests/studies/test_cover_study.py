@@ -58,11 +58,8 @@ def test_proud_caps_close_lighter_than_flush_faces():
         flush, tiles = (float(found[pitch, *name][5].split()[0]) for name in (("flush", "face"), ("tiles:", "the")))
         assert flush > 3 * tiles
     assert float(found["6.4 mm", "tiles:", "the"][8].split()[0]) <= 2.0
-    assert f"The table has {found['10 mm', 'flush', 'face'][5]} for a finger" in " ".join(PAGE.split())
-    button, too_much = (float(found["10 mm", "proud", "button"][5].split()[0]), 1.24)
+    assert f"This model has {found['10 mm', 'flush', 'face'][5]} at worst for a finger" in " ".join(PAGE.split())
     assert "5 mm | 4 mm | -0.2 % | +24.0 %" in section("paper.md", "elements")
-    assert 4 < too_much * button < 5
-    assert "the model would say 4 to 5 N" in " ".join(PAGE.split())
 
 
 def test_a_strip_sags_as_a_clamped_beam_does():

@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib
 import pytest
 import svg_texts
+from study_pages import section
 
 from contactfpga import picture_style
 from contactfpga.design import kits
@@ -16,6 +17,7 @@ from contactfpga.tools import cli
 from contactfpga_sim.lab.diagrams import cutaway, packet, pictures, together, wires
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+TIMES = section("kits.md", "times")
 KIT = kits.kit("starter")
 DRAWN = {
     "together": lambda path: together.draw(KIT, path),
@@ -50,8 +52,7 @@ def test_all_are_drawn(tmp_path):
 @pytest.mark.parametrize("port", ["contact", "last byte on the wire", "host's USB controller", "decision"])
 def test_times_are_those_of_the_page(port):
     """The median is shown, and in parentheses the worst."""
-    (row,) = re.findall(rf"^\| starter \| closed switch to the [^|]*{port}[^|]*\|(.*)\|$", (DOCS / "kits.md").read_text(
-        encoding="utf-8"), re.MULTILINE)  # fmt: skip
+    (row,) = re.findall(rf"^\| starter \| closed switch to the [^|]*{port}[^|]*\|(.*)\|$", TIMES, re.MULTILINE)
     median, _, worst = (round(float(cell)) for cell in row.split("|"))
     assert f"{median} µs ({worst})" in {one.text for one in words("together")}
 

@@ -4,23 +4,22 @@ from pathlib import Path
 
 import pytest
 from sample import sample
-from study_pages import outdated
+from study_pages import outdated, section
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.performance import scans
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs/performance.md"
 
 
 def test_the_reference_skins_row_is_up_to_date():
-    assert scans.reference_row("reference", Skin()) in PAGE.read_text().splitlines()
+    assert scans.reference_row("reference", Skin()) in section("performance.md", "reference").splitlines()
 
 
 @pytest.mark.parametrize("report", sample(scans.REPORTS, quick=["moments"]))
 def test_the_reference_skins_reports_are_up_to_date(report):
     row = scans.report_row("reference", Skin(report=report))
-    assert row in PAGE.read_text().splitlines()
+    assert row in section("performance.md", "report").splitlines()
 
 
 def test_the_reference_skin_keeps_the_promised_latency():

@@ -86,7 +86,7 @@ def test_the_text_says_what_the_tables_say():
     assert f"and needs up to {serial} clocks." in text
     recorded = re.findall(r"\| 8 \| \d+ / (\d+) / (\d+), \d+ \|", TABLES)
     most, worst = (max(map(int, column)) for column in zip(*recorded))
-    assert f"recordings on five sheets take {most} or fewer in 99 % and up to {worst}," in text
+    assert f"On five sheets they take {most} clocks or fewer in 99 % and up to {worst}," in text
 
 
 @pytest.mark.skipif(not (ROOT / scans.RECORDINGS).is_dir(), reason="no recordings")

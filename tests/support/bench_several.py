@@ -23,7 +23,7 @@ def run(several: Several, timelines: Sequence[Timeline], cycles: int, limit_s: f
     sheets = [_Sheet(top, number, timeline, cycles) for number, timeline in enumerate(timelines)]
     simulator = Simulator(top)
     simulator.add_clock(1e-6)
-    deadline = time.monotonic() + limit_s
+    deadline = time.process_time() + limit_s
 
     async def bench(ctx: Any) -> None:
         for cycle in range(cycles):
@@ -32,7 +32,7 @@ def run(several: Several, timelines: Sequence[Timeline], cycles: int, limit_s: f
             samples = await ctx.tick().sample(*(sheet.sampled for sheet in sheets))
             for sheet, sample in zip(sheets, samples[2:], strict=True):
                 sheet.note(cycle, sample)
-            if cycle % 256 == 0 and time.monotonic() > deadline:
+            if cycle % 256 == 0 and time.process_time() > deadline:
                 raise OutOfTime(f"{cycle} of {cycles} cycles simulated in {limit_s:g} s")
 
     simulator.add_testbench(bench)

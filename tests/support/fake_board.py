@@ -23,6 +23,16 @@ def wait_until(condition, seconds=60.0, pause_s=0.002):
         time.sleep(pause_s)
 
 
+def patiently(attempt, enough, timeouts_s=(1.0, 6.0, 36.0)):
+    """What ``attempt(timeout_s)`` returns, as soon as that is ``enough``, with one timeout after the other: a busy
+    machine may let a short one pass before anything came."""
+    for timeout_s in timeouts_s:
+        found = attempt(timeout_s)
+        if enough(found):
+            break
+    return found
+
+
 @contextlib.contextmanager
 def background(function):
     """Runs a function beside the block; what it raises is raised at the block's end."""

@@ -15,6 +15,9 @@ from fake_board import FakeBoard
 CHUNK = 4096
 """Bytes that a cable takes at once."""
 
+LONG_S = 60.0
+"""How long a busy machine may let a process wait."""
+
 ROUTER = """
 import sys, time
 from contactfpga.robot.net import session
@@ -24,19 +27,34 @@ with session.listening(sys.argv[1]):
 """
 
 
+PUBLISHER = """
+import sys
+from contactfpga.__main__ import main
+sys.exit(main())
+"""
+
+
 READER = """
 import dataclasses, json, sys, time
 import contactfpga
 board = contactfpga.open(sys.argv[1], timeout=60)
+clock, looked_s = board._link.clock, 0.0
+
+def look():
+    global looked_s
+    looked_s = clock()
+    return looked_s
+
+board._link.clock = look
 while True:
     found = None
     try:
-        found = board.latest(60, max_age_s=float(sys.argv[2]))
+        found, at_s = board.latest(60, max_age_s=float(sys.argv[2])), looked_s
     except contactfpga.NoData:
-        pass
-    now_s, stats = time.monotonic(), board.stats
+        at_s = clock()
+    stats = board.stats
     seen = stats.frames + stats.lost + stats.unexplained
-    line = [found and found.time_us, now_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
+    line = [found and found.time_us, at_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
     print(json.dumps(line), flush=True)
     time.sleep(0.005)
 """
@@ -47,6 +65,29 @@ def free_endpoint(protocol="tcp"):
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
+
+
+def patience(lease_s=LONG_S):
+    """How a program begins that waits long for others, and takes them for gone after its lease."""
+    return f"""
+from contactfpga.robot import net
+import contactfpga.robot.net.port, contactfpga.robot.net.session
+net.port.FOUND_S, net.session.CONNECT_MS, net.session.LEASE_MS = {LONG_S}, {LONG_S:.0f}_000, {round(1000 * lease_s)}
+"""
+
+
+def wait_long(monkeypatch):
+    """The same for this process: who is there is found, connected and kept, however late."""
+    from contactfpga.robot.net import port, session
+
+    monkeypatch.setattr(port, "FOUND_S", LONG_S)
+    monkeypatch.setattr(session, "CONNECT_MS", round(1000 * LONG_S))
+    monkeypatch.setattr(session, "LEASE_MS", round(1000 * LONG_S))
+
+
+def patient(port):
+    """The ``zenoh://`` port, for a reader that waits long for a publisher that the machine lets wait."""
+    return f"{port}{'&' if '?' in port else '?'}wait={LONG_S:.0f}"
 
 
 def assert_loopback_alone(pid):
@@ -71,7 +112,7 @@ class Child:
         """Kill it; what it said."""
         with contextlib.suppress(ProcessLookupError):
             self.process.kill()
-        return self.process.communicate(timeout=30)[1]
+        return self.process.communicate(timeout=LONG_S)[1]
 
     def __enter__(self):
         return self
@@ -80,14 +121,15 @@ class Child:
         self.end()
 
 
-def router(endpoint):
+def router(endpoint, lease_s=LONG_S):
     """A Zenoh session that is nothing but a router."""
-    return Child("-c", ROUTER, endpoint)
+    return Child("-c", patience(lease_s) + ROUTER, endpoint)
 
 
-def publish(port, *options, others=(), wait=True):
+def publish(port, *options, others=(), wait=True, lease_s=LONG_S):
     """``contactfpga publish`` of a port and others."""
-    return Child("-m", "contactfpga", "publish", port, *others, "--timeout", 60, *options, wait=wait)
+    arguments = ("publish", port, *others, "--timeout", LONG_S, *options)
+    return Child("-c", patience(lease_s) + PUBLISHER, *arguments, wait=wait)
 
 
 class Sight(NamedTuple):
@@ -96,6 +138,7 @@ class Sight(NamedTuple):
     time_us: int | None
     """Of the latest frame; None: there was no data."""
     at_s: float
+    """When the reader last looked at the clock before it returned that frame: this program may rest after that."""
     seen: int
     """Frames that came or are known not to have come."""
     hellos: int
@@ -106,10 +149,16 @@ class Sight(NamedTuple):
 class Reader(Child):
     """A program that takes the latest frame of a port, none older than ``max_age_s``."""
 
-    def __init__(self, port, max_age_s):
-        super().__init__("-c", READER, port, max_age_s)
+    def __init__(self, port, max_age_s, lease_s):
+        super().__init__("-c", patience(lease_s) + READER, port, max_age_s)
         self.sights = [Sight(*json.loads(self.line))]
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+
+    def end(self):
+        self.process.kill()
+        self._listener.join()  # else both would read what it printed, and one after it is closed
+        return super().end()
 
     def _listen(self):
         self.sights += (Sight(*json.loads(line)) for line in self.process.stdout)
@@ -117,6 +166,8 @@ class Reader(Child):
 
 class Streaming(FakeBoard):
     """Some hundred frames per second, and hellos; its clock is that of the host, and ``sent`` holds their times."""
+
+    waits = False
 
     def __init__(self, skin, every_s=0.005):
         super().__init__(skin)
@@ -141,7 +192,10 @@ class Streaming(FakeBoard):
         return data + self.frame()
 
     def _write(self, data):
-        """A line does not wait: what nobody reads is lost, as in a UART."""
+        """A line does not wait: what nobody reads is lost, as in a UART; but where a test wants every frame to come."""
+        if self.waits:
+            super()._write(data)
+            return
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
@@ -158,8 +212,9 @@ class Relay:
         self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
         self._whole = threading.Event()
         self._whole.set()
-        self._sockets = []
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._sockets, self._carriers = [], []
+        self._server = threading.Thread(target=self._serve, daemon=True)
+        self._server.start()
 
     def cut(self):
         self._whole.clear()
@@ -188,7 +243,8 @@ class Relay:
                     continue
                 self._sockets += [near, far]
                 for source, sink in ((near, far), (far, near)):
-                    threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+                    self._carriers.append(threading.Thread(target=self._carry, args=(source, sink), daemon=True))
+                    self._carriers[-1].start()
 
     def _carry(self, source, sink):
         with contextlib.suppress(OSError):
@@ -202,7 +258,11 @@ class Relay:
         return self
 
     def __exit__(self, *_):
+        with contextlib.suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)  # ends its thread, which may just be opening more
+        self._server.join()
         self.cut()
-        self._listener.close()
-        for one in self._sockets:
+        for one in self._carriers:
+            one.join()
+        for one in (self._listener, *self._sockets):
             one.close()

@@ -58,7 +58,7 @@ class OnTerminal:
 
     def wait(self, seconds=60):
         status = self.process.wait(seconds)
-        self._reader.join(2)
+        self._reader.join(60)  # it may have to wait for the processor
         os.close(self._master)
         return status
 

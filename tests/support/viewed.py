@@ -29,7 +29,7 @@ class Page:
         for message in messages:
             self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict([])))
 
-    def hear(self, wanted, seconds=20.0):
+    def hear(self, wanted, seconds=60.0):
         """Until a message is ``wanted``, which is returned."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
@@ -52,7 +52,7 @@ def socket_of(port, guard, *, origin=None, token=True, host=None, query=""):
         subprotocols=[f"viser-v{viser.__version__}"],
         proxy=None,
         compression=None,
-        open_timeout=10,
+        open_timeout=60,
         max_size=None,
     )
 

@@ -34,7 +34,7 @@ def served():
 
 def get(port, path="/", **headers):
     """Status, headers and body; ``Host`` as a browser would send it."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     connection.putrequest("GET", path, skip_host=True)
     for name, value in {"Host": f"127.0.0.1:{port}", **headers}.items():
         connection.putheader(name, value)
@@ -125,11 +125,11 @@ def test_a_foreign_page_neither_reads_nor_presses(served):
     hasty += (
         "Origin: http://evil.example\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
     )
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as raw:
+    with socket.create_connection(("127.0.0.1", port), timeout=60) as raw:
         raw.sendall(hasty.encode() + b"\r\n\x82\x05abcde")
         assert raw.recv(4096)[:12] in (b"HTTP/1.1 403", b"")
     with socket_of(port, guard) as page:
-        page.recv(timeout=10)
+        page.recv(timeout=60)
     assert len(clicks) == before
 
 
@@ -159,7 +159,7 @@ def test_it_listens_on_this_computer_alone(served):
             continue
         if address != "127.0.0.1":
             with pytest.raises(OSError):
-                socket.create_connection((address, port), timeout=2).close()
+                socket.create_connection((address, port), timeout=5).close()
 
 
 def test_a_port_that_is_taken_is_named(served):
@@ -203,7 +203,7 @@ def test_the_address_can_be_opened(host, address):
     assert guard.check("/", told, 80, upgrade=True) is None
 
 
-def wait(found, seconds=10.0):
+def wait(found, seconds=60.0):
     until = time.monotonic() + seconds
     while not found() and time.monotonic() < until:
         time.sleep(0.01)

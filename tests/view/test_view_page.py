@@ -35,6 +35,20 @@ def extent(shown, visitor):
     return (0.5 + x * scale / camera.aspect), (0.5 + y * scale)
 
 
+def fitted(shown, visitor, apart_from=()):
+    """The same, and the camera's position, once the forearm fills the canvas from elsewhere than from those places."""
+    for _ in range(300):
+        place = next(iter(shown.web.get_clients().values())).camera.position
+        x, y = extent(shown, visitor)
+        fills = max(np.ptp(x), np.ptp(y)) == pytest.approx(1 / 1.04, abs=0.02)
+        if fills and all(np.linalg.norm(place - other) > 0.1 for other in apart_from):
+            break
+        visitor.page.wait_for_timeout(200)
+    else:
+        pytest.fail(f"it takes {np.ptp(x):.3f} of the width and {np.ptp(y):.3f} of the height from {place}")
+    return x, y, place
+
+
 def resized(shown, visitor, width, height):
     """The canvas' left, top, width and height once it has settled, and the server knows of it."""
     visitor.page.set_viewport_size({"width": width, "height": height})
@@ -78,11 +92,11 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     shown, visitor = seen
     shown.hand.click(30, 50)
     shown.hand.click(30, 110)
-    visitor.page.wait_for_selector("text=2 contacts", timeout=30_000)
+    visitor.page.wait_for_selector("text=2 contacts", timeout=120_000)
     width, height, shown_wide = visitor.page.evaluate(
         "[window.__viserMutable.canvas.width, window.__viserMutable.canvas.height, window.box()[2]]"
     )
-    with visitor.page.expect_download(timeout=60_000) as kept:
+    with visitor.page.expect_download(timeout=120_000) as kept:
         visitor.page.keyboard.press("p")
     kept.value.save_as(tmp_path / "kept.png")
     assert kept.value.suggested_filename == "contactfpga.png"
@@ -90,7 +104,7 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     assert wide == width
     assert high == pytest.approx(height + 4 * 1.6 * 14 * width / shown_wide, abs=2)
     visitor.page.keyboard.press("l")
-    visitor.page.wait_for_selector("text=Nothing touches", timeout=30_000)
+    visitor.page.wait_for_selector("text=Nothing touches", timeout=120_000)
     assert shown.hand.fingers == []
 
 
@@ -99,14 +113,9 @@ def test_keys_and_buttons_turn_the_view_and_it_is_fitted(seen):
     places = []
     for key in "234":
         visitor.page.keyboard.press(key)
-        visitor.page.wait_for_timeout(1500)
-        places.append(next(iter(shown.web.get_clients().values())).camera.position)
-        x, y = extent(shown, visitor)
-        assert max(np.ptp(x), np.ptp(y)) == pytest.approx(1 / 1.04, abs=0.02)
+        places.append(fitted(shown, visitor, places)[2])
     visitor.page.locator("button:has-text('overview')").click()
-    visitor.page.wait_for_timeout(1500)
-    places.append(next(iter(shown.web.get_clients().values())).camera.position)
-    assert min(np.linalg.norm(a - b) for i, a in enumerate(places) for b in places[:i]) > 0.1
+    fitted(shown, visitor, places)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -114,8 +123,8 @@ def test_a_page_is_dark_for_who_likes_it(seen, scheme):
     shown, visitor = seen
     page = visitor.page.context.browser.new_page(viewport={"width": 400, "height": 300}, color_scheme=scheme)
     try:
-        page.goto(shown.url)
-        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached", timeout=60_000)
+        page.goto(shown.url, timeout=120_000)
+        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached", timeout=120_000)
         red, green, blue = page.evaluate("getComputedStyle(document.body).backgroundColor.match(/[0-9]+/g).map(Number)")
         assert (red + green + blue < 150) == (scheme == "dark")
     finally:
@@ -136,7 +145,6 @@ def test_the_forearm_fills_the_window_beside_or_above_the_panel(seen, width, hei
         assert wide == width
         assert 0.5 * height < high < 0.6 * height
         assert panel["y"] >= high
-    x, y = extent(shown, visitor)
+    x, y, _ = fitted(shown, visitor)
     assert min(x.min(), y.min()) >= 0
     assert max(x.max(), y.max()) <= 1
-    assert max(np.ptp(x), np.ptp(y)) == pytest.approx(1 / 1.04, abs=0.02)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fake_board import wait_until
 from tracked import frame
 
 from contactfpga import Skin
@@ -275,11 +276,15 @@ def test_silence_is_said(board):
     import contactfpga
     from contactfpga.tools.view.sources import BoardSource
 
-    with contactfpga.open(board.path) as port:
+    with contactfpga.open(board.path, timeout=60.0) as port:
         source = BoardSource(port, "board")
-        assert "no data" not in dict(source.told())
-        port._link.last_s -= 2.0
-        assert dict(source.told())["no data"].startswith("for 2.")
+
+        def told(silent_s):
+            port._link.last_s = port.clock() - silent_s
+            return dict(source.told())
+
+        wait_until(lambda: "no data" not in told(0.0))
+        wait_until(lambda: told(2.0)["no data"].startswith("for 2."))
 
 
 @pytest.mark.parametrize(

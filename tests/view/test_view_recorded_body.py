@@ -12,7 +12,7 @@ pytest.importorskip("viser")
 
 from contactfpga.robot.body import Body, BodyError, packed
 from contactfpga.robot.body.snapshot import on_link
-from contactfpga.tools.recordings import Recording, Session
+from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.bodies import BodyPlayer, pushes
 from contactfpga.tools.view.playback import Player
@@ -21,15 +21,18 @@ TIMES = "[[links]]\nlate_s = 0.2\nsilent_s = 0.4"
 
 
 def record(folder, about=None):
-    """The chest sends for 0.2 s, the arm for a second."""
+    """The chest sends for 0.2 s, the arm for a second; both clocks, which boards that are simulated have of their own,
+    begin at once, however late the program comes to each of them."""
     path = write_robot(folder)
     path.write_text(ROBOT.replace("[[links]]", TIMES))
     ports = {"arm": StreamPort(ROUND, frames=1000), "chest": StreamPort(FLAT, frames=200)}
-    with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
-        for name, port in ports.items():
-            session.add(port, name=name)
-        session.start()
-        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports.values()))
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setattr(recorder, "_epoch_ns", lambda board: 10**18)
+        with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
+            for name, port in ports.items():
+                session.add(port, name=name)
+            session.start()
+            wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports.values()))
     return path
 
 
@@ -111,10 +114,16 @@ def test_a_robot_that_is_not_whole_is_refused_in_one_line(tmp_path, change, says
         packed.unpack(texts, tmp_path)
 
 
+def unhurried(player):
+    """As fast as it likes: on a busy machine it would stop short of the place that is looked for."""
+    player._clock = lambda: player._stepped_s
+
+
 def test_the_view_takes_the_robot_or_one_link(file, tmp_path):
     with opening.opened(opening.ViewRequest(str(file)), http_port=0) as shown:
         assert isinstance(shown.source, BodyPlayer)
         shown.source.pause()  # a busy machine would play on between two turns
+        unhurried(shown.source)
         shown.source.seek(0.1)
         for _ in range(10):
             shown.view.step()
@@ -134,7 +143,7 @@ def test_the_view_takes_the_robot_or_one_link(file, tmp_path):
     assert isinstance(source, Player)
     assert source.title == "x.mcap, chest"
     source.pause()
-    source._clock = lambda: source._stepped_s  # as fast as it likes: on a busy machine it stops short of the place
+    unhurried(source)
     source.seek(0.1)
     shown = source.poll().zones
     wanted = [zones for t_s, _, zones in Recording(file).frames(link="chest") if t_s <= 0.1]

@@ -186,7 +186,7 @@ def test_how_often_frames_come_is_said_in_words(frames_per_s, says):
 def test_a_simulated_board_says_its_speed_only_where_it_lags(board):
     import contactfpga
 
-    with contactfpga.open(board.path) as port:
+    with contactfpga.open(board.path, timeout=60.0) as port:
         source = BoardSource(port, "board")
         assert dict(source.told())["lost"] == "nothing"
         source._pace = SimpleNamespace(share=1.0)

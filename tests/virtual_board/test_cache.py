@@ -184,7 +184,7 @@ def answer(folder):
     """What a process says that loads a library from the cache, and makes it there is none."""
     environment = os.environ | {"CONTACTFPGA_CACHE": str(folder)}
     command = [sys.executable, "-c", ANSWER]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=250, check=False)
     return done.returncode, done.stdout.split(), done.stderr
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fake_board import wait_until
 from frames import decoded
 from slow_skin import SHEETS, SLOW
 
@@ -80,13 +81,16 @@ def test_cells_of_another_size_are_refused():
         VirtualBoard(SLOW, "elbow")
 
 
-def read_for(path, seconds):
-    """What a client that opens the port reads in this time."""
+def read_until(path, enough):
+    """What a client reads that opens the port and stays until these bytes are ``enough``: as long as a busy machine
+    takes."""
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     try:
         tty.setraw(port)
-        data, end = b"", time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
+        data, deadline = b"", time.monotonic() + 60
+        while not enough(data):
+            left = deadline - time.monotonic()
+            assert left > 0, f"{len(data)} bytes came"
             if select.select([port], [], [], left)[0]:
                 data += os.read(port, 4096)
         return data
@@ -94,15 +98,28 @@ def read_for(path, seconds):
         os.close(port)
 
 
+def whole_frames(data):
+    """Frames of what a client has read that came in the middle of one."""
+    return decoded(data.partition(b"\0")[2], SLOW)[0]
+
+
 def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
-    with PtyBoard(SLOW, "full") as board:
-        before, started = board.clock(), time.monotonic()
+    """Clock and slip together follow the time since the board began, which lies between two readings of the test."""
+    board = PtyBoard(SLOW, "full")
+    earliest = time.monotonic()
+    with board:
+        wait_until(board.clock)
+        latest = time.monotonic()
         for _ in range(3):
-            data = read_for(board.port, 0.4)
-            frames = decoded(data[data.index(b"\0") + 1 :], SLOW)[0]
-            assert len(frames) > 100
-        passed = time.monotonic() - started
-        assert abs(board.clock() - before + board.slip - passed) < 0.2
+            assert read_until(board.port, lambda data: len(whole_frames(data)) > 100)
+        for _ in range(20):
+            asked, shown = time.monotonic(), board.clock()
+            # So much that the board has compared its clock with real time after the question, however late it ran.
+            wait_until(lambda: board.clock() > shown + 1.5 * pty_board.CHUNK_S)  # noqa: B023
+            told = board.clock() + board.slip
+            assert told <= time.monotonic() - earliest + 2 * pty_board.CHUNK_S
+            assert told >= asked - latest - pty_board.MAX_LAG_S
+            time.sleep(0.05)
     assert board.failure is None
     assert not Path(board.port).exists() or board._master < 0
     board.stop()
@@ -118,11 +135,8 @@ def test_several_sheets_share_the_pseudo_terminal():
 
 def test_what_nobody_reads_is_dropped_and_counted():
     with PtyBoard(SLOW) as board:
-        deadline = time.monotonic() + 20
-        while not board.dropped and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert board.dropped
-        assert decoded(b"\0".join(read_for(board.port, 0.3).split(b"\0")[1:-1]) + b"\0", SLOW)[0]
+        wait_until(lambda: board.dropped)
+        assert read_until(board.port, whole_frames)
 
 
 @pytest.mark.parametrize(
@@ -152,16 +166,13 @@ def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatc
 
     board._board.advance = drag  # before it starts: at most a fifth of real time from the first window on
     with board:
-        deadline, told = time.monotonic() + 20, ""
-        while "slower than real time" not in told and time.monotonic() < deadline:
-            time.sleep(0.05)
-            told += capsys.readouterr().err
-        assert int(re.search(r"slower than real time \((\d+)%\)", told)[1]) < 50
+        told = []
+        wait_until(lambda: told.append(capsys.readouterr().err) or "slower than real time" in "".join(told))
+        assert int(re.search(r"slower than real time \((\d+)%\)", "".join(told))[1]) < 50
         slipped = board.slip
         assert slipped > 0.1
-        while board.slip < slipped + 0.5 and time.monotonic() < deadline:
-            time.sleep(0.05)
-        told += capsys.readouterr().err
+        wait_until(lambda: board.slip > slipped + 0.5)
+        told = "".join(told) + capsys.readouterr().err
         assert told.count("slower than real time") == 1  # not every few seconds
 
 
@@ -172,9 +183,9 @@ def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
     command = [sys.executable, "-m", "contactfpga.tools.cli", "board", "--skin", str(skin), "--symlink", str(link)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline().strip() == str(link)
-    assert read_for(link, 0.5)
+    assert read_until(link, len)
     process.send_signal(number)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     assert re.search(r"ended: the board ran for \d+\.\d s in \d+\.\d s of real time \(\d+%\)\n", err)
     assert not link.is_symlink()

@@ -263,7 +263,7 @@ def alone(cache, *words, hidden=""):
     command = [sys.executable, "-c", HIDDEN, hidden, *words]
     environment = os.environ | {"PATH": str(cache), "CONTACTFPGA_CACHE": str(cache)}
     environment = {name: value for name, value in environment.items() if name != "CXX"}
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=250, check=False)
 
 
 @pytest.mark.parametrize(

@@ -118,12 +118,12 @@ class Timeline:
         return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
 
     @property
-    def last(self) -> tuple[int, int, float] | None:
-        """Of the last frame its time since power-up in us, the bits of a request's number, and when it came; None where
-        a frame cannot continue it."""
+    def last(self) -> tuple[int, Frame, float] | None:
+        """Of the last frame its time since power-up in us, itself, and when it came; None where a frame cannot continue
+        it."""
         if self.before is None or self._time_us is None or not self._known:
             return None
-        return self._time_us, self.before.heard, self._now
+        return self._time_us, self.before, self._now
 
     def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
         """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before;
@@ -200,8 +200,8 @@ QUIET_S = 5.0
 """After so long without an answered request one is supposed."""
 CAUTION = 1.25
 """So much more is stated than these lines alone say, as clocks do not keep to a straight line."""
-MOST_ASKED = 64
-"""Answered requests that count."""
+MOST_ASKED, MOST_POINTS = 64, 512
+"""Answered requests, and least delayed arrivals, that count."""
 
 _SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
 
@@ -219,6 +219,8 @@ class ClockFit:
     A frame arrives after it was sampled, never before: the least delayed arrivals, less what their bytes take on the
     wire, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
     which bounds it from below. The truth lies between the two, on a line whose slope is that of crystals.
+
+    Sums are formed in order and exponentials one by one, so that the same fit in C (c/clockfit.h) rounds alike.
     """
 
     def __init__(self) -> None:
@@ -228,7 +230,7 @@ class ClockFit:
     def forget(self) -> None:
         """The board was restarted, or a clock stepped: what was measured says nothing of what comes, but for the least
         delay, which is the way's."""
-        self._pieces: collections.deque[_Point] = collections.deque()
+        self._pieces: collections.deque[_Point] = collections.deque(maxlen=MOST_POINTS)
         self._piece = -math.inf  # number of the last one
         self._asked: collections.deque[_Point] = collections.deque(maxlen=MOST_ASKED)
         self._newest = _Point(0.0, 0.0)
@@ -301,14 +303,14 @@ class ClockFit:
             gaps = np.full(len(_SLOPES), self._least_s)
         weights = np.maximum(gaps, 1e-9) * self._likely(int(gaps.argmax()), float(gaps.max()))
         if gaps.max() <= 0:  # by less than a step: no line keeps all bounds
-            weights = np.exp(gaps * 1e9 - gaps.max() * 1e9)
-        weights /= weights.sum()
+            weights = _exponentials(gaps * 1e9 - gaps.max() * 1e9)
+        weights /= _total(weights)
         middles = above - np.maximum(gaps, 0.0) / 2
-        middle = float(weights @ middles)
-        self._slope = float(weights @ _SLOPES)
-        self._least_s = max(0.0, float(weights @ gaps))
+        middle = _total(weights * middles)
+        self._slope = _total(weights * _SLOPES)
+        self._least_s = max(0.0, _total(weights * gaps))
         self._height_s = middle + self._least_s / 2
-        self._variance = float(weights @ ((middles - middle) ** 2 + gaps**2 / 12)) * CAUTION**2
+        self._variance = _total(weights * ((middles - middle) ** 2 + gaps**2 / 12)) * CAUTION**2
 
     def _likely(self, widest: int, gap_s: float) -> np.ndarray:
         """Of each slope, from arrivals alone, of which delays hide as much as they vary and as the bounds leave open:
@@ -319,8 +321,7 @@ class ClockFit:
         hidden_s = max(gap_s, 0.0) / 4 + float(np.median(heights) - heights.min()) + 1e-6
         usual, sharp = USUAL_PPM * 1e-6, hidden_s / max(float(device_s[-1] - device_s[0]), PIECE_S)
         exponents = (_SLOPES / usual) ** 2 + ((_SLOPES - _middle_slope(list(self._pieces))) / sharp) ** 2
-        likely: np.ndarray = np.exp((exponents.min() - exponents) / 2)
-        return likely
+        return _exponentials((exponents.min() - exponents) / 2)
 
     def arrived_in_turn(
         self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
@@ -350,25 +351,27 @@ class ClockFit:
                 at += 1
         return base_us, base_s, rate, sigma_s
 
-    def bounds(self) -> tuple[int, int, float, float, float, float, float] | None:
-        """Base in us, number of the last piece, base in s, height, slope and time of the line that bounds arrivals, and
-        time of the newest one: an arrival on the same piece that is not below this line says nothing new. None before
-        the first."""
-        if not self._pieces:
-            return None
-        line = self._base_s, self._height_s, self._slope, self._fitted_s
-        return self._base_us, int(self._piece), *line, self._newest.device_s
+    @property
+    def begun(self) -> bool:
+        """Whether a frame has come."""
+        return bool(self._pieces)
 
     def line(self, arrived_s: float) -> HostLine | None:
         """For frames that arrived then; None before the first :meth:`arrived`."""
-        return self.line_from(self._newest.device_s, arrived_s) if self._pieces else None
-
-    def line_from(self, now_s: float, arrived_s: float) -> HostLine:
-        """The host's line for frames that arrived then, if the newest arrival of the fit has the time ``now_s`` of
-        :meth:`bounds`."""
+        if not self._pieces:
+            return None
+        now_s = self._newest.device_s
         base_s = self._base_s + now_s + self._bound(now_s) - self._least_s / 2
         base_us = self._base_us + round(now_s * 1e6)
         return HostLine(arrived_s, base_us, base_s, 1.0 + self._slope, math.sqrt(self._variance))
+
+
+def _total(values: np.ndarray) -> float:
+    return float(values.cumsum()[-1])
+
+
+def _exponentials(values: np.ndarray) -> np.ndarray:
+    return np.array([math.exp(value) for value in values.tolist()])
 
 
 def _hides(point: _Point, earlier: _Point) -> bool:
@@ -405,30 +408,30 @@ def _turns_down(first: _Point, second: _Point, third: _Point) -> bool:
 
 
 class HostClock:
-    """A fit of clocks for one conversation; a recording, which is not ``live``, has none."""
+    """A fit of clocks for one conversation; a recording has none."""
 
-    def __init__(self, live: bool):
+    def __init__(self, fit: ClockFit | None):
         self.byte_s = 0.0
         """What a byte takes on the wire."""
-        self._fit = ClockFit() if live else None
+        self.fit = fit
         self._line: HostLine | None = None  # for the frames that come now
         self._latest: tuple[int, int] | None = None  # time and bytes of the last of them
 
     def begin(self, now: float) -> None:
         """Packets came."""
-        self._line = None if self._fit is None else self._fit.line(now)
+        self._line = None if self.fit is None else self.fit.line(now)
 
     def take(self, time_us: int, size: int, now: float, asked_s: float | None) -> HostLine | None:
         """A frame of so many bytes is among them, or the last of a run; ``asked_s``: the request was sent then that it
         answers first."""
-        if self._fit is None:
+        if self.fit is None:
             return None
         self._latest = time_us, size
         if self._line is None or asked_s is not None:  # else the last one of those that came at once says the most
             self.end(now)
             if asked_s is not None:
-                self._fit.answered(time_us, asked_s)
-            self._line = self._fit.line(now)
+                self.fit.answered(time_us, asked_s)
+            self._line = self.fit.line(now)
         return self._line
 
     def take_reads(
@@ -437,30 +440,25 @@ class HostClock:
         """The host's lines of reads in turn, none of which answers a request; None in a recording. ``arrived_s`` and
         ``counts``: time and number of frames of each read; ``times_us`` and ``sizes``: time and bytes of its last
         frame. An arrival came before (:attr:`begun`)."""
-        if self._fit is None:
+        if self.fit is None:
             return None
-        lines = self._fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
+        lines = self.fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
         return HostLines(*(np.repeat(values, counts) for values in (arrived_s, *lines)))
-
-    @property
-    def fit(self) -> ClockFit | None:
-        """The fit of the host's clock; None in a recording."""
-        return self._fit
 
     @property
     def begun(self) -> bool:
         """Whether :meth:`take_reads` may be called."""
-        return self._fit is None or self._fit.bounds() is not None
+        return self.fit is None or self.fit.begun
 
     def end(self, now: float) -> None:
         """These were all."""
-        if self._fit is not None and self._latest is not None:
+        if self.fit is not None and self._latest is not None:
             time_us, size = self._latest
-            self._fit.arrived(time_us, now, size * self.byte_s)
+            self.fit.arrived(time_us, now, size * self.byte_s)
         self._latest = None
 
     def forget(self) -> None:
         """The board was restarted, or is another one."""
         self._line = self._latest = None
-        if self._fit is not None:
-            self._fit.forget()
+        if self.fit is not None:
+            self.fit.forget()

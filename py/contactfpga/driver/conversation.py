@@ -9,11 +9,12 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.driver.clock import MOST_S, HostClock, Timeline, continues
+from contactfpga.driver.clock import MOST_S, ClockFit, HostClock, Timeline, continues
 from contactfpga.driver.events import Lines, UnitLine
 from contactfpga.driver.reads import Reads
 from contactfpga.driver.requests import Requests
@@ -30,7 +31,7 @@ from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.wire.units import KIND_UNITS
 from contactfpga.zones.run import Run, frame_of
-from contactfpga.zones.units import UnitSamples
+from contactfpga.zones.units import UnitHistory, UnitSamples
 from contactfpga.zones.zone import HostLine, Zones
 
 _FRAME_KINDS = set(protocol.KINDS.values())
@@ -45,6 +46,30 @@ class Arrival:
     """Every :meth:`Conversation.ask` whose ticket is not above this one came before the frame was scanned."""
 
 
+class Steady(NamedTuple):
+    """What frames mean as long as each continues the last one: then they change nothing but counters and clocks."""
+
+    time_us: int
+    """Of the last frame, since power-up."""
+    before: Frame
+    """The last frame."""
+    came_s: float
+    """When it came."""
+    fit: ClockFit
+    """Of the clocks, after it."""
+    byte_s: float
+    """What a byte takes on the wire."""
+    sheet: Sheet
+    faults: tuple[str, ...]
+    """Of flagged frames."""
+    history: UnitHistory | None
+
+    def zones(self, frame: Frame, time_us: int, before: Frame, line: HostLine) -> Zones:
+        """Of a frame that continues the last one, perhaps with others between, which is not counted; ``before``: the
+        one before it."""
+        return Zones(frame, self.sheet, time_us, before, line, self.faults, self.history)
+
+
 Event = Arrival | Hello | Faults | SelfTestSlot | UnitSamples | SkinMismatch | VersionMismatch
 
 FEW, FEW_IN_RUN = 16, 8
@@ -55,11 +80,17 @@ class Conversation:
     """One port's side of it.
 
     ``port``: its name, for messages. ``expected``: the Skin the board must be built from; None: any. ``live``: a board
-    is at the other end; else the bytes are a recording, and their times are no arrival times.
+    is at the other end; else the bytes are a recording, and their times are no arrival times. ``fit`` makes the fit of
+    its clocks.
     """
 
     def __init__(
-        self, port: str, expected: Skin | None = None, live: bool = True, rng: random.Random | None = None
+        self,
+        port: str,
+        expected: Skin | None = None,
+        live: bool = True,
+        rng: random.Random | None = None,
+        fit: Callable[[], ClockFit] = ClockFit,
     ) -> None:
         self.port = port
         self.stats = Stats()
@@ -77,9 +108,9 @@ class Conversation:
         self._live = live
         self._requests = Requests(rng)
         self._timeline = Timeline(self.stats, live)
-        self._clock = HostClock(live)
+        self._clock = HostClock(fit() if live else None)
         self._reader = protocol.HelloReader()
-        self.decodes: tuple[Widths, bytes] | None = None
+        self.frame_format: tuple[Widths, bytes] | None = None
         """What frames are decoded with, and what their check begins with; None where they come only one by one."""
         self._widths: Widths | None = None
         self._rest = b""
@@ -128,11 +159,11 @@ class Conversation:
         packets = self._split(data, now)
         if decoded is not None and len(decoded.packets) != len(packets):
             decoded = None
-        same = self.decodes
+        same = self.frame_format
         events: list[Event | Run] = []
         at = 0
         while at < len(packets):
-            known = decoded if decoded is not None and self.decodes == same else None
+            known = decoded if decoded is not None and self.frame_format == same else None
             at += self._take_some(packets[at:], now, events, known and known.part(at, len(packets)))
         self._end(now)
         return events
@@ -153,34 +184,23 @@ class Conversation:
             if reads.paused(at):
                 self.doubt(now)
             self._noticed = now
-            decoded = reads.decoded_at(at) if self.decodes == reads.decodes else None
+            decoded = reads.decoded_at(at) if self.frame_format == reads.frame_format else None
             yield now, self.receive_runs(reads.data_of(at), now, decoded)
             at += 1
 
-    def lost_track(self, rest: bytes, missing: int) -> None:
+    def skip(self, missing: int, rest: bytes) -> None:
         """Count ``missing`` bytes that were overwritten; ``rest`` is the packet that the next read completes."""
         self._rest = rest
         self.stats.bytes += missing
 
-    def steady(self) -> tuple[float, ...] | None:
-        """What :attr:`Timeline.last` says of the last frame, what :meth:`ClockFit.bounds` says, and what a byte takes
-        on the wire in s; None where a frame that continues the last one might change anything else than counters."""
+    def steady(self) -> Steady | None:
+        """None where a frame that continues the last one might change anything else than counters and clocks."""
         last, fit = self._timeline.last, self._clock.fit
-        bounds = None if fit is None else fit.bounds()
-        if last is None or bounds is None or self.lines.fading or self.decodes is None:
+        if last is None or fit is None or not fit.begun or self.lines.fading or self.frame_format is None:
             return None
-        return *last, *bounds, self._clock.byte_s
-
-    def frame_from(self, frame: Frame, time_us: int, before: Frame | None, line_s: float, arrived_s: float) -> Zones:
-        """One that continues the last one while all is :meth:`steady`, perhaps with others between; it is not counted.
-        ``before``: the one before it, if that is another than the last one; ``line_s``: as for
-        :meth:`ClockFit.line_from`."""
-        fit = self._clock.fit
         assert self._widths is not None
-        assert fit is not None
-        faults, before = self.lines.names("fault" in frame.flags), before or self._timeline.before
-        line = fit.line_from(line_s, arrived_s)
-        return Zones(frame, self._widths.sheet, time_us, before, line, faults, self.units.history)
+        names = self.lines.names(flagged=True)
+        return Steady(*last, fit, self._clock.byte_s, self._widths.sheet, names, self.units.history)
 
     def pass_time(self, now: float, paused: bool) -> None:
         """Nothing came until now. Who reads sees to it that nobody ``paused`` for long, as :meth:`doubt` wants."""
@@ -202,7 +222,7 @@ class Conversation:
         and many enough; ``at`` where there are not."""
         first = reads.packets_before(at)
         end = reads.last_within(at, ends[first + 1] if first + 1 < len(ends) else first)
-        if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.decodes != reads.decodes:
+        if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.frame_format != reads.frame_format:
             return at
         if not self._requests.idle or self.lines.fading or not self._clock.begun:
             return at
@@ -256,7 +276,7 @@ class Conversation:
         """
         before, widths = self._before(), self._widths
         table, ends, follows = None, [0], False
-        if len(packets) >= FEW and widths is not None and self.decodes is not None:
+        if len(packets) >= FEW and widths is not None and self.frame_format is not None:
             table = many.decode(packets, widths, before) if decoded is None else decoded
             ends, follows = self._stretches(table.packets, now)
         at = 0
@@ -345,7 +365,7 @@ class Conversation:
         self.stats.foreign_version += 1
         if not old.hello:
             return None
-        self.hello = self.sheet = self._widths = self.decodes = None
+        self.hello = self.sheet = self._widths = self.frame_format = None
         self._timeline = Timeline(self.stats, self._live)
         self._clock.forget()
         return VersionMismatch(
@@ -368,7 +388,7 @@ class Conversation:
             event = self._take_hello(told, now)
             widths = self._widths
             many_at_once = widths is not None and widths.report.zones and not widths.sheet.ghosts
-            self.decodes = (widths, self._before()) if widths is not None and many_at_once else None
+            self.frame_format = (widths, self._before()) if widths is not None and many_at_once else None
             return event
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):

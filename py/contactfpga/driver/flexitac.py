@@ -83,6 +83,10 @@ class Heard:
     """The number that frames carry."""
 
 
+HELLO_US = 500_000
+"""Interval of hellos, as boards say them: after a break a reader in the network needs one to know the time again."""
+
+
 class FlexitacPort:
     """The port ``flexitac://PORT``. Raises what a serial port raises, and :class:`AddressError`."""
 
@@ -109,7 +113,7 @@ class FlexitacPort:
         self._out = bytearray()
         self._port = SerialTransport(address.device, address.baud)
         self._begun_s = self._port.clock()
-        self._time_us = 0
+        self._time_us = self._greeted_us = 0
 
     def read(self, timeout_s: float) -> bytes:
         """Packets of the frames that came by then."""
@@ -119,6 +123,9 @@ class FlexitacPort:
         for number, readings in enumerate(frames):
             later = (len(frames) - number) * self._frame_s
             self._take(readings, max(self._time_us + 1, now_us - int(later * 1e6)))
+        if self._sent and self._time_us - self._greeted_us >= HELLO_US:
+            self._greeted_us = self._time_us
+            self._greet(self._time_us, self._heard.shown)
         found = bytes(self._out)
         self._out.clear()
         return found
@@ -148,8 +155,10 @@ class FlexitacPort:
             # Of the frames that come next one is on its way already, and one may wait in the adapter.
             self._heard = Heard(framing.number(plain[:HEARD_DIGITS]), 3, self._heard.shown)
             if plain[-1] & REQUEST_HELLO:
-                epoch = int((self._port.clock() - self._begun_s) * 1e6) >> EPOCH_BITS
-                self._out += encode_hello(self._skin, self._sent, epoch, self._heard.number)
+                self._greet(int((self._port.clock() - self._begun_s) * 1e6), self._heard.number)
+
+    def _greet(self, time_us: int, heard: int) -> None:
+        self._out += encode_hello(self._skin, self._sent, time_us >> EPOCH_BITS, heard)
 
     def _packet(self, cells: np.ndarray) -> bytes:
         """A frame of these cells, as on the wire."""

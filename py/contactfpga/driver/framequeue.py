@@ -14,48 +14,65 @@ class FrameQueue:
     """A queue of at most ``maxsize`` frames, errors and events between frames, which drops the oldest when it is full.
     The caller holds the board's lock."""
 
-    def __init__(self, maxsize: int, all_events: bool = False):
+    def __init__(self, maxsize: int, all_events: bool = False, came: int = 0):
         self.maxsize = maxsize
         self.all_events = all_events
         """Whether the queue also takes events between frames."""
         self.dropped = 0
         """Frames that were not taken in time."""
-        self.ahead = 0
-        """Number of coming frames that the listener has already: they are left out."""
+        self.shown = 0
+        """Number of the last frame that :meth:`show` gave: what waits up to it is dropped."""
+        self.others = 0
+        """What waits and is no frame."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
         self._taken = 0  # frames of the run in front
-        self._length = 0
+        self._came = self._gone = came  # frames, which have numbers from 1; those that wait no more
 
     def __len__(self) -> int:
-        return self._length
+        return max(0, self._came - self.seen) + self.others
+
+    @property
+    def seen(self) -> int:
+        """Number of the last frame that the listener had, or that was dropped."""
+        return max(self._gone, self.shown)
+
+    def show(self, number: int) -> bool:
+        """The listener gets this frame now, before it is put here or while it waits; False: it had it. The caller need
+        not hold the board's lock, but one that all callers hold."""
+        if number <= self.seen:
+            return False
+        self.shown = number
+        return True
 
     def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
         """Add what came."""
-        if self.ahead and isinstance(item, (Zones, Run)):
-            known = min(self.ahead, _count(item))
-            self.ahead -= known
-            if known == _count(item):
-                return
-            assert isinstance(item, Run)
-            item = item.after(known)
         self._items.append(item)
-        self._length += _count(item)
-        while self._length > self.maxsize:
-            self.dropped += self._drop(self._length - self.maxsize)
+        if isinstance(item, (Zones, Run)):
+            self._came += _count(item)
+        else:
+            self.others += 1
+        self._drop_shown()
+        while self._held > self.maxsize:
+            self.dropped += self._drop(self._held - self.maxsize)
 
     def put_back(self, zones: Zones) -> None:
         """Have this frame come next."""
         self._unwrap()
         self._items.appendleft(zones)
-        self._length += 1
+        self._gone -= 1
 
     def pop(self) -> Zones | SideEvent | ContactFPGAError | None:
         """What comes next; None where nothing waits."""
+        self._drop_shown()
         if not self._items:
             return None
-        self._length -= 1
         item = self._items[0]
-        if not isinstance(item, Run):
+        if not isinstance(item, (Zones, Run)):
+            self.others -= 1
+            self._items.popleft()
+            return item
+        self._gone += 1
+        if isinstance(item, Zones):
             self._items.popleft()
             return item
         zones = item[self._taken]
@@ -67,12 +84,13 @@ class FrameQueue:
 
     def pop_frames(self) -> list[Zones | Run]:
         """All frames that wait, up to the first error."""
+        self._drop_shown()
         self._unwrap()
         found: list[Zones | Run] = []
         while self._items and isinstance(item := self._items[0], (Zones, Run)):
             found.append(item)
             self._items.popleft()
-            self._length -= _count(item)
+            self._gone += _count(item)
         return found
 
     def first_error(self) -> ContactFPGAError | None:
@@ -84,39 +102,55 @@ class FrameQueue:
         if not any(item is zones for item in self._items):
             return
         while self._items[0] is not zones:
-            self._drop(self._length)
+            self._drop(self._held)
         self._drop(1)
 
     def keep_last(self) -> None:
         """Drop all but what came last, or up to the first error, which is raised."""
-        while self._length > 1:
+        self._drop_shown()
+        while self._held > 1:
             error = self.first_error()
-            self._drop(self._length - 1)
+            self._drop(self._held - 1)
             if error is not None:
                 raise error
         self._unwrap()  # so that the others do not become Python's numbers with it
 
     def drop_older(self, moment: float) -> None:
         """Drop a frame that waits alone and came before that moment."""
-        item = self._items[0] if self._length == 1 else None
+        self._drop_shown()
+        item = self._items[0] if self._held == 1 else None
         if isinstance(item, Zones) and item.arrived_s is not None and item.arrived_s < moment:
             self.clear()
 
     def clear(self) -> None:
         """Drop everything."""
         self._items.clear()
-        self._taken = self._length = 0
+        self._gone = self._came
+        self._taken = self.others = 0
+
+    @property
+    def _held(self) -> int:
+        """What waits, and what was shown and is not dropped yet, which another thread changes at any moment."""
+        return self._came - self._gone + self.others
 
     def _drop(self, most: int) -> int:
         """Drop what comes first, and of a run at most ``most`` frames; returns how many frames were dropped."""
         item = self._items[0]
+        if not isinstance(item, (Zones, Run)):
+            self._items.popleft()
+            self.others -= 1
+            return 0
         count = min(most, _count(item) - self._taken)
-        self._length -= count
+        self._gone += count
         self._taken += count
         if self._taken == _count(item):
             self._items.popleft()
             self._taken = 0
-        return count if isinstance(item, (Zones, Run)) else 0
+        return count
+
+    def _drop_shown(self) -> None:
+        while self._items and self._gone < self.shown:
+            self._drop(self.shown - self._gone)
 
     def _unwrap(self) -> None:
         """Take the frames out of the run in front that were taken from it."""
@@ -127,5 +161,5 @@ class FrameQueue:
             self._taken = 0
 
 
-def _count(item: Zones | Run | SideEvent | ContactFPGAError) -> int:
+def _count(item: Zones | Run) -> int:
     return len(item) if isinstance(item, Run) else 1

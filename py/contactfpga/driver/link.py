@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection
 from typing import Protocol
 
 from contactfpga.driver import forks
+from contactfpga.driver.clock import ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.framequeue import FrameQueue
@@ -70,9 +71,13 @@ class Link:
     there already (``replay://``), one of the threads that wait reads for all.
     """
 
+    fit: type[ClockFit] = ClockFit
+    """Of its clocks."""
+
     def __init__(self, transport: Transport, skin: Skin | None):
         self.transport = transport
-        self.conversation = Conversation(transport.name, skin, transport.live, getattr(transport, "rng", None))
+        rng = getattr(transport, "rng", None)
+        self.conversation = Conversation(transport.name, skin, transport.live, rng, self.fit)
         self.changed = threading.Condition()
         """To be held while any state is looked at."""
         self._queues: weakref.WeakSet[FrameQueue] = weakref.WeakSet()
@@ -80,6 +85,7 @@ class Link:
         """What came last."""
         self.last_s = transport.clock()
         """When it came."""
+        self._frames = 0  # that came
         self._last_bytes = 0  # that had come by then
         self._asked_s = -math.inf  # by :meth:`ask`
         self._commanding = threading.Lock()
@@ -101,8 +107,8 @@ class Link:
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
         """A queue for what comes from now on, as long as it is kept; with all events first the faults that the board
         told last."""
-        queue = FrameQueue(maxsize, all_events)
         with self.changed:
+            queue = FrameQueue(maxsize, all_events, self._frames)
             self._queues.add(queue)
             if all_events and self.conversation.lines.told:
                 queue.put(self.conversation.lines.told)
@@ -315,6 +321,7 @@ class Link:
         if between:
             return
         if isinstance(item, (Zones, Run)):
+            self._frames += 1 if isinstance(item, Zones) else len(item)
             self.last, self.last_s, self._last_bytes = item, self.transport.clock(), self.conversation.stats.bytes
         if isinstance(event, Run):  # what it answers, the frame before it has answered
             return

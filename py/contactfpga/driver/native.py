@@ -19,10 +19,14 @@ import numpy as np
 
 from contactfpga.driver import forks
 from contactfpga.driver.address import Serial, parse
-from contactfpga.driver.reads import Read, Reads
+from contactfpga.driver.clock import ClockFit
+from contactfpga.driver.conversation import Steady
+from contactfpga.driver.reads import READ, Reads
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import FIELDS, PacketTable
+from contactfpga.wire.protocol import Frame
 from contactfpga.zones.run import frame_of
+from contactfpga.zones.zone import HostLine
 
 LIBRARY = Path(__file__).with_name("_reader.so")
 """File of the library, put there by the installation."""
@@ -32,9 +36,10 @@ CHUNK = 16_384
 
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
-_READ = struct.Struct("d4q")
-_NEWEST = struct.Struct("Qqqdd")
+_LINE = struct.Struct("qddd")
+_NEWEST = struct.Struct("Qqqdqddd")
 _FRAME = struct.Struct("?7x8q")
+_NEWEST_AND_FRAME = struct.Struct("Qqqdqddd?7x8q")
 
 
 class Sheet(ctypes.Structure):
@@ -58,13 +63,6 @@ class Base(ctypes.Structure):
         ("time_us", ctypes.c_int64),
         ("heard", ctypes.c_int64),
         ("came_s", ctypes.c_double),
-        ("base_us", ctypes.c_int64),
-        ("piece", ctypes.c_int64),
-        ("base_s", ctypes.c_double),
-        ("height_s", ctypes.c_double),
-        ("slope", ctypes.c_double),
-        ("fitted_s", ctypes.c_double),
-        ("newest_s", ctypes.c_double),
         ("byte_s", ctypes.c_double),
     ]
 
@@ -76,12 +74,12 @@ class Newest(NamedTuple):
     """Its number, from 1: that of its packet since the port was opened."""
     time_us: int
     """Since power-up."""
-    before: bool
-    """Whether the frame before it came after the last packet that was taken."""
-    at_s: float
-    """When it came."""
-    line_s: float
-    """Time of the newest arrival of the fit of clocks by then."""
+    after_another: bool
+    """Whether the frame before it came after :meth:`Port.settle`: :meth:`Port.before` gives it."""
+    line: HostLine
+    """When it came, and its time on the host's clock."""
+    frame: Frame
+    """As it came over the wire."""
 
 
 class Library:
@@ -108,8 +106,14 @@ class Library:
         self.notice = function(keeps, "notice", ctypes.c_int, address, double)
         self.failure = function(keeps, "failure", ctypes.c_int, address)
         self.take = function(keeps, "take", None, address, address, ctypes.c_size_t)
-        self.settle = function(keeps, "settle", None, address, ctypes.POINTER(Base))
+        self.settle = function(keeps, "settle", None, address, ctypes.POINTER(Base), address)
         self.newest = function(keeps, "newest", ctypes.c_int, address, number, address)
+        self.fit_size = function(keeps, "fit_size", ctypes.c_size_t)
+        self.fit_begin = function(keeps, "fit_begin", None, address)
+        self.fit_forget = function(keeps, "fit_forget", None, address)
+        self.fit_arrived = function(keeps, "fit_arrived", None, address, ctypes.c_size_t, *[address] * 4)
+        self.fit_answered = function(keeps, "fit_answered", None, address, ctypes.c_int64, double)
+        self.fit_line = function(keeps, "fit_line", ctypes.c_int, address, address)
 
 
 @functools.lru_cache(maxsize=1)
@@ -140,6 +144,43 @@ def refusal(port: object) -> str:
     return missing()
 
 
+class NativeFit(ClockFit):
+    """The same in C, which the thread goes on with by itself: see :meth:`Port.settle`."""
+
+    def __init__(self) -> None:
+        self._library = library()
+        self.memory = ctypes.create_string_buffer(self._library.fit_size())
+        self._next = ctypes.create_string_buffer(_LINE.size)
+        self._library.fit_begin(self.memory)
+
+    def forget(self) -> None:
+        self._library.fit_forget(self.memory)
+
+    def arrived(self, time_us: int, arrived_s: float, wire_s: float) -> None:
+        host = (ctypes.c_double * 2)(arrived_s, wire_s)
+        self._library.fit_arrived(
+            self.memory, 1, ctypes.byref(ctypes.c_int64(time_us)), host, ctypes.byref(host, _WORD), None
+        )
+
+    def answered(self, time_us: int, asked_s: float) -> None:
+        self._library.fit_answered(self.memory, time_us, asked_s)
+
+    def arrived_in_turn(
+        self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        came = times_us.astype(np.int64), arrived_s.astype(float), wire_s.astype(float)  # in one piece each
+        lines = np.empty((len(times_us), 4))
+        self._library.fit_arrived(self.memory, len(lines), *(values.ctypes.data for values in (*came, lines)))
+        return lines.view(np.int64)[:, 0], lines[:, 1], lines[:, 2], lines[:, 3]
+
+    @property
+    def begun(self) -> bool:
+        return bool(self._library.fit_line(self.memory, self._next))
+
+    def line(self, arrived_s: float) -> HostLine | None:
+        return HostLine(arrived_s, *_LINE.unpack(self._next)) if self.begun else None
+
+
 class Port:
     """A port that the thread reads; with a descriptor of -1 it gets what :meth:`feed` gives."""
 
@@ -153,7 +194,6 @@ class Port:
         self.taken = 0
         """Packets that were taken, and those that were overwritten before."""
         self._bytes = 0  # the same
-        self._base = Base()
         self._make_room()
         forks.watch(self)
 
@@ -201,13 +241,13 @@ class Port:
         """errno of a port that is lost, -1 at its end, 0 as long as it goes on."""
         return int(self._library.failure(self._address))
 
-    def decode(self, decodes: tuple[Widths, bytes] | None) -> None:
-        """What frames are from now on; see :attr:`contactfpga.driver.conversation.Conversation.decodes`."""
-        if decodes == self._decodes:
+    def decode(self, frame_format: tuple[Widths, bytes] | None) -> None:
+        """What frames are from now on; see :attr:`contactfpga.driver.conversation.Conversation.frame_format`."""
+        if frame_format == self._decodes:
             return
         told = Sheet()
-        if decodes is not None:
-            widths, before = decodes
+        if frame_format is not None:
+            widths, before = frame_format
             sheet = widths.sheet
             told = Sheet(
                 1,
@@ -225,13 +265,12 @@ class Port:
             self._columns = 3
         self._make_room()
         self._library.sheet(self._address, ctypes.byref(told))
-        self._decodes = decodes
+        self._decodes = frame_format
 
     def _make_room(self) -> None:
         """For the newest frame and the one before it."""
         self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
         self._newest_view = self._newest.data
-        self._newest_words = self._newest.view(np.int64)
         self._newest_at = self._newest.ctypes.data
 
     # ---- what came
@@ -248,7 +287,7 @@ class Port:
             return None
         columns = self._columns
         reads = _TAKEN.size
-        fields = reads + count * _READ.size
+        fields = reads + count * READ.itemsize
         starts = fields + packets * FIELDS.itemsize
         sizes = starts + (packets + 1) * _WORD
         carried = sizes + packets * _WORD
@@ -260,8 +299,9 @@ class Port:
             found = np.frombuffer(memory, FIELDS, packets, fields)
             table = PacketTable(found, np.frombuffer(memory, np.int64, packets + 1, starts), rows)
         came = Reads(
-            Read(0.0, first_byte, first_packet, 0, 0),
-            list(_READ.iter_unpack(memory.data[reads:fields])),
+            first_byte,
+            first_packet,
+            np.frombuffer(memory, READ, count, reads),
             memory[data:end].tobytes(),
             self._decodes,
             table,
@@ -273,41 +313,39 @@ class Port:
 
     # ---- the newest frame
 
-    def settle(self, steady: tuple[float, ...] | None) -> None:
+    def settle(self, steady: Steady | None) -> None:
         """What :meth:`contactfpga.driver.conversation.Conversation.steady` says after what was taken."""
-        base = self._base
-        base.steady, base.packets = steady is not None, self.taken
-        if steady is not None:
-            base.time_us, base.heard, base.came_s, base.base_us, base.piece, *rest = steady
-            base.base_s, base.height_s, base.slope, base.fitted_s, base.newest_s, base.byte_s = rest
-        self._library.settle(self._address, ctypes.byref(base))
+        base, memory = Base(packets=self.taken), None
+        if steady is not None and isinstance(steady.fit, NativeFit):
+            memory = steady.fit.memory
+            base.steady, base.time_us, base.heard = 1, steady.time_us, steady.before.heard
+            base.came_s, base.byte_s = steady.came_s, steady.byte_s
+        self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
-        """The newest frame, whose fields and records :meth:`frame` gives then; None where it is not newer than this
-        packet. Raises :class:`Unsettled` where what came does not tell it."""
+        """The newest frame; None where it is not newer than this packet, which is one that was taken before
+        :meth:`settle` or came later. Raises :class:`Unsettled` where what came does not tell it. Not for several
+        threads at once."""
         found = self._library.newest(self._address, packets, self._newest_at)
-        if found < 0:
-            raise Unsettled
-        return Newest(*_NEWEST.unpack_from(self._newest_view)) if found else None
+        if found <= 0:
+            if found:
+                raise Unsettled
+            return None
+        values = _NEWEST_AND_FRAME.unpack_from(self._newest_view)
+        frame = self._frame(values[8:], _NEWEST.size + 2 * FIELDS.itemsize)
+        return Newest(values[0], values[1], values[2] == 1, HostLine._make(values[3:8]), frame)
 
-    def frame(self) -> Any:
-        """The newest frame of the last :meth:`newest`, as it came over the wire."""
-        return self._frame(0)
+    def before(self) -> Frame:
+        """The frame before that of the last :meth:`newest`."""
+        first, second = _FRAME.iter_unpack(self._newest_view[_NEWEST.size : _NEWEST.size + 2 * FIELDS.itemsize])
+        return self._frame(second, _NEWEST.size + 2 * FIELDS.itemsize + first[-1] * self._columns * _WORD)
 
-    def frame_before(self) -> Any:
-        """The frame before :meth:`frame`."""
-        return self._frame(1)
-
-    def _frame(self, index: int) -> Any:
+    def _frame(self, fields: tuple[int, ...], start: int) -> Frame:
+        """Of these fields, with the records that begin at ``start``."""
         assert self._decodes is not None
-        place = _NEWEST.size + index * FIELDS.itemsize
-        fields = _FRAME.unpack_from(self._newest_view, place)
-        start = _NEWEST.size + 2 * FIELDS.itemsize
-        if index:
-            start += _FRAME.unpack_from(self._newest_view, _NEWEST.size)[-1] * self._columns * _WORD
-        start //= _WORD
-        records = self._newest_words[start : start + fields[-1] * self._columns].reshape(-1, self._columns).copy()
-        return frame_of(fields, records, self._decodes[0].sheet)
+        shape = fields[-1], self._columns
+        copied = bytearray(self._newest_view[start : start + shape[0] * shape[1] * _WORD])
+        return frame_of(fields, np.ndarray(shape, np.int64, copied), self._decodes[0].sheet)
 
 
 class Unsettled(Exception):

@@ -2,20 +2,23 @@
 
 That thread notes when bytes came and decodes frames (:mod:`contactfpga.driver.native`). Whoever calls takes what came
 and has the conversation say what it means, as it does for a :class:`~contactfpga.driver.link.Link` with a thread in
-Python. While nobody calls, a thread does so some times a second.
+Python. While nobody calls, a thread does so every two seconds. The newest frame is known before what came was taken, as
+long as each frame continues the one before.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import Callable
+from typing import NamedTuple
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Arrival, Conversation, Steady
 from contactfpga.driver.events import Silence
 from contactfpga.driver.framequeue import FrameQueue
 from contactfpga.driver.link import READ_S, Link, Result, timed_out
-from contactfpga.driver.native import Newest, Port, Unsettled
+from contactfpga.driver.native import NativeFit, Port, Unsettled
 from contactfpga.driver.reads import Reads
 from contactfpga.driver.recording import RecordingTransport
 from contactfpga.driver.transport import SerialTransport, Transport
@@ -25,7 +28,7 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
-SERVE_S = 0.5
+SERVE_S = 2.0
 """Interval of taking what came while nobody calls; logs are as late as this. A file of recorded bytes has
 :data:`contactfpga.driver.link.READ_S`."""
 
@@ -53,15 +56,31 @@ class NativePort:
         return self._inner.lost(OSError(failure, os.strerror(failure) if failure > 0 else "it ended"))
 
 
+class _Settled(NamedTuple):
+    """What was known when the conversation had taken all that came."""
+
+    steady: Steady
+    packets: int
+    """That were taken."""
+    more_frames: int
+    """Number of the last frame less that of its packet, and the same for all frames that continue it."""
+
+
 class NativeLink(Link):
-    """A :class:`~contactfpga.driver.link.Link` to a board on a :class:`NativePort`."""
+    """A :class:`~contactfpga.driver.link.Link` to a board on a :class:`NativePort`.
+
+    The newest frame is shown without the lock :attr:`changed`, under which a thread may work through many frames.
+    """
+
+    fit = NativeFit
 
     def __init__(self, port: NativePort, transport: Transport, skin: Skin | None):
         self._port, self._core = port, port.core
         self._record = transport.take if isinstance(transport, RecordingTransport) else None
-        self._settled = self._taking = False
-        self._ahead: set[FrameQueue] = set()  # of which frames were shown before they were taken
-        self._shown: tuple[int, Frame | None] = 0, None  # number and frame of what was shown last
+        self._taking = False
+        self._showing = threading.Lock()  # held for short only: for what follows, and the core's newest frame
+        self._settled: _Settled | None = None
+        self._shown: tuple[int, Frame | None] = 0, None  # packet and frame of what was shown last
         super().__init__(transport, skin)
 
     @property
@@ -101,9 +120,9 @@ class NativeLink(Link):
                 self._failure = self._port.lost(failure)
 
     def _take_reads(self, reads: Reads, begun: bytes, missing: int) -> None:
-        said, self._settled = self._said, False
+        said = self._said
         if missing:
-            said.lost_track(begun, missing)
+            said.skip(missing, begun)
         if self._record is not None:
             for at in range(len(reads)):
                 self._record(reads.data_of(at), reads.at_s[at])
@@ -112,10 +131,8 @@ class NativeLink(Link):
                 self._pass_on(event)
                 if isinstance(event, (Arrival, Run)):
                     self._last_s = at_s
-        self._core.decode(said.decodes)
-        for queue in self._ahead:
-            queue.ahead = 0
-        self._ahead.clear()
+        with self._showing:
+            self._core.decode(said.frame_format)
 
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
         with self.changed:
@@ -162,42 +179,52 @@ class NativeLink(Link):
     def newest(self, queue: FrameQueue, timeout: float) -> Zones | None:
         deadline, start = self.clock() + timeout, self._said.stats.bytes
         while True:
-            with self.changed:
-                self.check_open()
-                try:
-                    if (zones := self._newest(queue)) is not None:
-                        return zones
-                except Unsettled:
-                    return None
-                if queue:
-                    return None
-                left, seen = self._left(deadline, timeout, start), self._core.taken + queue.ahead
-            self._core.wait(seen, min(left, READ_S))
+            try:
+                found = self._newest(queue)
+            except Unsettled:
+                return None
+            if not isinstance(found, int):
+                return found
+            self._core.wait(found, min(self._left(deadline, timeout, start), READ_S))
+            self.check_open()
 
-    def _newest(self, queue: FrameQueue) -> Zones | None:
-        """The newest frame, none that the queue has had; raises :class:`Unsettled` where what came does not tell it."""
-        core = self._core
+    def _newest(self, queue: FrameQueue) -> Zones | int | None:
+        """The newest frame, none that the queue has had; if there is none yet, the number of the packet after which it
+        comes; None where the queue has to be looked at. Raises :class:`Unsettled` where what came does not tell it."""
         try:
-            found = core.newest(core.taken + queue.ahead) if self._settled else self._settle(queue)
+            return self._show(queue)
         except Unsettled:
-            found = self._settle(queue)
-        if found is None or queue.first_error() is not None:
-            return None
-        queue.clear()
-        queue.ahead = found.packets - core.taken
-        self._ahead.add(queue)
-        frame, before = core.frame(), None
-        if found.before:
-            known, shown = self._shown
-            before = shown if known == found.packets - 1 else core.frame_before()
-        self._shown = found.packets, frame
-        return self._said.frame_from(frame, found.time_us, before, found.line_s, found.at_s)
+            self._settle()
+            return self._show(queue)
 
-    def _settle(self, queue: FrameQueue) -> Newest | None:
-        self.catch_up()
-        self._core.settle(self._said.steady())
-        self._settled = True
-        return self._core.newest(self._core.taken + queue.ahead)
+    def _show(self, queue: FrameQueue) -> Zones | int | None:
+        core = self._core
+        with self._showing:
+            if (settled := self._settled) is None:
+                raise Unsettled
+            if queue.others:
+                return None
+            steady, packets, more_frames = settled
+            seen = max(packets, queue.seen - more_frames)
+            if (found := core.newest(seen)) is None:
+                return None if queue else seen
+            if not queue.show(found.packets + more_frames):
+                return found.packets
+            before = steady.before
+            if found.after_another:
+                known, shown = self._shown
+                before = shown if shown is not None and known == found.packets - 1 else core.before()
+            self._shown = found.packets, found.frame
+        return steady.zones(found.frame, found.time_us, before, found.line)
+
+    def _settle(self) -> None:
+        with self.changed:
+            self.catch_up()
+            with self._showing:
+                steady = self._said.steady()
+                self._core.settle(steady)
+                packets = self._core.taken
+                self._settled = None if steady is None else _Settled(steady, packets, self._frames - packets)
 
     # ---- the thread that takes what came while nobody calls, and its end
 
@@ -217,6 +244,10 @@ class NativeLink(Link):
                     return
             with contextlib.suppress(ContactFPGAError):  # the next call says so
                 self._send()
+
+    def forked(self) -> None:
+        super().forked()
+        self._showing = threading.Lock()
 
     def abandon(self) -> None:
         super().abandon()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import functools
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,47 +16,40 @@ PAUSED, NOISE = 1, 2
 delimiter."""
 
 
-class Read(NamedTuple):
-    """What came at once; bytes and packets are those of all reads up to it."""
-
-    at_s: float
-    bytes: int
-    packets: int
-    records: int
-    odd: int
-    """Of :data:`PAUSED` and :data:`NOISE`."""
+READ = np.dtype([("at_s", "<f8"), ("bytes", "<i8"), ("packets", "<i8"), ("records", "<i8"), ("odd", "<i8")])
+"""What came at once: bytes and packets are those of all reads up to it, ``odd`` of :data:`PAUSED` and :data:`NOISE`."""
 
 
 class Reads:
     """Consecutive reads.
 
-    ``reads``: of the fields of :class:`Read`, after as many bytes and packets as ``before`` says; ``data``: all bytes.
+    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes.
     ``decoded``: of every packet, with (n,) ``sizes`` in bytes, whether it is a whole frame by what
-    :attr:`contactfpga.driver.conversation.Conversation.decodes` said, ``decodes``, and then its fields.
+    :attr:`contactfpga.driver.conversation.Conversation.frame_format` said, ``frame_format``, and then its fields.
     """
 
     def __init__(
         self,
-        before: Read,
-        reads: list[tuple[float, int, int, int, int]],
+        bytes_before: int,
+        packets_before: int,
+        reads: np.ndarray,
         data: bytes,
-        decodes: tuple[Widths, bytes] | None,
+        frame_format: tuple[Widths, bytes] | None,
         decoded: PacketTable | None,
         sizes: np.ndarray,
     ):
-        self.at_s = [read[0] for read in reads]
-        self.decodes, self.decoded = decodes, decoded
-        self._data, self._sizes = data, sizes
-        self._bytes = [0, *(read[1] - before.bytes for read in reads)]
-        self._packets = [0, *(read[2] - before.packets for read in reads)]
-        self._odd = [read[4] for read in reads]
+        self.at_s: list[float] = reads["at_s"].tolist()
+        self.frame_format, self.decoded = frame_format, decoded
+        self._reads, self._data, self._sizes = reads, data, sizes
+        self._bytes: list[int] = [0, *(reads["bytes"] - bytes_before).tolist()]
+        self._packets: list[int] = [0, *(reads["packets"] - packets_before).tolist()]
 
     def __len__(self) -> int:
         return len(self.at_s)
 
     def paused(self, at: int) -> bool:
         """Whether nobody had read before this read for longer than times are known."""
-        return bool(self._odd[at] & PAUSED)
+        return bool(self._reads["odd"][at] & PAUSED)
 
     def packets_before(self, at: int) -> int:
         """Packets that were complete before this read."""
@@ -83,15 +75,16 @@ class Reads:
 
     def _next_break(self, at: int) -> int:
         """The first read from here on that is odd, or from the next one on that came too late after the one before."""
-        if self._odd[at]:
+        if self._reads["odd"][at]:
             return at
         place = bisect.bisect_right(self._breaks, at)
         return self._breaks[place] if place < len(self._breaks) else len(self)
 
     @functools.cached_property
     def _breaks(self) -> list[int]:
-        late = np.diff(self.at_s, prepend=self.at_s[0]) > MOST_S
-        found: list[int] = np.flatnonzero((np.array(self._odd) > 0) | late).tolist()
+        at_s = self._reads["at_s"]
+        late = np.diff(at_s, prepend=at_s[0]) > MOST_S
+        found: list[int] = np.flatnonzero((self._reads["odd"] > 0) | late).tolist()
         return found
 
     def last_frames(
@@ -103,4 +96,4 @@ class Reads:
         counts = np.diff(by)
         some = counts > 0
         lasts = by[1:][some] - 1
-        return times_us[lasts - by[0]], self._sizes[lasts] + 1, np.array(self.at_s[at:end])[some], counts[some]
+        return times_us[lasts - by[0]], self._sizes[lasts] + 1, self._reads["at_s"][at:end][some], counts[some]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from contactfpga.choices import converters, debounces, labellers, scans
 from contactfpga.choices.choice import Choice
-from contactfpga.choices.reports import REPORTS
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.skin import limits
@@ -22,49 +23,45 @@ if TYPE_CHECKING:
 
 Mask = tuple[tuple[int, int], ...]
 
-_CHOICES: dict[str, tuple[Any, ...]] = {
-    "surface": ("plane", "cylinder"),
-    "connectivity": (4, 8),
-    "diodes": ("col2row", "row2col", "none"),
-    "row_drive": ("direct", "74hc595"),
-    "column_read": ("direct", "74hc165"),
-    "report": tuple(REPORTS),
-    "send": ("always", "on_change"),
-}
-
 _REGISTERED: dict[str, Callable[[object], Choice]] = {
     "labeller": labellers.find,
     "scan": scans.find,
     "debounce": debounces.find,
     "converter": converters.find,
 }
-_SWITCHES = ("closed", "guard", "fail_safe", "alive", "self_test", "dual")
-_WHOLE = (
-    *("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "units", "clock_hz", "baud"),
-)
 
 
 def check_types(skin: Skin) -> dict[str, Any]:
-    """Check the type of every field; returns choices, integers, lengths and times in their final types.
+    """Check every field against the type that the class declares; returns choices, integers, lengths and times in their
+    final types. Lists are left to the checks of what they hold.
 
     Equal Skins have one fingerprint, so 8.0 is no 8. An integer of numpy is accepted, and kept as Python's.
     """
     _check_name(skin.name)
-    return (
-        {name: _choice(name, getattr(skin, name), choices) for name, choices in _CHOICES.items()}
-        | {name: find(getattr(skin, name)).name for name, find in _REGISTERED.items()}
-        | {name: _switch(name, getattr(skin, name)) for name in _SWITCHES}
-        | {name: _whole(name, getattr(skin, name)) for name in _WHOLE}
-        | ({} if skin.zone_capacity is None else {"zone_capacity": _whole("zone_capacity", skin.zone_capacity)})
-        | {name: _finite(name, value) for name, value in _floats(skin)}
-    )
+    return {name: check(name, getattr(skin, name)) for name, check in _type_checks(dataclasses.fields(skin))}
 
 
-def _choice(name: str, value: Any, choices: tuple[Any, ...]) -> Any:
+@functools.cache
+def _type_checks(fields: tuple[dataclasses.Field[Any], ...]) -> list[tuple[str, Callable[[str, Any], Any]]]:
+    """The names of fields with the checks of their types, in the order in which they are refused."""
+    types = {field.name: field.type for field in fields}
+    types["connectivity"] = Literal[4, 8]  # int in the class, as callers compute it
+    return [
+        *((name, partial(_choice, get_args(of))) for name, of in types.items() if get_origin(of) is Literal),
+        *((name, _registered) for name in _REGISTERED),
+        *((name, checks[of]) for checks in _BY_TYPE for name, of in types.items() if of in checks),
+    ]
+
+
+def _choice(choices: tuple[Any, ...], name: str, value: Any) -> Any:
     of_type = isinstance(value, str) if isinstance(choices[0], str) else whole(value) is not None
     if not of_type or value not in choices:
         raise SkinError(f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, choices))}")
     return choices[choices.index(value)]
+
+
+def _registered(name: str, value: Any) -> str:
+    return _REGISTERED[name](value).name
 
 
 def _switch(name: str, value: Any) -> bool:
@@ -79,17 +76,22 @@ def _whole(name: str, value: Any) -> int:
     return number
 
 
-def _floats(skin: Skin) -> Iterator[tuple[str, Any]]:
-    for field in dataclasses.fields(skin):
-        value = getattr(skin, field.name)
-        if field.type == "float" or (field.type == "float | None" and value is not None):
-            yield field.name, value
-
-
 def _finite(name: str, value: Any) -> float:
     if not is_finite(value):
         raise SkinError(f"{name} is {shown(value)}; it must be a finite number")
     return float(value)
+
+
+def _optional(check: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
+    return lambda name, value: None if value is None else check(name, value)
+
+
+_BY_TYPE: tuple[dict[Any, Callable[[str, Any], Any]], ...] = (
+    {bool: _switch},
+    {int: _whole},
+    {int | None: _optional(_whole)},
+    {float: _finite, float | None: _optional(_finite)},
+)
 
 
 def _check_name(name: object) -> None:
@@ -116,15 +118,13 @@ def check_sheet(skin: Skin) -> dict[str, Any]:
     _check_ghosts(skin, mask)
     surface = check_surface(skin)
     _check_guard(skin)
-    orders = {name: _check_order(name, getattr(skin, name), lines) for name, lines in _ordered(skin)}
+    orders = {f"{kind}_order": _check_order(skin, kind) for kind in ("row", "column")}
     return {"mask": mask, **surface, **orders, **check_units(skin)}
 
 
-def _ordered(skin: Skin) -> list[tuple[str, int]]:
-    return [("row_order", skin.rows), ("column_order", skin.columns)]
-
-
-def _check_order(name: str, value: Any, lines: int) -> tuple[int, ...]:
+def _check_order(skin: Skin, kind: str) -> tuple[int, ...]:
+    name, lines = f"{kind}_order", getattr(skin, f"{kind}s")
+    value = getattr(skin, name)
     numbers = [whole(line) for line in value] if isinstance(value, list | tuple) else None
     if numbers is None or None in numbers:
         raise SkinError(f"{name} is {shown(value)}; it must be a list of whole numbers")
@@ -168,8 +168,7 @@ def _check_registers(skin: Skin) -> None:
     for kind, wiring, registers in (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165")):
         lines, chains = getattr(skin, f"{kind}_lines"), getattr(skin, f"{kind}_chains")
         if getattr(skin, wiring) == "direct":
-            if chains != 1:
-                raise SkinError(f"{kind}_chains is {shown(chains)}; leave it out, or set {wiring} = '{registers}'")
+            _left_out(skin, f"{kind}_chains", f"set {wiring} = '{registers}'")
             continue
         _within(f"{kind}_chains", chains, 1, lines)
         length = math.ceil(lines / chains)
@@ -181,10 +180,8 @@ def _check_registers(skin: Skin) -> None:
                 f"{kind}_chains = {filled}"
             )
     _within("shift_hz", skin.shift_hz, limits.MIN_SHIFT_HZ, limits.MAX_SHIFT_HZ, "Hz")
-    if skin.row_drive == skin.column_read == "direct" and skin.shift_hz != limits.SHIFT_HZ:
-        raise SkinError(
-            f"shift_hz is {shown(skin.shift_hz)}; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'"
-        )
+    if skin.row_drive == skin.column_read == "direct":
+        _left_out(skin, "shift_hz", "set row_drive = '74hc595' or column_read = '74hc165'")
 
 
 def _check_precharge(skin: Skin) -> None:
@@ -192,8 +189,8 @@ def _check_precharge(skin: Skin) -> None:
         raise SkinError(f"column_read is {skin.column_read!r}; precharge_us drives the columns and needs 'direct'")
     if skin.precharge_us and skin.ghosts:
         raise SkinError("diodes is 'none'; precharge_us drives the columns and needs 'col2row' or 'row2col'")
-    if not skin.reads_rows and skin.project_us != limits.PROJECT_US:
-        raise SkinError(f"project_us is {skin.project_us}; leave it out, or set scan = 'reversal'")
+    if not skin.reads_rows:
+        _left_out(skin, "project_us", "set scan = 'reversal'")
 
 
 def _check_ghosts(skin: Skin, mask: Mask) -> None:
@@ -220,8 +217,8 @@ def _check_ghosts(skin: Skin, mask: Mask) -> None:
 def check_link(skin: Skin) -> None:
     """Check clock, baud rate and report."""
     _within("barycenter_bits", skin.barycenter_bits, 0, limits.MAX_BARYCENTER_BITS)
-    if skin.report != "barycenter" and skin.barycenter_bits != limits.BARYCENTER_BITS:
-        raise SkinError(f"barycenter_bits is {shown(skin.barycenter_bits)}; leave it out, or set report = 'barycenter'")
+    if skin.report != "barycenter":
+        _left_out(skin, "barycenter_bits", "set report = 'barycenter'")
     if skin.clock_hz % 1_000_000 or not 1_000_000 <= skin.clock_hz <= limits.MAX_CLOCK_HZ:
         raise SkinError(f"clock_hz is {shown(skin.clock_hz)}; it must be a whole number of MHz from 1 to 400 MHz")
     _within("baud", skin.baud, limits.MIN_BAUD, skin.clock_hz // 2, "for this clock")
@@ -278,12 +275,17 @@ def _check_keep_alive(skin: Skin, derived: Derived) -> None:
         )
 
 
+def _left_out(skin: Skin, name: str, instead: str) -> None:
+    """Check that a field that nothing uses has its default."""
+    if (value := getattr(skin, name)) != getattr(type(skin), name):
+        raise SkinError(f"{name} is {shown(value)}; leave it out, or {instead}")
+
+
 def _within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     if not low <= value <= high:
         raise SkinError(f"{name} is {shown(value)}; it must lie between {low} and {high} {unit}".rstrip())
 
 
-_MIN_RADIUS_MM, _MAX_RADIUS_MM = 0.1, 100_000.0
 _PITCH_TOLERANCE = 1e-3
 """Allowed relative error of a pitch against the radius."""
 
@@ -298,10 +300,7 @@ def check_surface(skin: Skin) -> dict[str, float]:
         return {}
     if skin.radius_mm is None:
         raise SkinError("radius_mm is missing; surface = 'cylinder' needs it")
-    if not _MIN_RADIUS_MM <= skin.radius_mm <= _MAX_RADIUS_MM:
-        raise SkinError(
-            f"radius_mm is {shown(skin.radius_mm)}; it must lie between {_MIN_RADIUS_MM} and {_MAX_RADIUS_MM} mm"
-        )
+    _within("radius_mm", skin.radius_mm, 0.1, 100_000.0, "mm")
     around_mm = 2 * math.pi * skin.radius_mm
     return _check_closed(skin, around_mm) if skin.closed else _check_gap(skin, around_mm)
 
@@ -350,8 +349,7 @@ def check_units(skin: Skin) -> dict[str, Any]:
         raise SkinError(f"units is {skin.units}; {converter.title} has {converter.channels} channels")
     sums = _sums(skin.unit_sums, skin.units)
     if not skin.units:
-        if skin.converter_v != limits.CONVERTER_V:
-            raise SkinError(f"converter_v is {skin.converter_v}; leave it out, or set units")
+        _left_out(skin, "converter_v", "set units")
         return {"unit_sums": sums}
     least_v = converter.limits[0][0]
     if not least_v <= skin.converter_v <= converter.most_v:

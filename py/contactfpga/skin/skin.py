@@ -1,6 +1,6 @@
 """The one description of a sheet from which gateware, golden model, virtual board and host are built."""
 
-from __future__ import annotations
+# No `from __future__ import annotations`: the checks look at the fields' types, which must not be texts.
 
 import dataclasses
 import functools
@@ -79,7 +79,7 @@ class Skin:
     """Time without a driven row before the next one, in us; with ``precharge_us`` at least that and two clocks."""
     precharge_us: float = 0.0
     """How long the board drives the columns to the released level before it drives a row, in us; 0: not at all."""
-    project_us: float = limits.PROJECT_US
+    project_us: float = 1.0
     """How long ``scan = "reversal"`` drives all columns before it reads the rows, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin per row; ``74hc595``: rows on shift registers."""
@@ -89,7 +89,7 @@ class Skin:
     """``direct``: a pin per column; ``74hc165``: columns on shift registers."""
     column_chains: int = 1
     """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
-    shift_hz: int = limits.SHIFT_HZ
+    shift_hz: int = 8_000_000
     """The shift clock in Hz at most; it is clock_hz divided by a whole number, at least 2."""
     debounce: DebounceName | Debounce = "none"
     """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as QMK names them."""
@@ -105,7 +105,7 @@ class Skin:
     report: ReportName = "moments"
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: the
     pressed cells as a bitmap."""
-    barycenter_bits: int = limits.BARYCENTER_BITS
+    barycenter_bits: int = 4
     """With ``report = "barycenter"``, x and y are rounded to 1 / 2^barycenter_bits of a cell, halves upward."""
     send: Literal["always", "on_change"] = "always"
     """``always``: every frame is sent. ``on_change``: frames whose cells differ from the last one, and keep-alives."""
@@ -128,7 +128,7 @@ class Skin:
     """Pressure units, read by an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
     converter: ConverterName | Converter = "mcp3208"
     """The converter that reads the pressure units."""
-    converter_v: float = limits.CONVERTER_V
+    converter_v: float = 3.3
     """The converter's supply in V, which limits its SPI clock."""
     unit_sums: tuple[tuple[int, ...], ...] = ()
     """Up to four weighted sums of the units' deviations from their zeros, with a weight from -127 to 127 for each
@@ -148,7 +148,7 @@ class Skin:
         checks.check_timing(self)
 
     @classmethod
-    def load(cls, path: str | Path, trust: bool = False, usual: Mapping[str, Any] | None = None) -> Skin:
+    def load(cls, path: str | Path, trust: bool = False, usual: Mapping[str, Any] | None = None) -> "Skin":
         """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
         ``[circuit]`` are not the Skin's: :func:`contactfpga.design.cover.load_cover` and
         :func:`contactfpga.design.circuit.load_circuit` read them. A file that names a module, such as
@@ -172,7 +172,7 @@ class Skin:
         except SkinError as error:
             raise SkinError(f"{path}: {error}") from None
 
-    def replace(self, **changes: Any) -> Skin:
+    def replace(self, **changes: Any) -> "Skin":
         """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
         one whose division is switched on or off."""
         divides = self.report == "barycenter"
@@ -248,20 +248,8 @@ class Skin:
     @property
     def sheet(self) -> Sheet:
         """The part of the Skin that reading frames needs."""
-        assert self.zone_capacity is not None
-        return Sheet(
-            rows=self.rows,
-            columns=self.columns,
-            connectivity=self.connectivity,
-            report=self.report,
-            barycenter_bits=self.barycenter_bits if self.report == "barycenter" else 0,
-            zone_capacity=self.zone_capacity,
-            pitch_x_mm=self.pitch_x_mm,
-            pitch_y_mm=self.pitch_y_mm,
-            radius_mm=self.radius_mm,
-            closed=self.closed,
-            ghosts=self.ghosts,
-        )
+        shared = {field.name: getattr(self, field.name) for field in dataclasses.fields(Sheet)}
+        return Sheet(**shared | ({} if self.report == "barycenter" else {"barycenter_bits": 0}))
 
     @functools.cached_property
     def derived(self) -> Derived:

@@ -7,7 +7,7 @@ import functools
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, TypeVar, overload
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
 
 import numpy as np
 
@@ -420,8 +420,7 @@ class Zones(Sequence[Zone]):
 Times = TypeVar("Times", int, np.ndarray)
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class HostLine:
+class HostLine(NamedTuple):
     """A linear map from device time to the host's clock, as known when its frames arrived, and their arrival."""
 
     arrived_s: float

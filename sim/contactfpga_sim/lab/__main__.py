@@ -51,8 +51,9 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
             print(f"{page}: {name} stays as it is without {', '.join(absent)}", flush=True)
             continue
         text = run.text(name)
-        if section.kept:
-            text = beside.part(text, section.kept, DOCS / beside.FOLDER / f"{Path(page).stem}-{name}.csv")
+        if section.kept or section.heads:
+            file = DOCS / beside.FOLDER / f"{Path(page).stem}-{name}.csv"
+            text = beside.part(text, section.kept, file, section.heads)
         writer.write(DOCS / page, {name: lambda text=text: text}, meaning.fingerprint(study, name))  # type: ignore[misc]
         print(f"{page}: {name}", flush=True)
     if study.pictures:

@@ -1,4 +1,4 @@
-"""Long tables of pages: a page keeps the rows that matter, a CSV file has all."""
+"""Long tables of pages: a page keeps the rows and columns that matter, a CSV file has all."""
 
 from __future__ import annotations
 
@@ -15,20 +15,26 @@ FOLDER = "tables"
 _TABLE = re.compile(r"(?:^\|.*\|(?:\n|\Z))+", re.MULTILINE)
 _HEAD = 2
 """Lines of a table above its rows."""
-_PARTED = re.compile(rf"^(?:(?:\|.*\n)+\n)?All \[\d+ rows\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE)
+_PARTED = re.compile(
+    rf"^(?:(?:\|.*\n)+\n)?All \[\d+ rows(?:, \d+ columns)?\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE
+)
 
 
-def part(text: str, kept: str, file: Path) -> str:
+def part(text: str, kept: str, file: Path, heads: str = "") -> str:
     """A section with only the rows of its longest table that match the regular expression ``kept``, and a link to the
-    file with all. If no row matches, only the link stays."""
+    file with all. If no row matches, only the link stays. ``heads`` is one for the headers of the columns that stay."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]
     shown = [row for row in rows if re.search(kept, row)]
+    columns = [number for number, head in enumerate(_cells(lines[0])) if re.search(heads, head)]
     file.parent.mkdir(exist_ok=True)
     write_text(file, _csv(lines))
-    link = f"All [{len(rows)} rows]({FOLDER}/{file.name})."
-    return text.replace(table, "\n".join([*lines[:_HEAD], *shown, "", link] if shown else [link]), 1)
+    fewer = len(columns) < len(_cells(lines[0]))
+    size = f"{len(rows)} rows, {len(_cells(lines[0]))} columns" if fewer else f"{len(rows)} rows"
+    link = f"All [{size}]({FOLDER}/{file.name})."
+    picked = [[_cells(row)[number] for number in columns] for row in (lines[0], *shown)]
+    return text.replace(table, "\n".join([writer.table_of(picked), "", link] if shown else [link]), 1)
 
 
 def whole(page: Path, name: str) -> str:
@@ -39,9 +45,12 @@ def whole(page: Path, name: str) -> str:
 
 def _csv(lines: list[str]) -> str:
     text = io.StringIO()
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in (lines[0], *lines[_HEAD:])]
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows(map(_cells, (lines[0], *lines[_HEAD:])))
     return text.getvalue()
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip() for cell in line.strip("|").split("|")]
 
 
 def _table(text: str) -> str:

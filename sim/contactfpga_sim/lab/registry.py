@@ -34,6 +34,8 @@ class Section:
     """A function without arguments that makes part of the text, such as a row, in less than a minute."""
     kept: str = ""
     """Regular expression for the rows of its longest table that the page keeps; empty: all."""
+    heads: str = ""
+    """Regular expression for the headers of the columns that the page keeps; empty: all."""
     of_netlists: bool = False
     """Whether it shows measurements by :mod:`.size`, so that netlists, not reached code, decide whether it is out of
     date."""

@@ -15,19 +15,25 @@ _ALL = (
             "places": Section(
                 "tables:places_table",
                 kept=r"^\| (flush, .*|buttons|tiles) \| 10 \| 1 \| 5 |^\| tiles \| 6.4 \| 0.4 \| 5 ",
+                heads="^(?!pressed|limit alone)",
             ),
             "effects": Section(
                 "tables:effects_table",
                 kept=NO_ROW,
             ),
-            "set": Section("tables:set_table", kept=r"^\| (reacts|speed stays|sensor torque|contact force|peak force)"),
-            "sheet": Section("tables:sheet_table"),
-            "speeds": Section("tables:speed_table"),
+            "set": Section(
+                "tables:set_table",
+                kept=r"^\| (reacts|speed stays|contact force|peak force)",
+                heads="^$|^(paper|set|6 ms|UART|pin|limit)",
+            ),
+            "sheet": Section("tables:sheet_table", heads="^(?!touches|bound)"),
+            "speeds": Section("tables:speed_table", heads="^(?!.*δ)"),
             "defense": Section("tables:defense_table", kept="switch"),
-            "pushes": Section("tables:push_table", sample="tables:push_table", kept="0.265|limit"),
+            "pushes": Section("tables:push_table", sample="tables:push_table", kept=NO_ROW),
             "failures": Section(
                 "tables:failure_table",
-                kept="nothing wrong|halfway between|patch's|m/s: pressed flat|nobody waits|dies before",
+                kept="nothing wrong|halfway between|patch's|nobody waits|dies before",
+                heads="^$|reacts|because|peak|reversals",
             ),
             "steps": Section("tables:step_table", kept=NO_ROW),
         },
@@ -41,8 +47,12 @@ _ALL = (
         minutes=4,
         sections={
             "outages": Section("tables:outages_table", kept="unplugged|sends nothing|another Skin"),
-            "registration": Section("tables:registration_table", kept=r"^\| (plane|cyl)|^\|  \| 6"),
-            "folds": Section("tables:folds_table", kept=r"^\| [25] ", sample="tables:folds_sample"),
+            "registration": Section(
+                "tables:registration_table",
+                kept=r"^\| (plane|cyl).*, with normals|^\|  \| 6 \| 0",
+                heads="^(?!wrongly|residual)",
+            ),
+            "folds": Section("tables:folds_table", kept=r"^\| 5 ", sample="tables:folds_sample"),
         },
         pictures="tables:draw",
         extra="test",
@@ -63,15 +73,19 @@ _ALL = (
         page="chart.md",
         minutes=25,
         sections={
-            "front": Section("tables:front_table", kept=r"\*\*"),
+            "front": Section("tables:front_table", kept=r"\*\*", heads="family|touch|miscounted|barycenter"),
             "families": Section(
                 "tables:families_table",
-                kept=r"^\| (run, (6.4|20) mm, tiles|run, 6.4 mm, paper|\*.*) \| \d",
+                kept=r"^\| run, 6.4 mm, (tiles|paper) \| \d",
             ),
-            "methods": Section("tables:methods_table", kept=r"^\| (?!barycenter)\w+, 6.4 mm, tiles \|"),
-            "host": Section("tables:host_table", kept=r"\| (9|10|28|29|91|92) \|"),
-            "floor": Section("limits:floor_table", kept=r"^\| finger \| tiles \| (6.4|10) mm"),
-            "other_ways": Section("limits:rivals_section", kept="6.4 mm"),
+            "methods": Section(
+                "tables:methods_table",
+                kept=r"^\| (?!barycenter|single)\w+, 6.4 mm, tiles \|",
+                heads="method|touch|alone|miscounted|barycenter|LUT4",
+            ),
+            "host": Section("tables:host_table", kept=r"\| (10|29|92) \|", heads="^(?!labelled|faster)"),
+            "floor": Section("limits:floor_table", kept=NO_ROW),
+            "other_ways": Section("limits:rivals_table", kept="6.4 mm", heads="^(?!pitch|missed|lines|assumes)"),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -83,7 +97,12 @@ _ALL = (
         page="clock.md",
         minutes=1,
         sections={
-            "accuracy": Section("tables:accuracy_table", sample="tables:slow_sample"),
+            "accuracy": Section(
+                "tables:accuracy_table",
+                kept=r"microframes|1 ms \||16 ms|network",
+                heads="^(?!error within)",
+                sample="tables:slow_sample",
+            ),
         },
     ),
     Study(
@@ -92,8 +111,8 @@ _ALL = (
         page="labelling.md",
         minutes=5,
         sections={
-            "closed": Section("tables:clocks_table", sample="tables:clocks_sample"),
-            "closed_size": Section("tables:size_table", of_netlists=True),
+            "closed": Section("tables:clocks_table", kept=NO_ROW, sample="tables:clocks_sample"),
+            "closed_size": Section("tables:size_table", kept=r"^\| `\w+` \| 8 ", of_netlists=True),
         },
         extra="boards",
     ),
@@ -103,18 +122,34 @@ _ALL = (
         page="cover.md",
         minutes=3,
         sections={
-            "closes": Section("caps:felt_table", kept="6.4 mm|10 mm.*the paper", sample="caps:felt_sample"),
-            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm"),
-            "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
-            "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
-            "rules": Section("tables:rules_table", page="paper.md", kept=r"closed|\*\*"),
-            "failing": Section("tables:failing_table", page="paper.md", kept="trapezoid, 100 |midpoint|Euler"),
-            "sense": Section("tables:sense_table", kept=r"^\| (halfspace|bonded), point \| R\* = 2 mm"),
+            "closes": Section(
+                "caps:felt_table",
+                kept=r"(6.4|10) mm.*the paper|6.4 mm.*(caps, gaps|tiles)",
+                heads="pitch|presses|50 %|99 %",
+                sample="caps:felt_sample",
+            ),
+            "elements": Section("caps:elements_table", page="paper.md", kept=r"^\| 5 mm \| [48]"),
+            "sags": Section("caps:sagging_table", page="paper.md", kept="6.4 mm", sample="caps:sagging_table"),
+            "paper": Section(
+                "tables:paper_table",
+                page="paper.md",
+                kept="misprint|wrong;|not reproduce|inconsistent|bottoms|fails|vacuous|low by",
+                sample="tables:paper_table",
+            ),
+            "rules": Section("tables:rules_table", page="paper.md", kept=r"\*\*"),
+            "failing": Section("tables:failing_table", page="paper.md", kept=NO_ROW),
+            "sense": Section("tables:sense_table", kept=NO_ROW),
             "thinning": Section(
-                "tables:thinning_table", kept=r"^\| (6|0.895|0.252) ms", sample="tables:thinning_table"
+                "tables:thinning_table",
+                kept=r"^\| (6|0.895|0.252) ms",
+                heads="^(?!the paper|in the)",
+                sample="tables:thinning_table",
             ),
             "foams": Section(
-                "tables:foam_table", kept=r"^\| (PORON 4701-30, 320|Plastazote|Sylodyn)", sample="tables:foam_table"
+                "tables:foam_table",
+                kept=r"^\| (PORON 4701-30, 320|Plastazote|Sylodyn)",
+                heads="^(?!source)",
+                sample="tables:foam_table",
             ),
         },
         pictures="tables:draw",
@@ -133,9 +168,15 @@ _ALL = (
         page="failures.md",
         minutes=10,
         sections={
-            "failures": Section("tables:table", kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed"),
-            "closed": Section("tables:closed", kept=r"^\| \[Two fingers"),
-            "unnoticed": Section("tables:unnoticed", kept=r"^\| \[(?![^]]*, by line reversal)"),
+            "failures": Section(
+                "tables:table",
+                kept=r"^\| \[(?![^]]*, by line reversal).*\*\*not noticed",
+                heads="knob|at$|helps",
+            ),
+            "closed": Section("tables:closed", kept=NO_ROW),
+            "unnoticed": Section(
+                "tables:unnoticed", kept=r"^\| \[.*#(closing|light|diodes|broken|stuck|silence)\)", heads="knob|why"
+            ),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
@@ -147,10 +188,7 @@ _ALL = (
         page="fit.md",
         minutes=10,
         sections={
-            "fingers": Section("tables:fingers_section", kept="23x23|answer|runner"),
-            "bumper": Section("tables:bumper_section", kept="the answer"),
-            "hands": Section("tables:hands_section", kept="the answer"),
-            "sole": Section("tables:sole_section", kept="the answer"),
+            "fingers": Section("tables:fingers_section", kept="23x23|answer", heads="^(?!pitch|bytes)"),
         },
         extra="chart",
     ),
@@ -161,9 +199,9 @@ _ALL = (
         minutes=30,
         sections={
             "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table", kept="of registers"),
-            "modules": Section("tables:modules_table", kept="(scan|label) .*`"),
-            "ways": Section("tables:ways_table", kept="silently wrong"),
+            "flipped": Section("tables:designs_table", kept="of registers", heads="^(?!bits|flips)"),
+            "modules": Section("tables:modules_table", kept=NO_ROW),
+            "ways": Section("tables:ways_table", kept=NO_ROW),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -176,12 +214,19 @@ _ALL = (
         minutes=5,
         sections={
             "layouts": Section("tables:layouts_table", kept="at one end|best of all", sample="tables:layouts_table"),
-            "places": Section("tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)"),
-            "wrong": Section("tables:wrong_table", kept="30 %|drifted"),
-            "felt": Section("tables:felt_table", kept=r"^\| 5 mm \|"),
+            "places": Section(
+                "tables:places_table", kept=r"^\| (set \| 5|closings \| 5|center of pressure \| 10)", heads="^(?!over)"
+            ),
+            "wrong": Section("tables:wrong_table", kept="30 %|drifted", heads="not|^error|radius|covers|reports"),
+            "felt": Section("tables:felt_table", kept=NO_ROW),
             "pairs": Section("tables:pairs_table", kept="60 mm"),
-            "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table", page="haptics_limits.md", kept=r"^\| \["),
+            "limits": Section("tables:limits_table", kept=NO_ROW),
+            "breaks": Section(
+                "tables:breaks_table",
+                page="haptics_limits.md",
+                kept=r"^\| \[.*not noticed",
+                heads="knob|at$|reported|helps",
+            ),
             "breakpictures": Section(
                 "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
             ),
@@ -209,13 +254,19 @@ _ALL = (
         minutes=12,
         sections={
             "kits": Section("tables:headline", page="../README.md"),
-            "times": Section("tables:times_table"),
+            "times": Section("tables:times_table", kept="pin|last byte on|decision"),
             "built": Section("tables:built_table"),
-            "pins": Section("tables:pins_table", kept="the kit|22 kΩ alone|reversal"),
-            "parts": Section("tables:parts_table", kept=r"^\| fast \| beside", sample="tables:parts_table"),
+            "pins": Section("tables:pins_table", kept=NO_ROW),
+            "parts": Section(
+                "tables:parts_table",
+                kept=r"^\| fast \| beside",
+                heads="count|what|value",
+                sample="tables:parts_table",
+            ),
             "predictions": Section(
                 "tables:predictions_table",
                 kept=r"`(contact_worst|break_worst|settle)_us|`felt_half_n",
+                heads="^(?!name)",
                 sample="tables:predictions_table",
             ),
         },
@@ -229,7 +280,7 @@ _ALL = (
         minutes=1,
         sections={
             "diodes": Section("tables:diodes_table", sample="tables:diodes_table"),
-            "pulls": Section("tables:pulls_table", kept=r"^\| (4.7|10|22|47) k", sample="tables:pulls_table"),
+            "pulls": Section("tables:pulls_table", kept=r"^\| (10|22|47) k", sample="tables:pulls_table"),
             "series": Section("tables:series_table", kept=r"^\| (none|33|100)", sample="tables:series_table"),
         },
         pictures="tables:draw",
@@ -253,9 +304,9 @@ _ALL = (
         page="mutants.md",
         minutes=90,
         sections={
-            "mutants": Section("tables:mutants_table", kept=r"^\| all"),
-            "options": Section("tables:options_table", kept=r"^\| all"),
-            "several": Section("tables:several_table", kept=r"^\| all"),
+            "mutants": Section("tables:mutants_table", kept=r"^\| all", heads="^(?!stage)"),
+            "options": Section("tables:options_table", kept=r"^\| all", heads="^(?!stage)"),
+            "several": Section("tables:several_table", kept=r"^\| all", heads="^(?!stage)"),
         },
         compute="tables:compute",
     ),
@@ -265,9 +316,9 @@ _ALL = (
         page="net.md",
         minutes=2,
         sections={
-            "batch": Section("tables:batch_table"),
-            "links": Section("tables:links_table", kept=r"^\| (1|16|64) "),
-            "thousand": Section("tables:thousand_table", kept="network|readers"),
+            "batch": Section("tables:batch_table", heads="^(?!messages|ratio)"),
+            "links": Section("tables:links_table", kept=r"^\| (1|16|64) ", heads="links|of those|latency"),
+            "thousand": Section("tables:thousand_table", kept=NO_ROW),
         },
         pictures="tables:draw",
         extra="test",
@@ -278,17 +329,14 @@ _ALL = (
         page="performance.md",
         minutes=5,
         sections={
-            "reference": Section("scans:reference_table", sample="scans:reference_sample"),
+            "reference": Section("scans:reference_table", heads="^(?!bytes)", sample="scans:reference_sample"),
             "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample", kept=NO_ROW),
-            "report": Section("scans:report_table", sample="scans:report_sample", kept="reference"),
-            "fast": Section("scans:latency_table", sample="scans:latency_sample"),
+            "report": Section("scans:report_table", sample="scans:report_sample", kept="reference", heads="^(?!sheet)"),
+            "fast": Section("scans:latency_table", heads="^(?!bytes|contact|frames)", sample="scans:latency_sample"),
             "bridges": Section(
-                "bridges:bridge_table", kept="1 ms, 0", page="boards.md", sample="bridges:bridge_sample"
+                "bridges:bridge_table", kept="1 ms, 0.*reference", page="boards.md", sample="bridges:bridge_sample"
             ),
-            "sides": Section("scans:sides_table", sample="scans:sides_sample", kept=NO_ROW),
-            "gain": Section(
-                "scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole|nothing"
-            ),
+            "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole"),
             "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
             "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
         },
@@ -300,9 +348,9 @@ _ALL = (
         minutes=5,
         sections={
             "reader_rest": Section("tables:rest_table"),
-            "reader_busy": Section("tables:busy_table"),
-            "reader_loop": Section("tables:loop_table"),
-            "reader_links": Section("tables:links_table"),
+            "reader_busy": Section("tables:busy_table", kept="latest", heads="^(?!calls)"),
+            "reader_loop": Section("tables:loop_table", kept="a thread"),
+            "reader_links": Section("tables:links_table", kept=r"^\| 64 \| `latest"),
         },
     ),
     Study(
@@ -311,9 +359,9 @@ _ALL = (
         page="recordings.md",
         minutes=2,
         sections={
-            "sizes": Section("tables:sizes_table"),
-            "reading": Section("tables:reading_table"),
-            "loss": Section("tables:loss_table"),
+            "sizes": Section("tables:sizes_table", kept=r"^\| 10,"),
+            "reading": Section("tables:reading_table", kept=NO_ROW),
+            "loss": Section("tables:loss_table", kept="worst"),
         },
         extra="test",
     ),
@@ -324,9 +372,8 @@ _ALL = (
         minutes=60,
         sections={
             "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
-            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16"),
-            "labellers": Section("scripts/measure_rivals.py:summary_table", page="performance.md", kept="16x16"),
+            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16", heads="^(?!sheet)"),
+            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="labeller|builds"),
         },
         compute="scripts/measure_rivals.py:compute",
         extra="boards",
@@ -339,7 +386,7 @@ _ALL = (
         minutes=10,
         sections={
             "costs": Section("scripts/measure_ros.py:costs_table", kept="Contacts|Marker"),
-            "shown": Section("scripts/measure_ros.py:shown_table"),
+            "shown": Section("scripts/measure_ros.py:shown_table", heads="ROS|by|late"),
         },
         extra="test",
     ),
@@ -349,10 +396,11 @@ _ALL = (
         page="safety.md",
         minutes=5,
         sections={
-            "coverage": Section("tables:coverage_table", kept=r"^\| (none|`guard`, |these)"),
+            "coverage": Section("tables:coverage_table", kept=r"^\| (none|`guard`, |these)", heads="options|reported"),
             "faults": Section(
                 "tables:faults_table",
                 kept="row is broken|stuck closed|does not close|diode is shorted|no supply|wire of",
+                heads="^(?!effect|wrong frames|without|time until)",
             ),
             "times": Section("tables:times_table", sample="tables:times_table"),
         },
@@ -371,14 +419,10 @@ _ALL = (
         minutes=2,
         sections={
             "needs": Section("tables:needs_table", kept="nominal|500|64x64, rows"),
-            "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]"),
-            "shorted": Section("tables:shorted_table", kept=r"^\| [012] ", sample="tables:shorted_table"),
+            "breaks": Section("tables:breaks_table", kept=r"^\| [A-Z]", heads="^(?!circuit|what breaks)"),
+            "shorted": Section("tables:shorted_table", kept=r"^\| [01] ", sample="tables:shorted_table"),
             "summary": Section("tables:summary_table", kept=r"^\| all", needs=("ngspice",)),
-            "agreement": Section(
-                "tables:agreement_table",
-                kept=r"^\| (settle|project rows) \| 16x16 \| one cell \| 30, 2, 3",
-                needs=("ngspice",),
-            ),
+            "agreement": Section("tables:agreement_table", kept=NO_ROW, needs=("ngspice",)),
         },
         pictures="pictures:draw",
     ),
@@ -388,7 +432,7 @@ _ALL = (
         page="several.md",
         minutes=3,
         sections={
-            "several_line": Section("tables:line_table", kept=r"000 \| [148] \|", sample="tables:line_sample"),
+            "several_line": Section("tables:line_table", kept=r"000 \| [48] \|", sample="tables:line_sample"),
             "several_size": Section("tables:size_table", of_netlists=True),
         },
         extra="boards",
@@ -399,8 +443,8 @@ _ALL = (
         page="performance.md",
         minutes=60,
         sections={
-            "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole"),
-            "faults": Section("tables:faults_table", of_netlists=True),
+            "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole", heads="^(?!8x8)"),
+            "faults": Section("tables:faults_table", kept="none|guard|self_test|fast", of_netlists=True),
             "units_size": Section("tables:units_table", kept=r"^\| (1|6) ", page="units.md", of_netlists=True),
             "boards": Section("tables:boards_table", page="boards.md"),
         },
@@ -421,7 +465,7 @@ _ALL = (
         page="mutants.md",
         minutes=60,
         sections={
-            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| (units|all)"),
+            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| all", heads="^(?!folder)"),
             "left": Section("scripts/tested_mutants.py:left"),
         },
         compute="scripts/tested_mutants.py:compute",
@@ -433,14 +477,22 @@ _ALL = (
         page="tracking.md",
         minutes=25,
         sections={
-            "speed": Section("tables:speed_table"),
+            "speed": Section("tables:speed_table", kept=NO_ROW),
             "reflex": Section("tables:reflex_table"),
             "breaks": Section(
-                "tables:breaks_table", kept="(pass each|bounces|stuck switches|frames are lost).*`Tracker`"
+                "tables:breaks_table",
+                kept="(pass each|bounces|frames are lost).*`Tracker`",
+                heads="knob|up to|helps",
             ),
-            "scores": Section("tables:scores_table", kept=r"mean of all \| (25|100|10,000) "),
-            "ahead": Section("tables:ahead_table", kept=r"`(crossing|tapping|entering)` \| 100 "),
-            "recorded": Section("tables:recorded_table", kept=r"all \| `Tracker`", needs=("../shared/data",)),
+            "scores": Section(
+                "tables:scores_table", kept=r"mean of all \| (25|100|10,000) ", heads="scenes|second|IDF1"
+            ),
+            "ahead": Section("tables:ahead_table", kept=NO_ROW),
+            "recorded": Section(
+                "tables:recorded_table",
+                kept=NO_ROW,
+                needs=("../shared/data",),
+            ),
         },
         pictures="tables:draw",
         extra="test",
@@ -451,7 +503,12 @@ _ALL = (
         page="units.md",
         minutes=1,
         sections={
-            "units": Section("tables:units_table", kept=r"\| 6 \|", sample="tables:units_table"),
+            "units": Section(
+                "tables:units_table",
+                kept=r"\| 6 \|",
+                heads="converter|supply|sweep|packet|Mbaud",
+                sample="tables:units_table",
+            ),
         },
     ),
     Study(
@@ -460,8 +517,8 @@ _ALL = (
         page="view.md",
         minutes=4,
         sections={
-            "view_load": Section("tables:loads_table"),
-            "view_clicks": Section("tables:clicks_table", kept="gateware|until it is drawn|^\\| all"),
+            "view_load": Section("tables:loads_table", kept="two", heads="sheet|both"),
+            "view_clicks": Section("tables:clicks_table", kept=r"^\| all"),
         },
         compute="tables:compute",
         pictures="tables:draw",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,15 @@ class CircuitError(ContactFPGAError, ValueError):
     """An impossible or unworkable circuit; the message names the value and the limit."""
 
 
-def _within(where: str, name: str, value: object, low: float, high: float, unit: str = "") -> None:
-    if not is_finite(value) or not low <= float(value) <= high:  # type: ignore[arg-type]
-        ends = f"{low:.12g} and {high:.12g}"
-        raise CircuitError(f"{name} in [{where}] is {shown(value)}; it must lie between {ends} {unit}".rstrip())
+def _check_limits(where: str, values: Diode | Circuit) -> None:
+    """Check each number against the lowest and the highest value that its field declares."""
+    for one in dataclasses.fields(values):
+        if not one.metadata:
+            continue
+        value, (low, high, *unit) = getattr(values, one.name), one.metadata["limits"]
+        if not is_finite(value) or not low <= float(value) <= high:
+            ends = " ".join([f"{low:.12g} and {high:.12g}", *unit])
+            raise CircuitError(f"{one.name} in [{where}] is {shown(value)}; it must lie between {ends}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,50 +33,23 @@ class Diode:
     """A Shockley junction with a series resistance and a depletion charge: SPICE's IS, N, RS, CJO, VJ and M, without
     breakdown or diffusion charge."""
 
-    saturation_a: float
-    emission: float
-    series_ohm: float
-    junction_pf: float
+    saturation_a: float = field(metadata={"limits": (1e-18, 1e-3), "spice": "IS"})
+    emission: float = field(metadata={"limits": (0.5, 5.0), "spice": "N"})
+    series_ohm: float = field(metadata={"limits": (0.0, 1000.0), "spice": "RS"})
+    junction_pf: float = field(metadata={"limits": (0.0, 1000.0), "spice": "CJO"})
     """Capacitance at 0 V."""
-    junction_v: float
-    grading: float
+    junction_v: float = field(metadata={"limits": (0.1, 2.0), "spice": "VJ"})
+    grading: float = field(metadata={"limits": (0.0, 0.9), "spice": "M"})
 
     def __post_init__(self) -> None:
-        for name, (low, high) in DIODE_LIMITS.items():
-            _within("diode", name, getattr(self, name), low, high)
+        _check_limits("diode", self)
 
-
-DIODE_LIMITS = {
-    "saturation_a": (1e-18, 1e-3),
-    "emission": (0.5, 5.0),
-    "series_ohm": (0.0, 1000.0),
-    "junction_pf": (0.0, 1000.0),
-    "junction_v": (0.1, 2.0),
-    "grading": (0.0, 0.9),
-}
 
 SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 11.0, 0.3, 0.5)
 """A small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
 SILICON = Diode(2.5e-9, 1.75, 0.6, 2.0, 0.75, 0.4)
 """A small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
 DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
-
-LIMITS = {
-    "line_pf": (0.1, 100_000.0, "pF"),
-    "crossing_pf": (0.0, 1000.0, "pF"),
-    "neighbor_pf": (0.0, 10_000.0, "pF"),
-    "pin_ohm": (1.0, 10_000.0, "ohm"),
-    "series_ohm": (0.0, 100_000.0, "ohm"),
-    "line_ohm": (0.0, 100_000.0, "ohm"),
-    "switch_ohm": (0.1, 1e6, "ohm"),
-    "column_pull_ohm": (100.0, 1e8, "ohm"),
-    "row_pull_ohm": (100.0, 1e8, "ohm"),
-    "supply_v": (1.0, 5.5, "V"),
-    "low_v": (0.1, 5.0, "V"),
-    "high_v": (0.2, 5.5, "V"),
-    "pin_ma": (0.1, 100.0, "mA"),
-}
-"""Lowest and highest value, and unit."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -80,38 +59,38 @@ class Circuit:
     Each line is one capacitance; its resistance is between it and its pin, as if all switches were at the far end.
     """
 
-    line_pf: float = 30.0
+    line_pf: float = field(default=30.0, metadata={"limits": (0.1, 100_000.0, "pF")})
     """Capacitance of a line to ground, with its pin, in pF."""
-    crossing_pf: float = 2.0
+    crossing_pf: float = field(default=2.0, metadata={"limits": (0.0, 1000.0, "pF")})
     """Capacitance of a row to a column at their crossing, with an open switch, in pF."""
-    neighbor_pf: float = 3.0
+    neighbor_pf: float = field(default=3.0, metadata={"limits": (0.0, 10_000.0, "pF")})
     """Capacitance of a line to each neighbor, in pF."""
-    pin_ohm: float = 40.0
+    pin_ohm: float = field(default=40.0, metadata={"limits": (1.0, 10_000.0, "ohm")})
     """Resistance of a driving pin, high or low."""
-    series_ohm: float = 0.0
+    series_ohm: float = field(default=0.0, metadata={"limits": (0.0, 100_000.0, "ohm")})
     """Resistor between pin and line."""
-    line_ohm: float = 0.0
+    line_ohm: float = field(default=0.0, metadata={"limits": (0.0, 100_000.0, "ohm")})
     """Resistance of a line from end to end."""
-    switch_ohm: float = 100.0
+    switch_ohm: float = field(default=100.0, metadata={"limits": (0.1, 1e6, "ohm")})
     """Resistance of a closed switch."""
     diode: Diode = SCHOTTKY
     """Diode in series with each switch; in a file also ``"schottky"`` or ``"silicon"``."""
-    column_pull_ohm: float = 100_000.0
+    column_pull_ohm: float = field(default=100_000.0, metadata={"limits": (100.0, 1e8, "ohm")})
     """Resistor that pulls or keeps a column at its released level."""
-    row_pull_ohm: float = 10_000.0
+    row_pull_ohm: float = field(default=10_000.0, metadata={"limits": (100.0, 1e8, "ohm")})
     """Resistor that pulls a row to its untouched level; used by projections alone."""
-    supply_v: float = 3.3
-    low_v: float = 0.8
+    supply_v: float = field(default=3.3, metadata={"limits": (1.0, 5.5, "V")})
+    """Supply of the board's pins, in V."""
+    low_v: float = field(default=0.8, metadata={"limits": (0.1, 5.0, "V")})
     """VIL: the highest level that surely reads low."""
-    high_v: float = 2.0
+    high_v: float = field(default=2.0, metadata={"limits": (0.2, 5.5, "V")})
     """VIH: the lowest level that surely reads high."""
-    pin_ma: float = 8.0
+    pin_ma: float = field(default=8.0, metadata={"limits": (0.1, 100.0, "mA")})
     """Largest permanent pin current: 8 mA is specified for an iCE40's pin at 3.3 V, and for an ECP5's with its usual
     drive strength. Charging pulses may be higher."""
 
     def __post_init__(self) -> None:
-        for name, (low, high, unit) in LIMITS.items():
-            _within("circuit", name, getattr(self, name), low, high, unit)
+        _check_limits("circuit", self)
         if not isinstance(self.diode, Diode):
             raise CircuitError(f"diode is {shown(self.diode)}; it must be a Diode, or one of {', '.join(DIODES)}")
         if not self.low_v < self.high_v < self.supply_v:
@@ -129,6 +108,11 @@ class Circuit:
         """A copy with some values changed, checked again."""
         return dataclasses.replace(self, **changes)
 
+
+LIMITS: dict[str, tuple[float, float, str]] = {
+    one.name: one.metadata["limits"] for one in dataclasses.fields(Circuit) if one.metadata
+}
+"""Lowest and highest value, and unit, of a circuit's numbers."""
 
 THERMAL_V = 8.617333e-5 * 300.15
 """k T / q at 27 degrees Celsius, SPICE's default."""

@@ -23,6 +23,9 @@ FOUND_S = 3.0
 """Timeout for the first message of a publisher."""
 GONE_S = 1.0
 """Silence after which a publisher is gone, whatever its token: anyone can declare a token."""
+LATE_S = 0.2
+"""How much longer than asked for a wait lasts if this process stood still, as one that is stopped or gets no processor.
+That is no silence of the publisher's, whose messages may wait to be taken."""
 
 
 class ZenohPort:
@@ -39,6 +42,8 @@ class ZenohPort:
         self._waiting = 0
         self._stream = Stream(self.counters)
         self._asks: zenoh.Publisher | None = None
+        self._still_s = 0.0  # for which this process stood still since the last message
+        self._still_after_s: float | None = None  # when that message came
         try:
             self._session = session.connected(address.connect, address.config)
         except MissingExtra:
@@ -72,7 +77,7 @@ class ZenohPort:
         """Available bytes, after waiting at most ``timeout_s`` for the first."""
         with self._changed:
             if not self._pieces:
-                self._changed.wait(timeout_s)
+                self._wait(timeout_s)
             data = b""
             while self._pieces and not (data and self._pieces[0][1]):
                 piece, after_break = self._pieces.popleft()
@@ -86,9 +91,18 @@ class ZenohPort:
                 )
             return data
 
+    def _wait(self, timeout_s: float) -> None:
+        begun_s, heard_s = time.monotonic(), self._stream.heard_s
+        self._changed.wait(timeout_s)
+        late_s = time.monotonic() - begun_s - timeout_s
+        if late_s > LATE_S and self._stream.heard_s == heard_s:
+            self._still_s = late_s + (self._still_s if self._still_after_s == heard_s else 0.0)
+            self._still_after_s = heard_s
+
     def _gone(self) -> bool:
-        assert self._stream.heard_s is not None
-        silent_s, wait_s = time.monotonic() - self._stream.heard_s, self._address.wait_s
+        heard_s, wait_s = self._stream.heard_s, self._address.wait_s
+        assert heard_s is not None
+        silent_s = time.monotonic() - heard_s - (self._still_s if self._still_after_s == heard_s else 0.0)
         return silent_s > (max(wait_s, QUIET_S) if self._stream.ended else wait_s + GONE_S)
 
     def write(self, data: bytes) -> None:

@@ -47,17 +47,19 @@ class Moments:
     def _shifted(self, seconds: float) -> int:
         now = self._clock()
         if not self._until - KEPT_S <= now < self._until:
-            self._offset_ns = self._measured()
+            self._offset_ns = offset_ns(self._now_ns, self._clock)
             self._until = now + KEPT_S
         return round(seconds * 1e9) + self._offset_ns
 
-    def _measured(self) -> int:
-        """The difference of the clocks, by the least interrupted reading."""
-        found = []
-        for _ in range(_TRIES):
-            before, now_ns, after = self._clock(), self._now_ns(), self._clock()
-            found.append((after - before, now_ns - round((before + after) / 2 * 1e9)))
-        return min(found)[1]
+
+def offset_ns(now_ns: Callable[[], int], clock: Callable[[], float]) -> int:
+    """The first clock's lead over the second in ns, by the least interrupted of several readings: a process may rest
+    between two looks at clocks."""
+    found = []
+    for _ in range(_TRIES):
+        before, moment_ns, after = clock(), now_ns(), clock()
+        found.append((after - before, moment_ns - round((before + after) / 2 * 1e9)))
+    return min(found)[1]
 
 
 OK, WARN, ERROR = range(3)

@@ -7,41 +7,17 @@ import dataclasses
 import json
 from typing import Any
 
-from contactfpga import terminal
+from contactfpga import helptext, terminal
 from contactfpga.design import circuit as sheet
 from contactfpga.design.circuit import DIODES, Circuit, CircuitError, Diode, Needs, Problem
 from contactfpga.design.circuit.static import NOISE_V
 from contactfpga.design.circuit.times import MARGIN, Time
-from contactfpga.design.circuit.values import DIODE_LIMITS, LIMITS
+from contactfpga.design.circuit.values import LIMITS
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin, limits
 from contactfpga.tools.console import flags, numbers
 
 EXTRA = None
-
-WORDS = {
-    "line_pf": "Capacitance of a line to ground, with its pin",
-    "crossing_pf": "Capacitance of a row to a column",
-    "neighbor_pf": "Capacitance of a line to each of the two beside it",
-    "pin_ohm": "Resistance of a pin that drives",
-    "series_ohm": "Resistor between pin and line",
-    "line_ohm": "Resistance of a line from end to end",
-    "switch_ohm": "Resistance of a closed switch",
-    "column_pull_ohm": "Resistor that pulls or keeps a column at its released level",
-    "row_pull_ohm": "Resistor that pulls a row that is read, in a projection",
-    "supply_v": "Supply",
-    "low_v": "VIL: the highest level that is sure to read low",
-    "high_v": "VIH: the lowest level that is sure to read high",
-    "pin_ma": "Current that a pin may carry permanently",
-}
-DIODE_WORDS = {
-    "saturation_a": "IS",
-    "emission": "N",
-    "series_ohm": "RS",
-    "junction_pf": "CJO",
-    "junction_v": "VJ",
-    "grading": "M",
-}
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -54,16 +30,18 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--diodes", choices=("col2row", "row2col"), help=direction)
     usual = Circuit()
     values = parser.add_argument_group("circuit")
+    meanings = {one.name: " ".join(one.text.split()).partition(". ")[0] for one in helptext.fields(Circuit)}
     for name, (low, high, unit) in LIMITS.items():
         flag = "--pf" if name == "line_pf" else _flag(name)
-        words = f"{WORDS[name]} (default: {getattr(usual, name):g})."
+        words = f"{meanings.get(name, '').rstrip('.')} (default: {getattr(usual, name):g})."
         kind = numbers.number(low, high, unit)
         values.add_argument(flag, dest=name, type=kind, metavar=unit.upper(), help=words)
     diode = parser.add_argument_group("diode, as SPICE describes it (default: schottky)")
     diode.add_argument("--diode", choices=tuple(DIODES), help="Kind; it gives the values below that you leave out.")
-    for name, (low, high) in DIODE_LIMITS.items():
-        kind, words = numbers.number(low, high), f"{DIODE_WORDS[name]} (schottky: {getattr(usual.diode, name):g})."
-        diode.add_argument(_flag(f"diode_{name}"), type=kind, metavar=DIODE_WORDS[name], help=words)
+    for one in dataclasses.fields(Diode):
+        kind, spice = numbers.number(*one.metadata["limits"]), one.metadata["spice"]
+        words = f"{spice} (schottky: {getattr(usual.diode, one.name):g})."
+        diode.add_argument(_flag(f"diode_{one.name}"), type=kind, metavar=spice, help=words)
     factor = f"Recommended times are this many times those computed (default: {MARGIN:g})."
     parser.add_argument("--margin", type=numbers.number(1, 10), default=MARGIN, metavar="FACTOR", help=factor)
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
@@ -101,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _changed(given: Circuit, args: argparse.Namespace) -> Circuit:
     diode = DIODES[args.diode] if args.diode else given.diode
-    fields = {name: getattr(args, f"diode_{name}") for name in DIODE_LIMITS}
+    fields = {one.name: getattr(args, f"diode_{one.name}") for one in dataclasses.fields(Diode)}
     changes: dict[str, Any] = {name: getattr(args, name) for name in LIMITS}
     changes["diode"] = Diode(**(dataclasses.asdict(diode) | _said(fields)))
     return given.replace(**_said(changes))

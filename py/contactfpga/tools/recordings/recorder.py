@@ -15,6 +15,7 @@ from contactfpga.driver.mcap import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.robot.ros.cdr import encode
 from contactfpga.robot.ros.convert import header
+from contactfpga.robot.ros.feed import offset_ns
 from contactfpga.robot.ros.types import PACKAGE
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Cutter, Hello
@@ -212,7 +213,7 @@ def link_name(hello: Hello) -> str:
 
 def _epoch_ns(board: Board) -> int:
     """Offset of the board's clock from 1970."""
-    return time.time_ns() - round(board.clock() * 1e9)
+    return offset_ns(time.time_ns, board.clock)
 
 
 def of_bytes(data: bytes, time_ns: int, frame: str) -> bytes:

@@ -85,6 +85,7 @@ def rivals_table() -> str:
     """Each rival at two pitches of tiles, for several fingers."""
     head = (
         "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
+        "assumes",
     )  # fmt: skip
     rows = list(itertools.product(RIVALS, RIVAL_PITCHES_MM))
     with pool.executor() as executor:
@@ -107,22 +108,9 @@ def rival_line(name: str, pitch_mm: float, count: int = TOUCHES) -> str:
         (
             name, f"{pitch_mm:g} mm", _share(means["miscounted"]), _share(means["missed"]),
             _length(means["barycenter_mm"]), f"{median:.1f} / {late:.1f} ms", str(rival.wires(skin)),
-            f"{rival.cost_usd(skin):.0f} USD",
+            f"{rival.cost_usd(skin):.0f} USD", rival.note.removeprefix("model: "),
         )
     )  # fmt: skip
-
-
-def rivals_notes() -> str:
-    """Assumptions of each model."""
-    notes: dict[str, list[str]] = {}
-    for name, rival in RIVALS.items():
-        notes.setdefault(rival.note, []).append(name)
-    return "\n".join(f"- {', '.join(names)}: {note}." for note, names in notes.items())
-
-
-def rivals_section() -> str:
-    """Table and assumptions."""
-    return f"{rivals_table()}\n\n{rivals_notes()}"
 
 
 def _share(one: Interval) -> str:

@@ -31,18 +31,3 @@ def section(arguments: str) -> str:
 def fingers_section() -> str:
     """Fingertips, with all covers and closing forces."""
     return section("examples/scenes-fingers.toml")
-
-
-def bumper_section() -> str:
-    """A robot's bumper."""
-    return section("examples/scenes-bumper.toml --cover bare --barycenter-mm 3 --latency-us 500")
-
-
-def hands_section() -> str:
-    """Hands."""
-    return section("examples/scenes-hands.toml --cover bare --barycenter-mm 3 --latency-us 500")
-
-
-def sole_section() -> str:
-    """A shoe's sole."""
-    return section("examples/scenes-sole.toml --cover bare --barycenter-mm 3 --latency-us 500")

@@ -17,7 +17,6 @@ from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.adaptive import AdaptiveScanModel
 from contactfpga_sim.model.golden.facts import facts
-from contactfpga_sim.model.scenes.families import FAMILIES, placements
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS
 
@@ -229,9 +228,6 @@ FAST_SKINS = {
 TOUCHES = 196
 """Places of a contact, spread over the sheet; on 16x16 every place of 3x3 cells."""
 
-SCENES = 400
-"""Scenes of each family."""
-
 
 def latency_table() -> str:
     """Latency of the reversal scan, and of a raster scan of the reference sheet."""
@@ -271,33 +267,6 @@ def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
     return f"{bound:.1f} us, + {100 * (found.touch_to_last_byte_us.worst / bound - 1):.0f} %"
 
 
-def sides_table() -> str:
-    """Slots per frame of the built-in families, by rows only and by the side with fewer touched lines."""
-    head = ("scenes", "touched rows, mean / most", "slots by rows", "slots by the shorter side", "saved")
-    return writer.table(head, [sides_row(name) for name in FAMILIES])
-
-
-def sides_row(name: str) -> str:
-    """One line of :func:`sides_table`, on 16x16: a projection and a slot per row, or, if less, two projections and a
-    slot per row or per column, whichever are fewer."""
-    frames = np.stack([scene.pressed(0.0, Skin()) for scene in placements(name, SCENES, 0, Skin())])
-    rows, columns = frames.any(axis=2).sum(axis=1), frames.any(axis=1).sum(axis=1)
-    one = 1 + rows
-    both = np.minimum(one, 2 + np.minimum(rows, columns))
-    saved = 1 - both.mean() / one.mean()
-    counts = (
-        f"{rows.mean():.1f} / {rows.max()}",
-        f"{one.mean():.1f} / {one.max()}",
-        f"{both.mean():.1f} / {both.max()}",
-    )
-    return writer.line((name, *counts, f"{100 * saved:.0f} %"))
-
-
 def latency_sample() -> str:
     """The first row of :func:`latency_table`."""
     return latency_row("16x16", *FAST_SKINS["16x16"])
-
-
-def sides_sample() -> str:
-    """The first row of :func:`sides_table`."""
-    return sides_row(next(iter(FAMILIES)))

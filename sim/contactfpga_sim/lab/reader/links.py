@@ -38,6 +38,8 @@ def measured(reader: str, links: int, call: str) -> Share:
             opened.callback(board.close)
         queues = [board.subscribe(int(PACE.per_second * PACE.seconds)) for board in boards]
         feeder.begin()
+        while not feeder.written_s[0]:  # the frames are made first
+            time.sleep(0.01)
         time.sleep(0.2)
         before = [board.stats.frames for board in boards]
         used, begun = time.process_time(), time.monotonic()

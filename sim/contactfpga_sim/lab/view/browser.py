@@ -67,7 +67,7 @@ class Visitor:
 
     def __init__(self, page: Any, shown: ServedView):
         self.page, self._shown = page, shown
-        page.goto(shown.url)
+        page.goto(shown.url, timeout=1e3 * PATIENCE_S)
         until = time.monotonic() + PATIENCE_S
         while not shown.web.get_clients():
             if time.monotonic() > until:
@@ -153,7 +153,7 @@ def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = 
     if path is None:
         raise MissingTool("a picture of the view", NAMES[0], "sudo apt install chromium")
     with running(shown), sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(SOFTWARE))
+        browser = playwright.chromium.launch(executable_path=path, args=list(SOFTWARE), timeout=1e3 * PATIENCE_S)
         try:
             scheme: Any = "dark" if dark else "light"
             page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
+import select
 import threading
 import tty
 from collections.abc import Callable
@@ -12,6 +12,8 @@ import numpy as np
 
 ROWS, COLUMNS = 16, 32
 MARK = b"\xaa\x55"
+LOOK_S = 0.05
+"""How often it looks whether it has to end, while nobody reads."""
 
 
 class FlexitacSheet:
@@ -63,6 +65,8 @@ class FlexitacSheet:
 
     def _run(self) -> None:
         while not self._stopping.wait(1 / self._hz):
-            with contextlib.suppress(BlockingIOError):  # nobody reads
-                os.write(self._master, self.frame(self.seconds))
-                self.seconds += 1 / self._hz
+            data = self.frame(self.seconds)
+            while data and not self._stopping.is_set():  # as long as nobody reads
+                if select.select([], [self._master], [], LOOK_S)[1]:
+                    data = data[os.write(self._master, data) :]
+            self.seconds += 1 / self._hz
