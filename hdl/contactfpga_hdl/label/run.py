@@ -26,8 +26,8 @@ class RunLabeller(wiring.Component):
     """Rows in, zone records out; work follows the runs of pressed cells.
 
     A row with n steps needs n + 2 clocks, two empty rows one; a zone leaves three clocks after the last step with one
-    of its cells (docs/timing.md). With C columns a row needs at most ceil(C/2) steps with 8-connectivity and C with 4. Each step
-    passes walk, join and sum in three clocks.
+    of its cells (docs/timing.md). With C columns a row needs at most ceil(C/2) steps with 8-connectivity and C with 4.
+    Each step passes walk, join and sum in three clocks.
 
     rows (in): a frame's rows in ascending order.
     records (out): its zones, then an end mark.

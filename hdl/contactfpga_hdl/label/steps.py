@@ -185,7 +185,7 @@ class Walk(wiring.Component):
         start = _index((left.edges & ~left.edges_stop)[:-1], len(step.start))
         past = _index(left.edges_stop & ~left.edges_later, len(step.past))
         m.d.comb += [
-            closes.eq(~(left.befores_later & inside).any() & ~(left.edges_later & inside).any()),
+            closes.eq(~((left.befores_later | left.edges_later) & inside).any()),
             step.end.eq(~left.work),
             step.has_before.eq(has_before),
             step.before.eq(_index(left.befores & ~left.befores_later, len(step.before))),
