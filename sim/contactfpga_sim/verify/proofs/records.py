@@ -55,8 +55,8 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
     ends_now = seen_ends + (dut.records.valid & record.end)
     steps = ((columns + 1) // 2 if connectivity == 8 else columns) + closed
-    age = Signal(range(steps + 2), init=steps + 1)
-    done = age == steps + 1
+    age = Signal(range(steps + 3), init=steps + 2)
+    done = age == steps + 2
     with m.If(taken):
         m.d.sync += [*open_row.copy(after, when=~taken_last), expected.eq(ended_zones), expected_end.eq(taken_last)]
         m.d.sync += [seen.eq(0), seen_ends.eq(0), age.eq(0)]
@@ -65,7 +65,7 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     newest = Signal(columns)  # the row last handed over, empty before a frame
     with m.If(handed):
         m.d.sync += newest.eq(Mux(last, 0, cells))
-    proof.lemma((inside["walk.before"] == newest) & (inside["walk.y_next"] == y_next) & (age <= steps + 1))
+    proof.lemma((inside["walk.before"] == newest) & (inside["walk.y_next"] == y_next) & (age <= steps + 2))
     with m.If(taken | done):
         proof.claim(seen_now == expected)
         proof.claim(ends_now == expected_end)
