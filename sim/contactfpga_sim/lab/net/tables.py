@@ -124,7 +124,7 @@ def draw(folder: Path) -> Path:
             axes.set(xscale="log", yscale="log", xlabel="links of 1 kHz, batches of 10 ms", ylabel=label)
             axes.set_xticks(links, map(str, links))
             axes.set_yticks(ticks, map("{:,g}".format, ticks))
-            axes.set(xlim=(links[0] / 1.3, links[-1] * 1.3), ylim=(0.1, 2 * ticks[-1]))
+            axes.set(xlim=(links[0] / 1.3, links[-1] * 1.3), ylim=(0.1, 3 * ticks[-1]))
             axes.minorticks_off()
             axes.grid(True)
             axes.legend(handlelength=3)
