@@ -1,6 +1,6 @@
-/* clockfit.h: the fit of a board's clock to the host's, for reader.c. It does what contactfpga.driver.clock.ClockFit in
- * Python does, with the same roundings: the same order of operations, and no contracted products (compile it with
- * -ffp-contract=off). What the names mean is said there.
+/* clockfit.h: the fit of a board's clock to the host's, for reader.c. It computes what contactfpga.driver.clock.ClockFit
+ * computes in Python, which explains the names. Both round alike, as operations have the same order and no product is
+ * contracted (-ffp-contract=off).
  */
 #ifndef CONTACTFPGA_CLOCKFIT_H
 #define CONTACTFPGA_CLOCKFIT_H

@@ -79,7 +79,7 @@ typedef struct {
     uint64_t packets; /* this frame's number, from 1 */
     int64_t time_us, before; /* before: whether the one before it follows */
     double at_s;             /* when it came */
-    host_line line;             /* of the read that brought it */
+    host_line line;          /* of the read that brought it */
 } newest;
 
 typedef struct {
@@ -108,7 +108,7 @@ typedef struct {
     bool clean;      /* all packets since the base continue; what follows is of the last one */
     int64_t time_us;
     double at_s;
-    host_line line;     /* of its read */
+    host_line line;  /* of its read */
     fit fit;         /* after it */
     uint8_t *bytes;
     packet *packets;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 
@@ -146,7 +145,7 @@ def blurred(sigma_s):
     """Newest frames at 10 s on the body's clock, known to within ``sigma_s``."""
     states = {"arm": state_of(ROUND, 0, 0, 10.0), "chest": state_of(FLAT, 0, 0, 10.0)}
     for state in states.values():
-        state.zones._line = dataclasses.replace(state.zones._line, sigma_s=sigma_s)
+        state.zones._line = state.zones._line._replace(sigma_s=sigma_s)
     return states
 
 

@@ -50,7 +50,7 @@ def waiting(board):
 
 
 def frames_of(board, sheet, touch, count):
-    """The frame before a touch, and all from then on, at least so many. Their times are those of the test's clock."""
+    """The last frame before a touch and the frames after it, at least ``count``, with times of the test's clock."""
     board.next(LONG)
     _, earliest = waiting(board)
     frames = [board.next(LONG)]

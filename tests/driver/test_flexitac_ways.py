@@ -60,8 +60,8 @@ def of_json(text):
 
 
 def for_seconds(run, sheet, *words, recorded=None):
-    """What a command says that takes so many seconds, and may record into a file; more seconds where the machine lets
-    the sheet wait meanwhile."""
+    """Output of a command that runs for some seconds and may record into a file; it runs for longer where the machine
+    lets the sheet wait."""
 
     def said(seconds):
         sheet.begin()
@@ -112,7 +112,7 @@ def test_recorded_as_mcap_and_exported(address, sheet, run, tmp_path):
 
 
 def zones_of(board, count):
-    """Its frames until so many are touched, as :func:`usual` takes them."""
+    """Frames of the board until ``count`` of them are touched, as :func:`usual` takes them."""
     found = []
     while sum(map(bool, found)) < count:
         found.append([(zone.x_mm, zone.y_mm, zone.area_cells) for zone in board.next(60.0)])

@@ -311,7 +311,7 @@ def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
     packets = 20 * (99 * b"\x55" + b"\0")
 
     def fill(least):
-        """Bytes that go in, at least so many, until none has for a while."""
+        """Number of bytes that the port takes, at least ``least``, until it takes none for a while."""
         total, begun = 0, time.monotonic()
         until = begun + 1.0
         while time.monotonic() < until or (total < least and time.monotonic() < begun + LONG):

@@ -145,15 +145,15 @@ def test_a_link_that_the_model_lacks_is_refused_by_name(tmp_path):
 
 
 def test_the_wrapper_of_the_example_feels(tmp_path):
-    names = runpy.run_path(str(Path(__file__).parents[2] / "examples/arm/felt.py"))
+    names = runpy.run_path(str(Path(__file__).parents[2] / "examples/arm/tactile_environment.py"))
     toml = robot(tmp_path)
     model, data = pressed(toml, [("link", 40.0, 70.0, 3.0)])
-    felt = names["Felt"](model, data, toml, "link")
+    environment = names["TactileEnvironment"](model, data, toml, "link")
     for _ in range(2):
-        assert not felt.reset()[-12:].any()
+        assert not environment.reset()[-12:].any()
         for _ in range(100):
-            seen = felt.step([3.0])
+            seen = environment.step([3.0])
         assert seen[-12:-10] == pytest.approx([40.0, 70.0], abs=2)
         for _ in range(100):
-            felt.step([-1.0])
-    felt.sheets.close()
+            environment.step([-1.0])
+    environment.sheets.close()

@@ -6,7 +6,7 @@ import time
 import pytest
 from fake_board import wait_until
 from net_processes import Relay, free_endpoint
-from small_port import Awake, SmallPort, published
+from small_port import AwakeClock, SmallPort, published
 
 import contactfpga
 from contactfpga.robot.net import port as net_port
@@ -35,7 +35,7 @@ class FirstKept(net_port.ZenohPort):
 def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoint):
     monkeypatch.setattr(net_port, "ZenohPort", FirstKept)
     with (
-        Awake() as awake,
+        AwakeClock() as awake,
         session.listening(f"{endpoint}#so_sndbuf=4096") as network,
         Relay(endpoint, BYTES_S) as relay,
         published(source := SmallPort(now=awake.seconds), network, "slow", block=block) as publisher,
@@ -64,7 +64,7 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoi
 
 def test_a_port_does_not_run_over_while_bytes_are_collected():
     """For 0.6 s, in which three times as many come as the port holds. While this process has to wait, none comes."""
-    with Awake() as awake, session.listening(free_endpoint()) as network:
+    with AwakeClock() as awake, session.listening(free_endpoint()) as network:
         source = SmallPort(now=awake.seconds)
         with published(source, network, "slow", batch_s=0.6) as publisher:
             source.port_bytes = 1024

@@ -26,7 +26,7 @@ SKIN = contactfpga.Skin(name="left forearm")
 KEY = "contactfpga/left-forearm"
 LONG = 60.0
 TRIES = 4
-"""On a busy machine one of so many takes no longer than it should."""
+"""Number of tries, of which one is quick enough even on a busy machine."""
 
 
 def first_message(network):

@@ -38,7 +38,7 @@ def port(endpoint, wait_s=None):
 
 
 def take(board, count, sent_us):
-    """So many frames, each of which the board sent, in order."""
+    """The next ``count`` frames are frames that the board sent, in order."""
     times = [board.next(LONG).time_us for _ in range(count)]
     assert set(times) <= sent_us
     assert times == sorted(set(times))

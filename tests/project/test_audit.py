@@ -128,8 +128,12 @@ def test_a_claim_without_tests_is_wrong(tests):
 def test_a_claim_that_does_not_end_in_time_neither_agrees_nor_differs(tests, tmp_path, before, said, wrong):
     """Unless a test failed before. What it started is ended, too."""
     started = f"subprocess.run(['sh', '-c', 'echo $$ > {tmp_path}/started; sleep 1000'])"
-    found = tests(before + LONG + started, seconds=12)
-    assert found == audit.Finding("it holds", f"{'1 FAILED; ' * wrong}not ended in 12 s{said}", wrong, ended=False)
+    for seconds in (12, 60, 240):  # a busy machine may not have begun with the test in time
+        found = tests(before + LONG + started, seconds=seconds)
+        if (tmp_path / "started").exists():
+            break
+    text = f"{'1 FAILED; ' * wrong}not ended in {seconds} s{said}"
+    assert found == audit.Finding("it holds", text, wrong, ended=False)
     assert not alive(int((tmp_path / "started").read_text()))
 
 

@@ -10,7 +10,7 @@ import contactfpga
 from contactfpga.robot.net.publisher import BoardPublisher
 
 
-class Awake:
+class AwakeClock:
     """Counts the seconds in which this process gets the processor: a thread that sleeps shortly, and then longer than
     it should, had to wait. A context manager."""
 

@@ -119,8 +119,8 @@ class Timeline:
 
     @property
     def last(self) -> tuple[int, Frame, float] | None:
-        """Of the last frame its time since power-up in us, itself, and when it came; None where a frame cannot continue
-        it."""
+        """Time of the last frame in us since power-up, the frame, and its arrival in s on the host's clock; None if no
+        frame can continue it."""
         if self.before is None or self._time_us is None or not self._known:
             return None
         return self._time_us, self.before, self._now

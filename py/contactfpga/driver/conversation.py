@@ -50,23 +50,23 @@ class Steady(NamedTuple):
     """What frames mean as long as each continues the last one: then they change nothing but counters and clocks."""
 
     time_us: int
-    """Of the last frame, since power-up."""
+    """Time of the last frame in us since power-up."""
     before: Frame
     """The last frame."""
     came_s: float
-    """When it came."""
+    """Arrival of the last frame, in s on the host's clock."""
     fit: ClockFit
-    """Of the clocks, after it."""
+    """Fit of the clocks after the last frame."""
     byte_s: float
-    """What a byte takes on the wire."""
+    """Time of a byte on the wire, in s."""
     sheet: Sheet
     faults: tuple[str, ...]
-    """Of flagged frames."""
+    """Names of the faults that a flagged frame has."""
     history: UnitHistory | None
 
     def zones(self, frame: Frame, time_us: int, before: Frame, line: HostLine) -> Zones:
-        """Of a frame that continues the last one, perhaps with others between, which is not counted; ``before``: the
-        one before it."""
+        """Zones of a frame that continues the last one, perhaps with others between; no counter changes. ``before`` is
+        the frame before it."""
         return Zones(frame, self.sheet, time_us, before, line, self.faults, self.history)
 
 

@@ -72,7 +72,7 @@ class Link:
     """
 
     fit: type[ClockFit] = ClockFit
-    """Of its clocks."""
+    """Fit of the board's clock to the host's."""
 
     def __init__(self, transport: Transport, skin: Skin | None):
         self.transport = transport

@@ -71,15 +71,15 @@ class Newest(NamedTuple):
     """The newest frame."""
 
     packets: int
-    """Its number, from 1: that of its packet since the port was opened."""
+    """Number of the frame's packet since the port was opened, from 1."""
     time_us: int
-    """Since power-up."""
+    """Time of the frame in us since power-up."""
     after_another: bool
     """Whether the frame before it came after :meth:`Port.settle`: :meth:`Port.before` gives it."""
     line: HostLine
-    """When it came, and its time on the host's clock."""
+    """Map from the board's clock to the host's, with the frame's arrival."""
     frame: Frame
-    """As it came over the wire."""
+    """The frame as it came over the wire."""
 
 
 class Library:
@@ -145,7 +145,8 @@ def refusal(port: object) -> str:
 
 
 class NativeFit(ClockFit):
-    """The same in C, which the thread goes on with by itself: see :meth:`Port.settle`."""
+    """A :class:`~contactfpga.driver.clock.ClockFit` in C; the thread that reads goes on with it, see
+    :meth:`Port.settle`."""
 
     def __init__(self) -> None:
         self._library = library()

@@ -56,12 +56,12 @@ class NativePort:
         return self._inner.lost(OSError(failure, os.strerror(failure) if failure > 0 else "it ended"))
 
 
-class _Settled(NamedTuple):
-    """What was known when the conversation had taken all that came."""
+class _Base(NamedTuple):
+    """State of the conversation when it had taken all that came; newer frames are shown on top of it."""
 
     steady: Steady
     packets: int
-    """That were taken."""
+    """Number of packets that the conversation had taken."""
     more_frames: int
     """Number of the last frame less that of its packet, and the same for all frames that continue it."""
 
@@ -79,7 +79,7 @@ class NativeLink(Link):
         self._record = transport.take if isinstance(transport, RecordingTransport) else None
         self._taking = False
         self._showing = threading.Lock()  # held for short only: for what follows, and the core's newest frame
-        self._settled: _Settled | None = None
+        self._base: _Base | None = None
         self._shown: tuple[int, Frame | None] = 0, None  # packet and frame of what was shown last
         super().__init__(transport, skin)
 
@@ -200,11 +200,11 @@ class NativeLink(Link):
     def _show(self, queue: FrameQueue) -> Zones | int | None:
         core = self._core
         with self._showing:
-            if (settled := self._settled) is None:
+            if (base := self._base) is None:
                 raise Unsettled
             if queue.others:
                 return None
-            steady, packets, more_frames = settled
+            steady, packets, more_frames = base
             seen = max(packets, queue.seen - more_frames)
             if (found := core.newest(seen)) is None:
                 return None if queue else seen
@@ -224,7 +224,7 @@ class NativeLink(Link):
                 steady = self._said.steady()
                 self._core.settle(steady)
                 packets = self._core.taken
-                self._settled = None if steady is None else _Settled(steady, packets, self._frames - packets)
+                self._base = None if steady is None else _Base(steady, packets, self._frames - packets)
 
     # ---- the thread that takes what came while nobody calls, and its end
 

@@ -318,7 +318,7 @@ _ALL = (
         sections={
             "batch": Section("tables:batch_table", heads="^(?!messages|ratio)"),
             "links": Section("tables:links_table", kept=r"^\| (1|16|64) ", heads="links|of those|latency"),
-            "thousand": Section("tables:thousand_table", kept=NO_ROW),
+            "thousand": Section("tables:thousand_table"),
         },
         pictures="tables:draw",
         extra="test",

@@ -118,13 +118,13 @@ def draw(folder: Path) -> Path:
             bare = [value / _pair(row[8])[place] for value, row in zip(values, rows, strict=True)]
             _line(latency, links, bare, f"{name[-4:-1]} of a bare pair", color, ls=style.DASHES[1])
         for axes, label, ticks in (
-            (cpu, "processor time of each link,\n% of a core", (0.3, 1, 3, 10, 30)),
-            (latency, "latency, ms", (0.3, 1, 3, 10, 30, 100, 300, 1000)),
+            (cpu, "processor time of each link,\n% of a core", (0.1, 0.3, 1, 3, 10, 30)),
+            (latency, "latency, ms", (0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000)),
         ):
             axes.set(xscale="log", yscale="log", xlabel="links of 1 kHz, batches of 10 ms", ylabel=label)
             axes.set_xticks(links, map(str, links))
             axes.set_yticks(ticks, map("{:,g}".format, ticks))
-            axes.set(xlim=(links[0] / 1.3, links[-1] * 1.3), ylim=(0.2, 1.5 * ticks[-1]))
+            axes.set(xlim=(links[0] / 1.3, links[-1] * 1.3), ylim=(0.1, 3 * ticks[-1]))
             axes.minorticks_off()
             axes.grid(True)
             axes.legend(handlelength=3)

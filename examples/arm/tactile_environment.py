@@ -5,7 +5,7 @@ import numpy as np
 from contactfpga.mujoco import Sheets
 
 
-class Felt:
+class TactileEnvironment:
     """An environment whose observation ends with the places and sizes of at most four zones."""
 
     def __init__(self, model, data, robot="robot.toml", link="arm"):
@@ -23,7 +23,7 @@ class Felt:
 
     def observation(self):
         zones = self.sheets.snapshot().links[self.link].zones or ()
-        felt = np.zeros((4, 3))
-        for row, zone in zip(felt, zones):
+        rows = np.zeros((4, 3))
+        for row, zone in zip(rows, zones):
             row[:] = zone.x_mm, zone.y_mm, zone.area_cells
-        return np.concatenate([self.data.qpos, self.data.qvel, felt.ravel()])
+        return np.concatenate([self.data.qpos, self.data.qvel, rows.ravel()])
