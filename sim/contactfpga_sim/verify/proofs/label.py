@@ -198,6 +198,7 @@ _OVERFLOW_BUGS = (
     Bug("brackets forgotten", Brackets, "old_later",
         lambda brackets, inside: Mux(inside["late.row_done"], 0, brackets)),
     Bug("never pushed", Join, "push", lambda *_: 0),
+    Bug("the group that waits is looked up among the zones", Join, "lookup", lambda place, _: place[:-1]),
     Bug("always in the first place", Join, "decided.place", lambda *_: 0),
     Bug("the last row is a row like others", Walk, "last", lambda *_: 0),
     Bug("a zone stays open", Walk, "before",
