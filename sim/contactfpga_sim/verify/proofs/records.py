@@ -189,7 +189,7 @@ CASES = (
     _case(1, 4, 6),
     _case(2, 8, 7),
     _case(2, 4, 7),
-    _case(3, 8, 7, bugs=_BUGS, bug_clocks=16),
+    _case(3, 8, 7, bugs=_BUGS, bug_clocks=14),
     _case(3, 4, 8, campaign=True),
     _case(4, 8, 7, campaign=True),
     _case(4, 4, 9, campaign=True),
