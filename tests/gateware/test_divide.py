@@ -5,7 +5,7 @@ import math
 from fractions import Fraction
 
 import pytest
-from amaranth.hdl import Cat, Module
+from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from sample import sample
@@ -21,18 +21,25 @@ def skin_of(rows, columns, bits, **options):
 
 
 class Waiting(wiring.Component):
-    """The divider with its backlog, as the top joins them."""
+    """The divider with its backlog, as the top joins them. As of frames, no more wait than the backlog has room for."""
 
     def __init__(self, skin):
-        self.backlog, self.divider = Backlog(skin), Divider(skin)
+        self.room, self.backlog, self.divider = skin.derived.backlog, Backlog(skin), Divider(skin)
         passed, items = self.backlog.passed.signature.flip(), self.divider.items.signature
         super().__init__({"records": In(passed), "items": Out(items)})
 
     def elaborate(self, platform):
         m = Module()
         m.submodules += [self.backlog, self.divider]
-        wiring.connect(m, wiring.flipped(self.records), self.backlog.passed)
-        wiring.connect(m, self.backlog.waiting, self.divider.records)
+        passed, waiting = self.backlog.passed, self.backlog.waiting
+        wait = Signal(range(self.room + 1))
+        m.d.sync += wait.eq(wait + (passed.valid & passed.ready) - (waiting.valid & waiting.ready))
+        m.d.comb += [
+            passed.payload.eq(self.records.payload),
+            passed.valid.eq(self.records.valid & (wait != self.room)),
+            self.records.ready.eq(passed.ready & (wait != self.room)),
+        ]
+        wiring.connect(m, waiting, self.divider.records)
         wiring.connect(m, self.divider.items, wiring.flipped(self.items))
         return m
 

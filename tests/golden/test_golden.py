@@ -59,10 +59,10 @@ def test_rows_records_and_contact_of_the_reference_skin_by_hand():
     # row slot k: sampled at the pins in 72 k + 59, strobe 72 k + 61, handed over at 72 k + 62
     assert trace.rows[:2] == [(62, 1, False), (134, 0, False)]
     assert trace.rows[15] == (62 + 15 * 72, 8, True)
-    # a cell of row 0 is one cluster of row 1's strip: h + 1 + 2; one of the last row goes with it: h + 1 + 2
+    # a cell of row 0 is one cluster of row 1's strip: h + 1 + 3; one of the last row goes with it: h + 1 + 3
     one = 1 | 0 << 9 | 0 << 9 + 11
     other = 1 | 3 << 9 | 15 << 9 + 11
-    assert trace.records[:3] == [(137, one, False), (1145, other, False), (1146, 0, True)]
+    assert trace.records[:3] == [(138, one, False), (1146, other, False), (1147, 0, True)]
     # no step in an empty frame: end mark at h + 3
     assert trace.records[3:] == [(SCAN + 1145, 0, True)]
     assert trace.contact == [(62, 1), (SCAN + 62 + 15 * 72, 0)]

@@ -6,7 +6,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.link.pack import Packer
+from contactfpga_hdl.link.pack import FULL_BLOCK, Packer
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -148,6 +148,7 @@ def _lemmas(proof: Proof, dut: Packer, inside: Inside, plain: _PlainBytes, frame
     _lemmas_on_reading(proof, dut, inside["index"], plain)
     open_length = inside["length"]  # of the block that is being filled
     proof.lemma((open_length != 0) & (open_length <= frame.length))
+    proof.lemma(inside["full"] == (open_length == FULL_BLOCK))
     proof.lemma(inside["place"] == frame.length)
     proof.lemma(inside["code"] == frame.length - open_length)
     proof.lemma(frame.last_zero == frame.length - open_length)
