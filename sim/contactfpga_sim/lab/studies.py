@@ -85,7 +85,11 @@ _ALL = (
             ),
             "host": Section("tables:host_table", kept=r"\| (10|29|92) \|", heads="^(?!labelled|faster)"),
             "floor": Section("limits:floor_table", kept=NO_ROW),
-            "other_ways": Section("limits:rivals_table", kept="6.4 mm", heads="^(?!pitch|missed|lines|assumes)"),
+            "other_ways": Section(
+                "limits:rivals_table",
+                kept=r"^\| (analog array, 1 kHz|micro.*UART|OpenCV).* 6.4 mm ",
+                heads="^(?!pitch|missed|lines|assumes)",
+            ),
         },
         compute="tables:compute",
         pictures="tables:draw",
