@@ -203,7 +203,9 @@ _ALL = (
         minutes=30,
         sections={
             "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table", kept=r"^\| `(run|serial)(, dual)?` .*of registers", heads="^(?!bits|flips)"),
+            "flipped": Section(
+                "tables:designs_table", kept=r"^\| `(run|serial)(, dual)?` .*of registers", heads="^(?!bits|flips)"
+            ),
             "modules": Section("tables:modules_table", kept=NO_ROW),
             "ways": Section("tables:ways_table", kept=NO_ROW),
         },
