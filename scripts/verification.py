@@ -22,17 +22,16 @@ CLAIMS = ROOT / "docs" / "tables" / "verification.csv"
 
 HEAD = """# Verification
 
-For people who doubt this project or change it: where each claim has its tests, and what has none. You do not need it to
-use a sheet. [Status](status.md) says what was compared with what, and whether to trust a figure.
+Where each claim has its tests, and what has none. [Status](status.md) says what was compared with what, and whether to
+trust a figure.
 
 ## How to check a claim
 
 - `make audit SEED=7` draws ten claims, ten tables of the pages and ten faults in the gateware by your number, checks
-  each in some minutes and writes one page.
+  each in some minutes and writes one page. It fails if one differs, and lists what did not end in its time.
 - `make test` runs the quick tests, in minutes. `make test-all` runs tests of all claims. `make campaign` runs more
   cases of some of them, in hours.
-- To check one claim, look up its tests in the list. `test_scan::*` is every test of `test_scan.py`, which is in a
-  folder of `tests`:
+- For one claim, look up its tests in the list. `test_scan::*` is every test of `test_scan.py`:
 
       python -m pytest tests/gateware/test_scan.py
 

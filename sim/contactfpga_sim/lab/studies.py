@@ -85,7 +85,11 @@ _ALL = (
             ),
             "host": Section("tables:host_table", kept=r"\| (10|29|92) \|", heads="^(?!labelled|faster)"),
             "floor": Section("limits:floor_table", kept=NO_ROW),
-            "other_ways": Section("limits:rivals_table", kept="6.4 mm", heads="^(?!pitch|missed|lines|assumes)"),
+            "other_ways": Section(
+                "limits:rivals_table",
+                kept=r"^\| (analog array, 1 kHz|micro.*UART|OpenCV).* 6.4 mm ",
+                heads="^(?!pitch|missed|lines|assumes)",
+            ),
         },
         compute="tables:compute",
         pictures="tables:draw",
@@ -175,7 +179,7 @@ _ALL = (
             ),
             "closed": Section("tables:closed", kept=NO_ROW),
             "unnoticed": Section(
-                "tables:unnoticed", kept=r"^\| \[.*#(closing|light|diodes|broken|stuck|silence)\)", heads="knob|why"
+                "tables:unnoticed", kept=r"^\| \[.*#(diodes|broken|stuck|silence)\)", heads="knob|why"
             ),
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
@@ -199,7 +203,9 @@ _ALL = (
         minutes=30,
         sections={
             "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table", kept="of registers", heads="^(?!bits|flips)"),
+            "flipped": Section(
+                "tables:designs_table", kept=r"^\| `(run|serial)(, dual)?` .*of registers", heads="^(?!bits|flips)"
+            ),
             "modules": Section("tables:modules_table", kept=NO_ROW),
             "ways": Section("tables:ways_table", kept=NO_ROW),
         },
@@ -446,7 +452,7 @@ _ALL = (
             "gateware": Section("tables:gateware_table", of_netlists=True, kept="whole", heads="^(?!8x8)"),
             "faults": Section("tables:faults_table", kept="none|guard|self_test|fast", of_netlists=True),
             "units_size": Section("tables:units_table", kept=r"^\| (1|6) ", page="units.md", of_netlists=True),
-            "boards": Section("tables:boards_table", page="boards.md"),
+            "boards": Section("tables:boards_table", page="boards.md", heads="^(?!flip|logic)"),
         },
         extra="boards",
     ),
@@ -506,7 +512,7 @@ _ALL = (
             "units": Section(
                 "tables:units_table",
                 kept=r"\| 6 \|",
-                heads="converter|supply|sweep|packet|Mbaud",
+                heads="converter|supply|sweep$|packet|Mbaud",
                 sample="tables:units_table",
             ),
         },
