@@ -60,12 +60,12 @@ class Finding:
     """False: time was too short to say."""
 
 
-def claims(rng: random.Random, run_before: Path | None) -> list[Finding]:
-    """Claims, by their tests, or by the results of a run of all tests."""
+def claims(rng: random.Random, runs_before: Sequence[Path]) -> list[Finding]:
+    """Claims, by their tests, or by the results of runs that together had all tests."""
     sections = tomllib.loads((ROOT / "tests" / "claims.toml").read_text())["section"]
     drawn = rng.sample([one for section in sections for one in section["claim"]], DRAWN)
-    if run_before is not None:
-        results = verification.read_results(run_before)
+    if runs_before:
+        results = verification.read_results(runs_before)
         return [judged(one, results) for one in drawn]
     cores, until = os.cpu_count() or 1, time.monotonic() + CLAIMS_S
     with ThreadPoolExecutor(cores) as pool:
@@ -86,7 +86,7 @@ def tried(claim: dict, limit_s: int) -> Finding:
         results, said = Path(folder) / "tests.xml", Path(folder) / "said.txt"
         options = ["-v", "-n", "0", "-p", "no:cacheprovider", "-m", "not campaign", "--junitxml", str(results)]
         if run([sys.executable, "-u", "-m", "pytest", *options, *nodes], said, limit_s):
-            return judged(claim, verification.read_results(results) if results.exists() else {})
+            return judged(claim, verification.read_results([results]) if results.exists() else {})
         ended = re.findall(r"^\S+::.* (PASSED|FAILED|ERROR)\b", said.read_text(), re.MULTILINE)
     passed = ended.count("PASSED")
     if failed := len(ended) - passed:
@@ -176,7 +176,8 @@ def page(seed: int, parts: dict[str, Sequence[Finding]], seconds: Sequence[float
 def main(arguments: Iterable[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="make audit", description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, required=True, help="any whole number; it decides what is drawn")
-    parser.add_argument("--results", type=Path, metavar="FILE", help="of pytest, to judge the claims by: runs no tests")
+    text = "of pytest, to judge the claims by: runs no tests"
+    parser.add_argument("--results", type=Path, nargs="+", default=(), metavar="FILE", help=text)
     given = parser.parse_args(arguments)
     seed, rng = given.seed, random.Random(given.seed)
     times = [time.monotonic()]

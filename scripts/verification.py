@@ -9,9 +9,11 @@ many cases it ran with ``record_property("cases", n)``; one that says nothing co
 import argparse
 import csv
 import io
+import itertools
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,10 +63,12 @@ class Outcome:
         return "passed" if self.passed else "MISSING"
 
 
-def read_results(path: Path) -> dict[str, Outcome]:
-    """Outcome of every test function, by `file::name`, all its parameters together."""
+def read_results(paths: Iterable[Path]) -> dict[str, Outcome]:
+    """Outcome of every test function in these runs, by `file::name`, all its parameters together. Of a test that was in
+    several runs the last one counts."""
+    cases = itertools.chain.from_iterable(ElementTree.parse(path).iter("testcase") for path in paths)
     results: dict[str, Outcome] = {}
-    for case in ElementTree.parse(path).iter("testcase"):
+    for case in {(case.get("classname"), case.get("name")): case for case in cases}.values():
         if "icarus" in case.get("name", ""):
             continue  # a second simulator where it is installed; the page must not depend on that
         file = case.get("classname", "").split(".")[-1]
@@ -131,7 +135,9 @@ def judge(claims: dict, results: dict[str, Outcome]) -> tuple[list[str], list[st
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--results", type=Path, metavar="FILE", help="judge the claims by these results of pytest")
+    parser.add_argument(
+        "--results", type=Path, nargs="+", metavar="FILE", help="judge the claims by these results of pytest"
+    )
     args = parser.parse_args()
     claims = tomllib.loads((ROOT / "tests" / "claims.toml").read_text())
     if not args.results:

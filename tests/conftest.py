@@ -8,6 +8,7 @@ import os
 import random
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from pathlib import Path
 
@@ -91,10 +92,20 @@ FIRST = (
     "test_label_volume",
     "test_label",
     "test_cosim",
+    "test_adaptive",
+    "test_planted",
     "test_barycenter",
     "test_replay",
-    "test_chart",
+    # A browser draws with all cores, so not all of these come in a row.
     "test_failures",
+    "test_view_hostile",
+    "test_chart",
+    "test_try_page",
+    "test_bringup",
+    "test_view_page",
+    "test_mujoco_arm",
+    "test_tracking_breaks",
+    "test_mutants",
     "test_terminal",
     "test_demo",
 )
@@ -112,6 +123,10 @@ STEP = 3
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "only the tests of what reads a sheet, and every third case of each"
     parser.addoption("--quick", action="store_true", help=text)
+    text = "every third case of each test, one at least; whole numbers that follow each other draw all of them"
+    parser.addoption("--third", type=int, metavar="NUMBER", help=text)
+    text = "leave out what passed in this run, whose results --junitxml wrote"
+    parser.addoption("--passed", type=Path, metavar="FILE", help=text)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -124,17 +139,39 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     ranks = {name: rank for rank, name in enumerate(FIRST)}
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
-    if config.getoption("quick"):
-        kept = _quick(items)
-        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
-        items[:] = [item for item in items if item in kept]
+    third = 0 if config.getoption("quick") else config.getoption("third")
+    kept = items if third is None else _third(items, third)
+    if config.getoption("passed"):
+        passed = _passed(config.getoption("passed"))
+        kept = [item for item in kept if _result(item.nodeid) not in passed]
+    if len(kept) < len(items):
+        left = set(kept)
+        config.hook.pytest_deselected(items=[item for item in items if item not in left])
+        items[:] = [item for item in items if item in left]
 
 
-def _quick(items: list[pytest.Item]) -> set[pytest.Item]:
+def _third(items: list[pytest.Item], number: int) -> list[pytest.Item]:
+    """Every third case of each test, and one of a test with fewer than three."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    return {item for found in cases.values() for item in found[::STEP]}
+    return [item for found in cases.values() for item in found[number % min(STEP, len(found)) :: STEP]]
+
+
+def _passed(results: Path) -> set[tuple[str, str]]:
+    """What passed in a run, as :func:`_result` names it."""
+    cases = ElementTree.parse(results).iter("testcase")
+    return {
+        (case.get("classname", ""), case.get("name", ""))
+        for case in cases
+        if not {"failure", "error", "skipped"} & {child.tag for child in case}
+    }
+
+
+def _result(nodeid: str) -> tuple[str, str]:
+    """Class and name of a test in the results of a run."""
+    file, _, name = nodeid.partition("::")
+    return file.removesuffix(".py").replace("/", "."), name
 
 
 def pytest_xdist_auto_num_workers() -> int:

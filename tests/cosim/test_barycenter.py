@@ -127,6 +127,7 @@ def test_the_compiled_board_is_the_golden_models_in_every_clock():
 CROWDED = [(4, 12, 4, 8), (9, 8, 8, 5), (2, 16, 8, 0)]
 
 
+@pytest.mark.slow  # test_top.py has one frame after the other at the shortest row time
 @pytest.mark.parametrize(
     ("rows", "columns", "connectivity", "bits", "debounce"),
     sample(

@@ -181,6 +181,7 @@ def test_text_that_is_not_there_once_cannot_be_replaced():
         planted.replaced("link/alive.py", "self", "")
 
 
+@pytest.mark.slow
 def test_a_copy_is_what_is_tested():
     """Of a test that needs no gateware but for its import."""
     test = [f"{GATEWARE}/test_safe_pins.py::test_alive_turns_where_all_was_well_since_the_last_tick"]

@@ -19,6 +19,8 @@ import contactfpga
 import hatch_build
 from contactfpga import Skin
 
+pytestmark = pytest.mark.slow  # packages are built and installed; test_packaging.py looks at what they are made of
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"contactfpga": "py", "contactfpga_hdl": "hdl", "contactfpga_sim": "sim"}
 HOST_NEEDS = {"numpy", "serialx"}
@@ -179,7 +181,6 @@ def in_python(host, program, *arguments):
     return run(host / "python", "-I", "-c", program, *arguments, cwd=host).stdout.split()
 
 
-@pytest.mark.slow
 def test_the_host_alone_says_one_version(host):
     asked = [[host / "contactfpga"], [host / "python", "-m", "contactfpga"]]
     said = {run(*command, "--version", cwd=host).stdout.strip() for command in asked}
@@ -225,7 +226,6 @@ def test_the_host_alone_decodes_a_frame(host, tmp_path):
     assert in_python(host, program, file) == ["4", "55.0", "75.0"]  # 5.5 and 7.5 cells of 10 mm
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "extra"),
     [
@@ -249,13 +249,11 @@ def test_the_host_alone_names_the_extra_that_is_missing(host, command, extra):
     assert "Traceback" not in said
 
 
-@pytest.mark.slow
 def test_the_host_alone_names_pages_by_their_address(host):
     said = run(host / "contactfpga", "zones", "--help", cwd=host).stdout
     assert "https://github.com/contactfpga/contactfpga/blob/main/docs/haptics.md" in said
 
 
-@pytest.mark.slow
 def test_an_extra_is_added_to_the_wheel_that_is_there(host):
     """Without an index pip lacks what the extra adds, and not contactfpga itself."""
     pip = [sys.executable, "-m", "pip", "--isolated", "--python", host / "python"]

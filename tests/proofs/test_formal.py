@@ -236,6 +236,7 @@ def test_a_bug_that_reads_what_is_not_there_is_refused():
         search(lambda proof: takes(proof, lambda before, dut: 1), 2, bug=bug)
 
 
+@pytest.mark.slow  # other tests have these proofs and bugs one by one
 def test_the_table(capsys):
     assert main(["framing, 4 clocks"]) == 0
     out = capsys.readouterr().out

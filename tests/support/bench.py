@@ -165,18 +165,20 @@ class Bench:
         if values != self._driven:
             self._driven = values
             word, offset = 0, 0
-            for value, target in zip(values, self._targets):
-                assert 0 <= value < 1 << len(target), f"{value} does not fit {target!r}"
+            for value, width in zip(values, self._widths):
+                assert 0 <= value < 1 << width, f"{value} does not fit {width} bits at {offset} of {self._targets!r}"
                 word |= value << offset
-                offset += len(target)
-            ctx.set(Cat(*self._targets), word)
+                offset += width
+            ctx.set(self._targets, word)
 
     async def _testbench(self, ctx):
-        self._targets = [target for part in self._parts for target in part.targets]
+        targets = [target for part in self._parts for target in part.targets]
+        # Amaranth computes a width each time that it is asked for.
+        self._targets, self._widths = Cat(*targets), [len(target) for target in targets]
         self._driven = None
         watched = [value for part in self._parts for value in part.watched]
         deadline = time.process_time() + self._limit_s
-        if self._targets:
+        if targets:
             self._drive(ctx, 0)
         clock = ctx.tick().sample(*watched).__aiter__()
         try:
@@ -190,7 +192,7 @@ class Bench:
                 assert cycle % 256 or time.process_time() < deadline, (
                     f"{cycle} cycles took over {self._limit_s} s of the processor"
                 )
-                if self._targets:
+                if targets:
                     self._drive(ctx, cycle + 1)
         finally:
             await clock.aclose()
