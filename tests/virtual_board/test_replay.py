@@ -130,8 +130,8 @@ def test_json_lines_have_the_names_of_zones(tmp_path, run, capsys):
     found = [tuple(zone[name] for name in names) for zone in lines[1]["zones"]]
     assert found == [(2, 4, 3, 12.5, 5.0, 3.75), (1, 0, 3, 6.25, 0.0, 7.5)]
     # Last row: the zone in column 0 is one step, the one in column 2 that ended a row before is the second.
-    assert lines[1]["cycles"]["last_row_to_first_record"] == 3
-    assert lines[1]["cycles"]["last_row_to_last_record"] == 4
+    assert lines[1]["cycles"]["last_row_to_first_record"] == 4
+    assert lines[1]["cycles"]["last_row_to_last_record"] == 5
     assert lines[1]["flags"] == []
     assert cli.main(["zones", "sim://?scene=two_fingers", "--once", "--json"]) == 0
     live = json.loads(capsys.readouterr().out)
