@@ -25,8 +25,8 @@ class Family:
 
 
 FAMILIES = {
-    # No other memory there; left alone, yosys makes small ones of flip-flops. A wire takes longer there than yosys takes
-    # it to (750 ps): at 2,000 ps fewer LUTs follow each other.
+    # No other memory there; left alone, yosys makes small ones of flip-flops. Wires take longer than the 750 ps that
+    # yosys counts for each: with 2,000 ps fewer LUTs follow one another.
     "iCE40UP": Family(
         "synth_ice40",
         "-abc9 -dff -device u",
