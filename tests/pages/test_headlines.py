@@ -60,12 +60,12 @@ def test_times_are_those_of_the_kits_page_worst_first(index, name):
     assert name in what
     assert what.endswith("worst / median")
     for kit, said in zip(("starter", "fast"), kits, strict=True):
-        parts = said.strip("*").removesuffix(" us").split(" / ")
+        parts = said.strip("*").removesuffix(" µs").split(" / ")
         worst, median = (float(part.replace(",", "")) for part in parts)
         digits = len(parts[0].partition(".")[2])
         assert (worst, median) == pytest.approx(worst_and_median(kit, STAGES[name]), abs=0.5001 * 10**-digits)
         assert worst >= median
-    assert against.startswith(("6,000 us for the paper's", "up to 1,000 us", "the row above"))
+    assert against.startswith(("6,000 µs for the paper's", "up to 1,000 µs", "the same"))
 
 
 def test_counts_and_forces_are_those_of_their_pages():
