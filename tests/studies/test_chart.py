@@ -18,7 +18,7 @@ from contactfpga.design.cover import Cells
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.lab import kept
+from contactfpga_sim.lab import kept, writer
 from contactfpga_sim.lab.chart import (
     beside,
     compute,
@@ -410,7 +410,7 @@ def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     for path in drawn:
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
     for name in ("front", "families", "methods"):
-        assert section("chart.md", name) == getattr(tables, f"{name}_table")(points)
+        assert section("chart.md", name) == writer.spelled(getattr(tables, f"{name}_table")(points))
 
 
 def test_the_page_shows_as_many_placements_as_it_says():

@@ -10,6 +10,7 @@ from sample import sample
 from study_pages import section
 
 from contactfpga.skin import Skin
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance import labellers as label_figures
 from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.model.golden import volume
@@ -92,4 +93,4 @@ def test_the_text_says_what_the_tables_say():
 @pytest.mark.skipif(not (ROOT / scans.RECORDINGS).is_dir(), reason="no recordings")
 def test_the_recordings_table_is_up_to_date():
     recordings = scans.recordings(ROOT / scans.RECORDINGS)
-    assert label_figures.recorded_table(recordings) == section("performance.md", "labeller_recorded")
+    assert writer.spelled(label_figures.recorded_table(recordings)) == section("performance.md", "labeller_recorded")

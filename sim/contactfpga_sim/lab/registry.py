@@ -11,11 +11,12 @@ import dataclasses
 import functools
 import importlib
 import inspect
-import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+from contactfpga_sim.lab import writer
 
 NO_ROW = "^$"
 """For :attr:`Section.kept`: the page has a link to the table instead of rows of it."""
@@ -96,12 +97,12 @@ class StudyRun:
         return self.study.function(self.study.compute)()
 
     def call(self, place: str, *given: object) -> Any:
-        """Call the function at a place. Text, which a terminal may also print, is returned as pages spell it: µs."""
+        """Call the function at a place. Text is returned as pages spell it."""
         function = self.study.function(place)
         parameters = inspect.signature(function).parameters.values()
         wanted = sum(one.default is one.empty for one in parameters)
         found = function(*given, *([self.computed] if wanted > len(given) else []))
-        return re.sub(r"(?<!-)\bus\b", "µs", found) if isinstance(found, str) else found
+        return writer.spelled(found) if isinstance(found, str) else found
 
     def text(self, section: str) -> str:
         """The text of a section."""

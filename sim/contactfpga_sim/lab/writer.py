@@ -47,6 +47,11 @@ def table_of(rows: Sequence[Sequence[str]]) -> str:
     return table(rows[0], map(line, rows[1:]))
 
 
+def spelled(text: str) -> str:
+    """Text of a terminal, as pages spell it: µs for us."""
+    return re.sub(r"(?<!-)\bus\b", "µs", text)
+
+
 def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
     """A page's text with the sections among ``tables`` rewritten, with their fingerprint; None keeps it."""
 
