@@ -1,5 +1,6 @@
 """The link: which packet goes out when, and what is in it, against a replay of the rules of docs/timing.md."""
 
+import bisect
 import itertools
 import struct
 import zlib
@@ -70,7 +71,7 @@ def run(bench_of_skin, skin, frames, ready, asked=(), number=lambda cycle: 0, af
 
     def described(name):
         def value(_cycle):
-            ended = sum(index < len(source.transfers) for index in ends)
+            ended = bisect.bisect_left(ends, len(source.transfers))
             return frames[max(0, ended - 1)].facts[name]
 
         return value

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-MOST_MODULES, MOST_LINES = 25, 2860
+MOST_MODULES, MOST_LINES = 25, 2910
 LOADED = """
 import json, sys
 from amaranth.back import rtlil

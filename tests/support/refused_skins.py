@@ -194,7 +194,7 @@ REFUSED = [
     ),
     (
         {"scan": "adaptive", "settle_us": 2.0},
-        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones per frame need 43 clocks (3.58333 us) "
+        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones per frame need 44 clocks (3.66667 us) "
         "with labeller = 'run'",
     ),
     (
