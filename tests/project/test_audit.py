@@ -89,7 +89,7 @@ def tests(tmp_path, monkeypatch):
     """``tests(text)``: a project whose only tests are these, each claim's for some seconds."""
 
     def tests(text, seconds=60):
-        (tmp_path / "tests").mkdir()
+        (tmp_path / "tests").mkdir(exist_ok=True)
         (tmp_path / "tests" / "test_a.py").write_text(f"import time, subprocess\n\n\n{text}")
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    campaign:\n")
         monkeypatch.setattr(audit, "ROOT", tmp_path)

