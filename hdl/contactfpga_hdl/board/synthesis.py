@@ -33,9 +33,10 @@ FAMILIES = {
         (NO_COLLISIONS, _BLOCK_RAMS, "scratchpad -set synth_ice40.abc9.W 2000"),
     ),
     # Flip-flops of a tile share their enable. One that few have leaves places empty, and the HX1K has none to spare.
-    # In an FPGA that full the usual router of nextpnr goes on forever for many seeds; this one ends.
+    # In an FPGA that full the usual router of nextpnr goes on forever for many seeds; this one ends. With -dff it does not
+    # for a 16x16 sheet's bitmap at 48 MHz.
     "iCE40HX": Family(
-        "synth_ice40", "-abc9 -dff -device hx -dffe_min_ce_use 6", (NO_COLLISIONS, _BLOCK_RAMS), "--router router2"
+        "synth_ice40", "-abc9 -device hx -dffe_min_ce_use 6", (NO_COLLISIONS, _BLOCK_RAMS), "--router router2"
     ),
     # The products have a few bits each; the way to a multiplier and back takes longer than they do.
     "LFE5U": Family("synth_ecp5", "-nodsp", (NO_COLLISIONS,)),
