@@ -33,8 +33,8 @@ FAMILIES = {
         (NO_COLLISIONS, _BLOCK_RAMS, "scratchpad -set synth_ice40.abc9.W 2000"),
     ),
     # Flip-flops of a tile share their enable. One that few have leaves places empty, and the HX1K has none to spare.
-    # In an FPGA that full the usual router of nextpnr goes on forever for many seeds; this one ends, but with -dff not for
-    # the bitmap of a 16x16 sheet at 48 MHz.
+    # In an FPGA that full the usual router of nextpnr goes on forever for many seeds; this one ends, but
+    # with -dff not for the bitmap of a 16x16 sheet at 48 MHz.
     "iCE40HX": Family(
         "synth_ice40", "-abc9 -device hx -dffe_min_ce_use 6", (NO_COLLISIONS, _BLOCK_RAMS), "--router router2"
     ),
