@@ -24,8 +24,8 @@ CLAIMS = ROOT / "docs" / "tables" / "verification.csv"
 
 HEAD = """# Verification
 
-Where each claim has its tests, and what has none. [Status](status.md) says what was compared with what, and whether to
-trust a figure.
+This page is for a reader who doubts a claim. It lists the tests of each claim, and the claims without tests.
+[Status](status.md) shows which figures are compared with what.
 
 ## How to check a claim
 

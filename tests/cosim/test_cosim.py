@@ -63,7 +63,7 @@ def flags_in(skin: Skin, trace: Trace) -> set[str]:
 
 @functools.cache
 def reference_run(count: int) -> tuple[Trace, Trace]:
-    """What is predicted for the reference Skin, and what its gateware does, over so many of 14 frames."""
+    """Traces of the golden model and of the gateware: the reference Skin over the first ``count`` of 14 frames."""
     skin = Skin()
     rng = np.random.default_rng(1)
     density = np.array([0.02, 0.3, 0.0, 0.1, 0.9])

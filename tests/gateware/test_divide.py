@@ -21,7 +21,8 @@ def skin_of(rows, columns, bits, **options):
 
 
 class Waiting(wiring.Component):
-    """The divider with its backlog, as the top joins them. As of frames, no more wait than the backlog has room for."""
+    """The divider with its backlog, as the top joins them. A record is not taken while the backlog is
+    full, as no frame has more than it holds."""
 
     def __init__(self, skin):
         self.room, self.backlog, self.divider = skin.derived.backlog, Backlog(skin), Divider(skin)

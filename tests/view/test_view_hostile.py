@@ -83,7 +83,7 @@ def test_a_browser_runs_and_loads_nothing(tmp_path, which):
     file, links = record(tmp_path, "h")
     (tmp_path / "secret.png").write_bytes(b"not to be read")
     named = opening.ViewRequest(str(file), link=links["arm"] if which == "link" else None)
-    # A small window: the processor draws it.
+    # The window is small because the processor draws it.
     with opening.opened(named, http_port=0) as shown, browser.visit(shown, 640, 400) as visitor:
         asked = []
         visitor.page.on("request", lambda request: asked.append(request.url))

@@ -109,7 +109,7 @@ def stored_turns() -> dict[str, int]:
 def unwrapped(
     m: Module, derived: Derived, join: data.View, kept: data.View, found: Value, group: data.View, stored: data.View
 ) -> None:
-    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``, and to its ``stored`` part."""
+    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``, and to its word in the table."""
     m.submodules.unwrap = unwrap = Unwrap(derived)
     m.d.comb += [
         unwrap.kept.eq(kept),

@@ -65,7 +65,8 @@ def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray
 
 
 def _run_clocks(last_step: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The first step of a row is two clocks after it, and an empty row below an empty one has none."""
+    """Clocks from a row to its last record, to the next row, and to the end mark. The first step is two clocks after
+    its row; an empty row below an empty one has no step."""
     busy = steps + 1 + (steps > 0)
     return last_step + 3, busy, busy + 2
 

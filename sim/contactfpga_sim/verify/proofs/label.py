@@ -110,8 +110,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
 
 
 def walk_is_sound(labeller: Inside):
-    """Whether the walk's mask is a run of ones from column 0 on, followed by the other clusters' ends, and what is
-    left without the lowest bits is that."""
+    """Whether the walk's mask is a run of ones from column 0 on, followed by the other clusters' ends, and each
+    register without the lowest bits is its neighbor without them."""
     inside, ends = labeller["walk.inside"], labeller["walk.ends"]
     work, found = labeller["walk.work"], labeller["walk.found"]
     before, before_later = labeller["walk.befores"], labeller["walk.befores_later"]
