@@ -63,6 +63,7 @@ for line in ["", *sys.stdin.read().splitlines()]:
         before = file.read_bytes()
         file.write_bytes(before + b"#")
     sources._taken.clear()
+    sources._undocumented.cache_clear()
     sources.texts.cache_clear()
     print(eval(sys.argv[1], {"native": native, "skin": Skin()}))
     if file:
@@ -204,6 +205,22 @@ def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files
     page = copy / "sim/contactfpga_sim/lab/flips/tables.py"
     now, changed = keys(copy, key, [*paths, page])
     assert [file for file, key in changed.items() if key == now] == [page]
+
+
+def test_a_docstring_changes_no_kept_result(tmp_path, monkeypatch):
+    monkeypatch.setattr(sources, "_folders", lambda packages: {"told": tmp_path})
+    text = '"""Of what."""\n\nWIDTH = 3\n"""How wide."""\n\n\ndef f():\n    """Say so."""\n    return """so"""\n'
+    quiet = 'WIDTH = 3\ndef f():\n    return """so"""\n'
+    louder = text.replace("How wide.", "How wide it is,\n\nin cells.").replace("Say so.", "Return so.")
+
+    def key(text):
+        (tmp_path / "told.py").write_text(text)
+        sources._taken.clear()
+        sources._undocumented.cache_clear()
+        return sources.digest("told", documented=False)
+
+    assert key(text) == key(quiet) == key(louder)
+    assert len({key(text), key(text.replace("3", "4")), key(text.replace('"""so"""', '"""no"""'))}) == 3
 
 
 def imports_of(code, package):

@@ -29,16 +29,17 @@ _WORD = re.compile(r"\bimport\b")
 # Where a choice is; it is loaded from there.
 _PLACE = re.compile(r"""\b(contactfpga\w*(?:\.\w+)+):\w+["']""")
 
-_taken: dict[tuple[str, tuple[str, ...]], str] = {}
-"""Digests by module and packages; a process reads each once."""
+_taken: dict[tuple[str, tuple[str, ...], bool], str] = {}
+"""Digests by arguments; a process reads each module once."""
 _read: dict[Path, object] = {}
 """Our modules read so far, with stamps that reveal later writes."""
 
 
-def digest(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
+def digest(root: str, packages: tuple[str, ...] = PACKAGES, documented: bool = True) -> str:
     """Hash of a module, or all modules of a package, with their imports: text of ``packages`` and of data in folders
-    beside their modules, versions of others."""
-    key = root, packages
+    beside their modules, versions of others. Unless ``documented``, docstrings do not count, which takes three times
+    as long."""
+    key = root, packages, documented
     if key not in _taken:
         _taken[key] = _digest(*key)
     return _taken[key]
@@ -49,7 +50,7 @@ def texts(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
     """Hash like :func:`digest` over our modules alone: the same in a clone and a wheel, for every Python and other
     versions."""
     folders = _folders(packages)
-    return _sha(_texts(_closure([root], folders), folders))
+    return _sha(_texts(_closure([root], folders), folders, _hash))
 
 
 def changed() -> bool:
@@ -87,13 +88,13 @@ def version(name: str) -> str:
         return ""
 
 
-def _digest(root: str, packages: tuple[str, ...]) -> str:
+def _digest(root: str, packages: tuple[str, ...], documented: bool) -> str:
     folders = _folders(packages)
     found = _find(root, folders)
     if found is None:
         raise ModuleNotFoundError(f"no module named {root!r}", name=root)
     roots = found.parent.rglob("*.py") if found.name == "__init__.py" else [found]
-    return _hashed(_marks(map(_name, roots), folders, ours=True))
+    return _hashed(_marks(map(_name, roots), folders, True, _hash if documented else _undocumented))
 
 
 def _hashed(marks: Iterable[str]) -> str:
@@ -143,20 +144,22 @@ def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
     return next((Path(file) for file in (f"{path}/__init__.py", f"{path}.py") if os.path.isfile(file)), None)
 
 
-def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False) -> list[str]:
+def _marks(
+    roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False, hashed: Callable[[Path], str] | None = None
+) -> list[str]:
     """A line per reached module and other package; for ``ours`` also per data file beside a module."""
     found = _closure(roots, folders, _noted if ours else lambda _: None)
-    marks = _texts(found, folders)
+    marks = _texts(found, folders, hashed or _hash)
     for folder in {file.parent for file in found.values() if file} if ours else ():
         marks += (f"{file.name} {_hash(file)}" for file in _data(folder))
     others = _tops(found) - set(folders) - set(PACKAGES) - sys.stdlib_module_names
     return sorted((*marks, *(f"{other} {version(other)}" for other in others)))
 
 
-def _texts(found: Mapping[str, Path | None], folders: Mapping[str, Path]) -> list[str]:
+def _texts(found: Mapping[str, Path | None], folders: Mapping[str, Path], hashed: Callable[[Path], str]) -> list[str]:
     """A line per reached module and enclosing package."""
-    marks = [f"{name} {_hash(file)}" for name, file in found.items() if file]
-    marks += (f"{top} {_hash(file)}" for top in _tops(found) - set(found) if (file := _find(top, folders)))
+    marks = [f"{name} {hashed(file)}" for name, file in found.items() if file]
+    marks += (f"{top} {hashed(file)}" for top in _tops(found) - set(found) if (file := _find(top, folders)))
     return sorted(marks)
 
 
@@ -196,6 +199,26 @@ def _stamp(file: Path) -> object:
 
 def _hash(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@functools.cache
+def _undocumented(file: Path) -> str:
+    """Hash of a module's text without docstrings and empty lines."""
+    text = file.read_bytes().decode(errors="replace")
+    lines = text.splitlines()
+    with contextlib.suppress(SyntaxError):  # nothing can import it
+        for at in _docstrings(ast.parse(text)):
+            lines[at] = ""
+    return _sha(filter(str.strip, lines))
+
+
+def _docstrings(block: ast.AST) -> Iterator[int]:
+    """Lines, from 0, of strings that are statements. By this project's style they share no line with another."""
+    for name in ("body", "orelse", "finalbody", "handlers"):
+        for statement in getattr(block, name, ()):
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+                yield from range(statement.lineno - 1, statement.end_lineno or 0)
+            yield from _docstrings(statement)
 
 
 def _data(folder: Path) -> Iterator[Path]:
