@@ -153,7 +153,8 @@ def main() -> int:
     parser.add_argument(
         "--frames", type=numbers.whole(1, 10**9), default=500, help="for each board (default: %(default)s)"
     )
-    parser.add_argument("--third", type=int, metavar="N", help="a third of the default boards; the next N, the next third")
+    told = "every third of the default boards; whole numbers that follow each other draw all"
+    parser.add_argument("--third", type=int, metavar="NUMBER", help=told)
     told = "a .npz file with frames named `pressed`, or a folder of such files"
     parser.add_argument("--recordings", type=Path, metavar="PATH", help=told)
     args = parser.parse_args()
