@@ -20,8 +20,8 @@ from types import TracebackType
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga_sim.model.board import native
-from contactfpga_sim.verify.mutants import aig
-from contactfpga_sim.verify.mutants.aig import reached
+from contactfpga_sim.verify import aig
+from contactfpga_sim.verify.aig import reached
 from contactfpga_sim.verify.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
 
 QUICK_S, LONG_S = 4, 45
