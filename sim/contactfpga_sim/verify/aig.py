@@ -29,13 +29,18 @@ class Circuit:
     """Literal of each output."""
     gates: Sequence[tuple[int, int]]
     """The two operands of each AND gate."""
+    bad: Sequence[int] = ()
+    """Literals that must never hold: the complements of Yosys' assertions."""
+    given: Sequence[int] = ()
+    """Literals that hold in every clock: Yosys' assumptions."""
 
 
 def read(path: Path, names: Path) -> Circuit:
     """A binary AIGER file with the names of Yosys' ``write_aiger -map``; others are ``?``."""
     header, _, rest = path.read_bytes().partition(b"\n")
-    _, inputs, latches, outputs, gates = (int(word) for word in header.split()[1:6])
-    lines = rest.split(b"\n", latches + outputs)
+    _, inputs, latches, outputs, gates, *more = (int(word) for word in header.split()[1:])
+    bad, given = (*more, 0, 0)[:2]
+    lines = rest.split(b"\n", latches + outputs + bad + given)
     literals = [int(line.split()[0]) for line in lines[:-1]]
     deltas = _decoded(lines[-1])
     pairs = []
@@ -48,8 +53,10 @@ def read(path: Path, names: Path) -> Circuit:
         [tuple(called["latch", i]) for i in range(latches)],
         [called["output", i][0] for i in range(outputs)],
         literals[:latches],
-        literals[latches:],
+        literals[latches : latches + outputs],
         pairs,
+        literals[latches + outputs : len(literals) - given],
+        literals[len(literals) - given :],
     )
 
 
@@ -120,13 +127,15 @@ class Graph:
         """The literal that holds where exactly one of the two does."""
         return self.both(self.both(left, right) ^ 1, self.both(left ^ 1, right ^ 1) ^ 1)
 
-    def place(self, circuit: Circuit, inputs: Sequence[int], latches: Sequence[int]) -> tuple[list[int], list[int]]:
-        """The circuit's logic over these literals of inputs and latches: what latches take next, and the outputs."""
+    def place(self, circuit: Circuit, inputs: Sequence[int], latches: Sequence[int]) -> Circuit:
+        """The circuit's logic over these literals of inputs and latches: a circuit without gates of its own, whose
+        literals are this graph's."""
         literals = [0, *inputs, *latches]
         for left, right in circuit.gates:
             literals.append(self.both(literals[left >> 1] ^ left & 1, literals[right >> 1] ^ right & 1))
-        nexts, driven = ([literals[old >> 1] ^ old & 1 for old in some] for some in (circuit.nexts, circuit.driven))
-        return nexts, driven
+        names = ("nexts", "driven", "bad", "given")
+        placed = {name: [literals[old >> 1] ^ old & 1 for old in getattr(circuit, name)] for name in names}
+        return dataclasses.replace(circuit, gates=(), **placed)
 
     def cone(self, roots: Iterable[int]) -> list[int]:
         """Numbers of the nodes that the roots depend on, each after its operands."""

@@ -108,13 +108,14 @@ class Prover:
             twins |= {index: self._graph.variable() for index in sorted(found)}
         return False
 
-    def _placed(self, number: int, latches: Sequence[int]) -> tuple[list[int], list[int]]:
+    def _placed(self, number: int, latches: Sequence[int]) -> tuple[Sequence[int], Sequence[int]]:
         """Mutant ``number`` over these latches: their next states, and the outputs."""
         inputs = list(self._inputs)
         for index, name in enumerate(self._circuit.inputs):
             if found := re.fullmatch(r"mutant\[(\d+)\]", name):
                 inputs[index] = number >> int(found[1]) & 1
-        return self._graph.place(self._circuit, inputs, latches)
+        placed = self._graph.place(self._circuit, inputs, latches)
+        return placed.nexts, placed.driven
 
     def _differing(self, nexts: Sequence[int], twins: Collection[int]) -> dict[int, int]:
         """For each single register whether the mutant's next state differs."""

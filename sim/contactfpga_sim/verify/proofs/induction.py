@@ -1,0 +1,186 @@
+"""Whether claims of a circuit hold: forever, by induction over its clocks, or for some clocks from power-up.
+
+A program of its own, so that it can be ended: ``python -m contactfpga_sim.verify.proofs.induction FILES CLOCKS``.
+CaDiCaL, a SAT solver, chooses all inputs and, in a step of the induction, all registers of the first clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from pysat.solvers import Solver
+
+from contactfpga_sim.verify import aig
+
+REST = "rest"
+"""Name of the output for :meth:`~contactfpga_sim.verify.proofs.proof.Proof.rests`."""
+
+
+class Clocks:
+    """A circuit in clocks that follow each other, as clauses of a solver."""
+
+    def __init__(self, circuit: aig.Circuit, power_up: bool):
+        """``power_up``: all registers start at 0; otherwise the solver chooses."""
+        self._circuit = circuit
+        self._graph = aig.Graph(0)
+        self._solver = Solver(name="cadical195")
+        self._clauses = 0
+        self._latches: Sequence[int] = [0 if power_up else self._graph.variable() for _ in circuit.latches]
+        self._variables: list[tuple[Sequence[int], Sequence[int]]] = []
+        self._bad = 0
+        self.rest = 0
+        """Literal of the newest clock: the circuit is at rest."""
+
+    def add(self) -> None:
+        """Add a clock. In the one before, all claims hold."""
+        self.hold(self._bad ^ 1)
+        inputs = [self._graph.variable() for _ in self._circuit.inputs]
+        placed = self._graph.place(self._circuit, inputs, self._latches)
+        self._variables.append((inputs, self._latches))
+        for literal in placed.given:
+            self.hold(literal)
+        self._latches, self._bad = placed.nexts, self._graph.any(placed.bad)
+        if REST in self._circuit.outputs:
+            self.rest = placed.driven[self._circuit.outputs.index(REST)]
+
+    def hold(self, literal: int) -> None:
+        """Assume that the literal holds."""
+        self._define()
+        if literal != 1:
+            self._solver.add_clause([_signed(literal)] if literal else [])
+
+    def possible(self, *literals: int) -> bool:
+        """Whether these can hold together."""
+        self._define()
+        if 0 in literals:
+            return False
+        return bool(self._solver.solve([_signed(literal) for literal in literals if literal != 1]))
+
+    def broken(self) -> bool:
+        """Whether a claim can fail in the newest clock, on a way that comes to no state twice: others can be
+        shortened."""
+        while self.possible(self._bad):
+            holds, seen = self._holds(), dict[tuple[bool, ...], Sequence[int]]()
+            for _, latches in self._variables:
+                state = tuple(map(holds, latches))
+                if state in seen:
+                    pairs = zip(seen[state], latches, strict=True)
+                    self.hold(self._graph.any(self._graph.differ(*pair) for pair in pairs))
+                    break
+                seen[state] = latches
+            else:
+                return True
+        return False
+
+    def told(self) -> str:
+        """The solver's last choice: inputs and registers that are not 0, a line per clock."""
+        holds, lines = self._holds(), []
+        for number, (inputs, latches) in enumerate(self._variables):
+            values: dict[str, int] = defaultdict(int)
+            names = ((name,) for name in self._circuit.inputs)
+            for called, literal in zip((*names, *self._circuit.latches), (*inputs, *latches), strict=True):
+                for word, bit in re.findall(r"^([^$?]+)\[(\d+)\]$", "\n".join(called), re.MULTILINE):
+                    values[word] |= holds(literal) << int(bit)
+            words = (f"{name}={value:#x}" for name, value in values.items() if value)
+            lines.append(" ".join((f"clock {number}:", *words)))
+        return "\n".join(lines)
+
+    def _holds(self) -> Callable[[int], bool]:
+        """The solver's last choice for literals."""
+        true = {literal for literal in self._solver.get_model() or () if literal > 0}
+        return lambda literal: (literal >> 1 in true) != bool(literal & 1)
+
+    def _define(self) -> None:
+        """Tell the solver of gates that are new."""
+        for node in range(self._clauses, len(self._graph.operands)):
+            if operands := self._graph.operands[node]:
+                left, right = map(_signed, operands)
+                for clause in ([-node, left], [-node, right], [node, -left, -right]):
+                    self._solver.add_clause(clause)
+        self._clauses = len(self._graph.operands)
+
+
+def _signed(literal: int) -> int:
+    """A graph's literal for the solver."""
+    return -(literal >> 1) if literal & 1 else literal >> 1
+
+
+Found = tuple[str, int, str]
+"""Outcome, clocks, and the solver's choice where a claim fails."""
+
+
+def search(circuit: aig.Circuit, clocks: int) -> Found:
+    """Whether claims hold in the first clocks from power-up."""
+    run = Clocks(circuit, power_up=True)
+    for clock in range(clocks):
+        run.add()
+        if run.broken():
+            return "counterexample", clock, run.told()
+    return "proved", clocks, ""
+
+
+def prove(circuit: aig.Circuit, clocks: int) -> Found:
+    """Whether claims that held in as many clocks, at most ``clocks``, hold in the next one, and at power-up."""
+    start, step = Clocks(circuit, power_up=True), Clocks(circuit, power_up=False)
+    step.add()
+    for clock in range(clocks):
+        start.add()
+        if start.broken():
+            return "counterexample", clock, start.told()
+        step.add()
+        if not step.broken():
+            return "proved", clock + 1, ""
+    return "open", clocks, step.told()
+
+
+def prove_from_rest(circuit: aig.Circuit, clocks: int) -> Found:
+    """Whether claims hold from each clock at rest, with ``clocks`` clocks before it, to the next, which must come.
+
+    All clocks are then near one whose lemmas pin registers down, which spares the solver most of its search.
+    """
+    start = Clocks(circuit, power_up=True)
+    restless = []
+    for clock in range(clocks + 2):
+        start.add()
+        if start.broken():
+            return "counterexample", clock, start.told()
+        restless.append(start.rest ^ 1)
+    if start.possible(*restless[-2:]):
+        return "open", clocks, f"not at rest in clock {clocks} or {clocks + 1}\n{start.told()}"
+    step = Clocks(circuit, power_up=False)
+    for _ in range(clocks + 1):
+        step.add()
+    step.hold(step.rest)
+    number = clocks
+    while step.possible():
+        step.add()
+        number += 1
+        if step.broken():
+            return "open", number, step.told()
+        step.hold(step.rest ^ 1)
+    return "proved", number, ""
+
+
+def main() -> int:
+    """Print outcome, clocks and the solver's choice as JSON."""
+    parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.verify.proofs.induction", description=__doc__)
+    parser.add_argument("files", type=Path, help="folder of design.aig and names.txt")
+    parser.add_argument("clocks", type=int)
+    parser.add_argument("--forever", action="store_true")
+    options = parser.parse_args()
+    circuit = aig.read(options.files / "design.aig", options.files / "names.txt")
+    solve: Callable[[aig.Circuit, int], Found] = search
+    if options.forever:
+        solve = prove_from_rest if REST in circuit.outputs else prove
+    json.dump(solve(circuit, options.clocks), sys.stdout)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
