@@ -25,7 +25,7 @@ class StudyError(ContactFPGAError):
 
 
 def lacking(needs: Iterable[str]) -> list[str]:
-    """The needs that are absent: programs, and paths with a slash."""
+    """The absent needs: programs, and paths with a slash."""
     return [one for one in needs if not (Path(one).exists() if "/" in one else shutil.which(one))]
 
 
@@ -63,7 +63,7 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
 
 
 def stale(study: Study) -> Iterator[str]:
-    """A line for each section whose stored fingerprint is out of date."""
+    """A line per section with an outdated fingerprint."""
     for name in study.sections:
         page = study.page_of(name)
         written = writer.sections((DOCS / page).read_text(encoding="utf-8"))[name]
@@ -72,13 +72,13 @@ def stale(study: Study) -> Iterator[str]:
 
 
 def listed(study: Study) -> str:
-    """A study's line in the list."""
+    """A study's line in the list of studies."""
     needs = f"; needs {', '.join(study.needs)}" if study.needs else ""
     return f"{study.name:<12} {study.page:<16} {study.minutes:>4g} min  {study.title}{needs}"
 
 
 def main() -> int:
-    """Run the command and return its exit status."""
+    """Run the command; return its exit status."""
     args = _parser().parse_args()
     names = flags.known("study", args.name, list(studies.STUDIES))
     chosen = [studies.STUDIES[name] for name in names]
@@ -99,7 +99,7 @@ def main() -> int:
 
 
 def _make_all(chosen: Iterable[Study], strict: bool) -> int:
-    """Make each study; with ``strict`` one that cannot be made here is an error."""
+    """With ``strict``, a study that cannot be made here is an error."""
     for study in chosen:
         try:
             make(study)
@@ -112,7 +112,6 @@ def _make_all(chosen: Iterable[Study], strict: bool) -> int:
 
 @contextlib.contextmanager
 def _settings(args: argparse.Namespace) -> Iterator[None]:
-    """Configure the studies' worker processes and their cache of earlier results."""
     with contextlib.ExitStack() as stack:
         stack.callback(setattr, pool, "usual_jobs", pool.usual_jobs)
         pool.usual_jobs = args.jobs

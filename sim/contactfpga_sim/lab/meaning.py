@@ -1,7 +1,5 @@
-"""Fingerprints of the code behind a section of a page. Moving or documenting code does not change them.
-
-They cover the set of statements of all reached modules, without imports, comments, docstrings and positions.
-"""
+"""Fingerprints of the code of a section: the set of statements of all reached modules, without imports, comments,
+docstrings and positions."""
 
 from __future__ import annotations
 
@@ -30,7 +28,6 @@ def fingerprint(study: Study, section: str) -> str:
 
 
 def _netlists(study: Study, section: str) -> list[str]:
-    """Keys of the netlists that a section measures."""
     from contactfpga_sim.lab import size
 
     with size.keys_alone() as keys, contextlib.redirect_stderr(io.StringIO()):
@@ -74,7 +71,7 @@ def _says_nothing(statement: ast.AST) -> bool:
 
 
 def _plain(node: object) -> object:
-    """A syntax tree as plain values, equal in all Python versions with this syntax."""
+    """A syntax tree as plain values, equal in all Python versions."""
     if isinstance(node, ast.AST):
         return type(node).__name__, *_fields(node)
     if isinstance(node, list):

@@ -14,7 +14,7 @@ from contactfpga.inputs.files import write_text
 from contactfpga.tools.console import outputs
 
 Tables = Mapping[str, Callable[[], str]]
-"""The maker of each table, by name."""
+"""Maker of each table, by name."""
 
 _SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end -->", re.DOTALL)
 
@@ -28,7 +28,7 @@ class PageSection(NamedTuple):
 
 
 def sections(page: str) -> dict[str, PageSection]:
-    """The sections of a page's text, by name."""
+    """Sections of a page's text, by name."""
     return {name: PageSection(text, fingerprint) for name, fingerprint, text in _SECTION.findall(page)}
 
 
@@ -38,17 +38,17 @@ def line(cells: Iterable[str]) -> str:
 
 
 def table(head: Sequence[str], lines: Iterable[str]) -> str:
-    """A whole table; ``lines``: as :func:`line` makes them."""
+    """A table of lines by :func:`line`."""
     return "\n".join([line(head), "|---" * len(head) + "|", *lines])
 
 
 def table_of(rows: Sequence[Sequence[str]]) -> str:
-    """A whole table from cells; the first row is the head."""
+    """A table of cells; the first row is the head."""
     return table(rows[0], map(line, rows[1:]))
 
 
 def spelled(text: str) -> str:
-    """Text of a terminal, as pages spell it: µs for us."""
+    """Terminal text as pages spell it: µs for us."""
     return re.sub(r"(?<!-)\bus\b", "µs", text)
 
 
@@ -67,7 +67,7 @@ def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
 
 
 def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
-    """Write the tables into a page with :func:`update`, each as soon as it is made."""
+    """:func:`update` a page, with each table as soon as it is made."""
     for name, measure in tables.items():
         before = path.read_text(encoding="utf-8")
         if name in sections(before):
@@ -75,7 +75,7 @@ def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
 
 
 def page(path: str | Path, option: str = "page") -> Path:
-    """The page, checked to be writable before the measurements. Raises
+    """The page, checked to be writable before measurements. Raises
     :class:`~contactfpga.tools.console.outputs.OutputError`."""
     if not Path(path).is_file():
         raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")

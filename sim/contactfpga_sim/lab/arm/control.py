@@ -9,14 +9,12 @@ from contactfpga_sim.lab.arm.case import Case
 
 
 class SensorReadings(NamedTuple):
-    """The controller's inputs at one sample."""
+    """The controller's inputs at a sample."""
 
     angle_rad: float
     speed_rad_s: float
     torque_nm: float
-    """Torque as the sensor reads it."""
     contact: bool
-    """Contact as the controller receives it."""
     alive: bool
     """Whether the host was heard recently."""
 
@@ -25,9 +23,9 @@ class Controller:
     """PI speed controller with one of two behaviors.
 
     ``reverse``, the paper's: on contact, or torque at the limit, the arm goes back until the contact is resolved, then
-    slows to rest. ``comply``: the arm follows the torque like an inertia with damper and spring, but still goes back at
-    the torque limit. If the host falls silent, the arm stops; in a contact it first retreats the full distance. A
-    contact that persists then may be stale: it causes no second retreat until it was away once; the torque limit does.
+    slows to rest. ``comply``: the arm follows the torque like an inertia with damper and spring, but goes back at the
+    torque limit. If the host falls silent, the arm stops; in a contact it first retreats the full distance. A contact
+    that persists then may be stale: only the torque limit causes a second retreat until it was away once.
     """
 
     def __init__(self, case: Case):
@@ -47,7 +45,7 @@ class Controller:
         self._old: collections.deque[SensorReadings] = collections.deque()
 
     def sample(self, seconds: float, now: SensorReadings) -> float:
-        """The current in A to request until the next sample."""
+        """The requested current in A until the next sample."""
         sensed = self._late(now)
         over = abs(sensed.torque_nm) >= self._control.torque_limit_nm
         if now.contact:

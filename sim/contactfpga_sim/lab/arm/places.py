@@ -1,6 +1,6 @@
-"""Touches anywhere on the sheet: the arm over many places, controller phases and latencies.
+"""Touches anywhere on the sheet, with many controller phases and latencies.
 
-Places fill pitch cells in the sheet's middle evenly; each has a moment between two controller samples and a latency
+Places fill pitch cells in the sheet's middle evenly; each has an instant between two controller samples and a latency
 measured through the gateware.
 """
 
@@ -20,16 +20,16 @@ from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S
 
 ENDS_S = 20e-3
-"""A peak is over by this time plus the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
+"""A peak is over after this time plus that for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
 
 INSTANTS = 8
-"""Touches through the gateware that measure a way's latencies, a controller period apart."""
+"""Touches that measure a way's latencies through the gateware, a controller period apart."""
 
 SPAN = 3
-"""Pitches along each side of the touched square in the sheet's middle."""
+"""Pitches along each side of the touched square."""
 
 SEEDS = (0, 1)
-"""Each seed has half of the touches, so that comparing the halves shows the uncertainty."""
+"""Each seed makes half of the touches; a comparison of the halves shows the uncertainty."""
 
 Latencies = tuple[float, ...]
 """Equally likely latencies in s; empty: the sheet reports nothing."""
@@ -51,9 +51,7 @@ class Peaks:
     """Arrays (touches,) of one way."""
 
     force_n: Floats
-    """Peak force of each touch."""
     indentation_m: Floats
-    """Peak indentation of each touch."""
     limited: np.ndarray
     """Whether the torque limit reacted first."""
 
@@ -69,8 +67,8 @@ _GOLDEN = 1.32471795724
 
 
 def evenly(count: int, seed: int) -> Floats:
-    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others take even shares of their range in
-    random order."""
+    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others are even shares in random
+    order."""
     rng = np.random.default_rng(seed)
     square = (rng.random(2) + np.outer(np.arange(count), [1 / _GOLDEN, 1 / _GOLDEN**2])) % 1
     orders = np.stack([rng.permutation(count) for _ in range(4)], axis=1)
@@ -93,7 +91,7 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def peaks(found: list[list[list[tuple[float, float, bool]]]], way: int) -> list[Peaks]:
-    """The peaks of one way over several batches."""
+    """Peaks of one way over several batches."""
     arrays = [np.array(one[way], float) for one in found]
     return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0) for array in arrays]
 
@@ -123,7 +121,7 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
-    """A position in one of the middle cells of a side, by shares from 0 to 1."""
+    """A position in a middle cell of a side; ``inside`` and ``cell`` are shares from 0 to 1."""
     span = min(SPAN, count - 1)
     if not span:
         return 0.5 * inside * pitch_mm
@@ -131,15 +129,13 @@ def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
 
 
 def _step_s(case: Case) -> float:
-    """The longest integrator step for the case."""
     period = case.control.period_s / STEP_S
     fits = abs(period - round(period)) < 1e-6 and case.motor.time_constant_s / STEPS_A_TIME_CONSTANT >= STEP_S
     return STEP_S if fits else case.run.step_s
 
 
 def measured_s(case: Case, skin: Skin, way: str) -> Latencies:
-    """Times in s from a switch to the controller's input, of :data:`INSTANTS` touches through the gateware by the way
-    ``uart`` or ``pin``."""
+    """Times in s from a switch to the controller's input over :data:`INSTANTS` touches, by ``uart`` or ``pin``."""
     key = f"{kept.made_by(__name__, skin)} {way} {dataclasses.asdict(case.usb)} {case.control.period_s}"
     found: list[float] = kept.kept("latencies", key, lambda: _measured(case, skin, way))
     return tuple(found)

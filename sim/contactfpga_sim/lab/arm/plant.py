@@ -27,7 +27,7 @@ class Forces(NamedTuple):
     """Forces in one state."""
 
     contact_n: tuple[float, ...]
-    """Force of each touch, in N."""
+    """Force of each touch."""
     indentation_m: tuple[float, ...]
     """Foam indentation at each touch, negative while apart."""
     acceleration: float
@@ -37,8 +37,6 @@ class Forces(NamedTuple):
 
 
 class Plant:
-    """The case's equations."""
-
     def __init__(self, case: Case):
         self._motor = case.motor
         self._foam = case.foam

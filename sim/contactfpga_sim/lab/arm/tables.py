@@ -1,4 +1,4 @@
-"""Writes docs/arm.md's tables and pictures."""
+"""Tables and pictures of docs/arm.md."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ArmRuns(NamedTuple):
     plan: pictures.Plan
     points: dict[SweepTask, SweepPoint]
     columns: dict[str, RunRecord]
-    """The paper's experiment by way to the controller."""
+    """The paper's experiment by way."""
     anywhere: dict[anywhere.Geometry, anywhere.Found]
     """Touches anywhere, by geometry."""
 
@@ -45,7 +45,7 @@ def compute() -> ArmRuns:
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
-    """The page's runs, and force, speed and thickness against latency."""
+    """Pictures of the runs, and of force, speed and thickness against latency."""
     charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
     return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
 
@@ -81,17 +81,16 @@ FAILURES = (
 
 
 def matters_text(found: ArmRuns) -> str:
-    """A sentence on the most important change."""
     return anywhere.matters(found.anywhere)
 
 
 def places_table(found: ArmRuns) -> str:
-    """Peak force over touches anywhere, by geometry."""
+    """Peak forces of touches anywhere, by geometry."""
     return writer.table_of(anywhere.geometry_lines(found.anywhere))
 
 
 def effects_table(found: ArmRuns) -> str:
-    """Reduction of the mean peak force by each part of the sheet, changed alone."""
+    """Reduction of the mean peak force by each part of the sheet."""
     return writer.table_of(anywhere.effect_lines(found.anywhere))
 
 
@@ -124,7 +123,7 @@ def defense_table() -> str:
 
 
 def step_table() -> str:
-    """Results at 6 ms and by UART over integrator steps, and the largest change by halving."""
+    """Results at 6 ms and by UART over integrator steps, with the largest change by halving."""
     lines = [["step, us", "way", "closes, ms", "torque before, Nm", "peak force, N", "at rest, ms", "largest change"]]
     for way in ("latency", "uart"):
         before: list[float] | None = None
@@ -139,7 +138,7 @@ def step_table() -> str:
 
 
 def sheet_table(found: ArmRuns) -> str:
-    """Time from the switch to the controller in the gateware's own runs, and its cost."""
+    """Time from the switch to the controller in the gateware's runs, and its cost."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
     bounds = sweep.bounds_s(Case.load("paper"), pictures.Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):
@@ -152,7 +151,7 @@ def sheet_table(found: ArmRuns) -> str:
 
 
 def speed_table(found: ArmRuns) -> str:
-    """Safe arm speed by peak force and, in brackets, by the force at the reaction."""
+    """Safe arm speed by peak force; in brackets by the force at the reaction."""
     lines = [["force limit, N", *found.plan.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
     for limit in LIMITS_N:
         cells = []

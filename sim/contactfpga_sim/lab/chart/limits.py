@@ -1,4 +1,4 @@
-"""Tables for the chart's page: the least error of any method, and other ways to read a sheet."""
+"""The chart page's tables of the least error of any method, and of other ways to read a sheet."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SCENES = 4000
 """Scenes for each floor."""
 
 KNOWN_MM = 7.0
-"""Radius of the finger whose size is known."""
+"""Radius of a finger of known size."""
 
 CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "finger": ("finger", {}, tuple(COVERS)),
@@ -33,7 +33,7 @@ CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     ),
     "bumper": ("bumper", {}, ("bare", "tiles")),
 }
-"""By name: family, its options, and covers."""
+"""Family, options and covers by name."""
 
 RIVAL_PITCHES_MM = (6.4, 10.0)
 TOUCHES = 300
@@ -82,7 +82,7 @@ def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
 
 
 def rivals_table() -> str:
-    """Each rival at two pitches of tiles, for several fingers."""
+    """Rivals at two pitches of tiles, for several fingers."""
     head = (
         "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
         "assumes",

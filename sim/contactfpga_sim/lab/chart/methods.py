@@ -1,4 +1,4 @@
-"""The methods and settings that the chart compares, all on sheets of one extent."""
+"""Methods and settings of the chart, on sheets of one extent."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ EXTENT_MM = 160.0
 """Width and height of every sheet."""
 
 PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
-"""Pitches, first the one that compares methods."""
+"""Pitches; the first compares methods."""
 
 PITCH_MM = PITCHES_MM[0]
 
 THRESHOLDS_N = (0.2, 0.6, 1.0)
-"""Closing forces of switches, besides the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
+"""Closing forces besides the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
 
 MOST_ZONES = 32
-"""Zones per frame of every method, enough for all scenes here. More would need longer row times for `run` and the
-divider on the finest sheets."""
+"""Zones per frame, enough for all scenes here. More would need longer row times for `run` and divider on the finest
+sheets."""
 
 
 class Method(NamedTuple):
@@ -35,14 +35,14 @@ class Method(NamedTuple):
 
 
 def sheet(pitch_mm: float, **settings: Any) -> Skin:
-    """A square sheet of :data:`EXTENT_MM`, 4-connected by default."""
+    """A square sheet of :data:`EXTENT_MM`, by default 4-connected."""
     lines = round(EXTENT_MM / pitch_mm)
     given: dict[str, Any] = {"connectivity": 4, "zone_capacity": MOST_ZONES} | settings
     return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **given)
 
 
 def under(cover: str, name: str, pitch_mm: float, more: str = "", **settings: Any) -> dict[str, Method]:
-    """One method: ``name`` at a pitch under a cover, one of :data:`contactfpga_sim.lab.covers.COVERS`."""
+    """One method: ``name`` at a pitch under one of :data:`contactfpga_sim.lab.covers.COVERS`."""
     whole = f"{name}, {pitch_mm:g} mm, {cover}" + (f", {more}" if more else "")
     return {whole: Method(sheet(pitch_mm, **settings), COVERS[cover](pitch_mm))}
 
@@ -67,7 +67,7 @@ def _methods() -> dict[str, Method]:
 
 
 def _settings() -> dict[str, Method]:
-    """Other ways to label, scan and send, under tiles at :data:`PITCH_MM`."""
+    """Ways to label, scan and send, under tiles at :data:`PITCH_MM`."""
     debounced: dict[str, Any] = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
     ways: list[tuple[str, str, dict[str, Any]]] = [
         ("run", "8-connected", {"connectivity": 8}),
@@ -98,4 +98,4 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
-"""By name, the plainest first; each has gateware, and its time is from that gateware's golden model."""
+"""Methods by name, the plainest first; times are from the golden model of each one's gateware."""

@@ -1,4 +1,4 @@
-"""Light fingers on each arrangement of foam on switches: tables and picture of the cover's first part.
+"""Light fingers on arrangements of foam over switches, for docs/cover.md.
 
 Switch force, finger and sheet are fixed; foam, faces and caps differ.
 """
@@ -25,13 +25,11 @@ from contactfpga_sim.lab.cover.elements import FoamOnCaps
 PITCHES_MM = (10.0, 6.4)
 FORCES_N = (1.0, 0.4)
 LINES = 16
-"""Rows and columns of the sheet."""
 
 PLACES = 1000
-"""Places of the finger."""
 
 PROUD_MM = 0.5
-"""Height of caps above their surroundings, into which foam may sag."""
+"""Height of proud caps, into which foam may sag."""
 
 FLUSH = 0.8
 """Side of a flush cap over the pitch."""
@@ -71,14 +69,14 @@ KINDS = {
 
 
 def felt_table() -> str:
-    """Smallest felt finger forces, by pitch, kind of cover and switch force."""
+    """Smallest felt finger forces, by pitch, cover and switch force."""
     head = ["pitch", "what the foam presses", "one switch takes, least"]
     head += [f"{force:g} N switch: {what}" for force in FORCES_N for what in ("50 %", "99 %", "worst")]
     return writer.table_of([head, *(_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS))])
 
 
 def felt_sample() -> str:
-    """The fastest line of :func:`felt_table`."""
+    """Fastest line of :func:`felt_table`."""
     return writer.line(_row(PITCHES_MM[-1], list(KINDS)[-1]))
 
 
@@ -115,7 +113,6 @@ def elements_table() -> str:
 
 
 def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> float:
-    """The error with the largest magnitude."""
     foam = FoamOnCaps(thickness_mm, side_mm, stiffness=stiffness, proud=proud)
     switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
     cells = Cells(
@@ -165,7 +162,7 @@ _SHORT = ("flush face", "flush cap", "proud button", "proud caps, whole foam", "
 
 
 def draw(path: Path) -> Path:
-    """Cross sections of three covers, and the felt force along the diagonal between switches."""
+    """Cross sections of three covers, and felt force along the diagonal between switches."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(4.4)
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
@@ -175,7 +172,6 @@ def draw(path: Path) -> Path:
 
 
 def _sections(place: Any) -> None:
-    """Three stacked sketches; lengths in mm, widened upward."""
     for number, (name, proud, cut) in enumerate(
         (
             ("flush: the base carries most", False, False),
@@ -228,7 +224,6 @@ def _diagonal(place: Any) -> None:
 
 
 def _felt_along(cover: Cover, pitch_mm: float, along_mm: np.ndarray) -> Iterator[float]:
-    """Felt forces in N with the finger this far from a switch along the diagonal."""
     cells = Cells(cover, 10, 10, pitch_mm * 1e-3, pitch_mm * 1e-3)
     for away in along_mm:
         place = 4 * pitch_mm * 1e-3 + away * 1e-3 / math.sqrt(2)

@@ -20,7 +20,7 @@ TINTS = {
 
 
 class Canvas:
-    """A diagram of the page's width and this height. Create it under :data:`contactfpga.picture_style.SETTINGS`."""
+    """A diagram of the page's width, created under :data:`contactfpga.picture_style.SETTINGS`."""
 
     def __init__(self, height_px: float):
         self.figure = style.new(height_px / 96)
@@ -53,7 +53,7 @@ class Canvas:
         self.axes.plot(*zip(*points, strict=True), **{"color": color, "lw": 1, "solid_capstyle": "round"} | how)
 
     def arrow(self, *points: tuple[float, float], color: str = style.SOFT, both: bool = False) -> None:
-        """Draw a line through points with an arrowhead at its end, or at both."""
+        """Draw a line with an arrowhead at its end, or at both."""
         self.line(*points, color=color, lw=1.6, solid_capstyle="butt")
         ends = [(points[-2], points[-1])] + ([(points[1], points[0])] if both else [])
         for start, end in ends:
@@ -62,5 +62,4 @@ class Canvas:
             )
 
     def save(self, path: Path) -> Path:
-        """Write the diagram."""
         return style.save(self.figure, path)

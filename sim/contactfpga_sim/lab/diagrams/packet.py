@@ -1,4 +1,4 @@
-"""A map of a packet: the bytes of a frame with one zone, their bits, and the fields of a hello."""
+"""A map of a packet: bytes of a frame with one zone, their bits, and the fields of a hello."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Field(NamedTuple):
 
 
 def draw(skin: Skin, path: Path) -> Path:
-    """Write the picture of the frames of a Skin that reports moments, and of its hello."""
+    """Draw the frames of a Skin that reports moments, and its hello."""
     canvas, widths = Canvas(624), Widths(skin.sheet)
     canvas.text(LEFT, 18, f"Frame with one zone, {skin.rows}x{skin.columns} switches: bytes in the order sent")
     whole = list(_frame(widths))
@@ -106,7 +106,6 @@ NAMES = {getattr(hello, name): name.lower() for name in _TYPES}
 
 
 def _hello(skin: Skin) -> Iterator[Field]:
-    """The fields of a hello, read from its bytes."""
     packet = hello.encode_hello(skin).strip(b"\0")
     data = cobs_decode(packet[:-CHECK_BYTES])[:-1]
     while data:

@@ -1,4 +1,4 @@
-"""The parts of the starter kit, with the time of each arrow since the switch closed."""
+"""Parts of the starter kit, with times since the switch closed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CELLS = 9
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Write the picture."""
+    """Draw the kit's skin, board and host."""
     canvas = Canvas(346)
     _skin(canvas, kit)
     _boxes(canvas, kit)
@@ -28,7 +28,6 @@ def draw(kit: Kit, path: Path) -> Path:
 
 
 def _skin(canvas: Canvas, kit: Kit) -> None:
-    """Finger, foam, switches and link, stacked."""
     left, width = SKIN
     step = width / CELLS
     canvas.text(left, 22, "robot with a skin", fontweight="bold")
@@ -67,7 +66,6 @@ def _boxes(canvas: Canvas, kit: Kit) -> None:
 
 
 def _times(canvas: Canvas, kit: Kit) -> None:
-    """Arrows between the columns, with the kit's predicted times."""
     skin, said = kit.skin, predictions.load(kit)
     times = skin.derived
 

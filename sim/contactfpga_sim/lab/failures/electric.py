@@ -58,7 +58,7 @@ LAZY_CIRCUIT = WEAKLY.replace(line_ohm=2000.0)
 
 
 def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> list[tuple[int, int]]:
-    """Random places of fingers of 2x2 cells, at least ``free`` cells apart."""
+    """Random places of 2x2 fingers, at least ``free`` cells apart."""
     spots: list[tuple[int, int]] = []
     while len(spots) < count:
         row, column = map(int, rng.integers(0, (skin.rows - 1, skin.columns - 1)))
@@ -68,7 +68,6 @@ def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> l
 
 
 def _slow(skin: Skin, circuit: Circuit, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Two fingers without common rows or columns, on slow lines."""
     found = []
     with Rig(skin) as rig:
         rig.board.settle(*lines_of(circuit, skin, most=2))
@@ -118,7 +117,7 @@ SETTLE = Knob(
 
 
 def bare(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Three fingers at corners of rectangles; one loses its switches' diodes one by one."""
+    """Outcomes of three fingers at corners of rectangles; one loses its switches' diodes one by one."""
     return [_bare(skin, int(count), _rectangle(rng, skin)[:3], rng) for _ in range(draws)]
 
 
@@ -150,7 +149,6 @@ def _bare(skin: Skin, count: int, spots: list[tuple[int, int]], rng: np.random.G
 
 
 def _still(skin: Skin, read: np.ndarray) -> Zones:
-    """The frame of a sheet with these constant readings, with its guard lines if any."""
     if not skin.guard:
         return still(skin, read)
     return still(skin, read[:-1, :-1], wiring.missed(read))
@@ -200,7 +198,6 @@ def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
 
 
 def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of zones that do not match the contacts."""
     placed = [_apart(rng, BARE, int(count)) for _ in range(draws)]
     cells = [finger(BARE, *spots) for spots in placed]
     truths = [[finger(BARE, spot) for spot in spots] for spots in placed]
@@ -208,7 +205,7 @@ def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outco
 
 
 def _scattered_cells(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of misread cells; reported if each is marked."""
+    """Outcomes of misread cells; a fault is reported if each is marked."""
     cells = [finger(BARE, *_apart(rng, BARE, int(count))) for _ in range(draws)]
     return [_marked(zones, each) for zones, each in zip(_frames(BARE_CELLS, cells), cells)]
 
@@ -244,7 +241,7 @@ GHOST = Knob(
 
 
 PATIENT, PATIENT_GUARDED = (skin.replace(settle_us=5.0) for skin in (REVERSAL, REVERSAL_GUARDED))
-"""Skins whose columns allow the time that weak switches need."""
+"""Skins whose columns allow the time of weak switches."""
 
 
 def _switch(skin: Skin, kiloohm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
@@ -290,7 +287,6 @@ DIODES_REVERSAL = dataclasses.replace(
 
 
 def _broken(skin: Skin, line: str, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes with broken lines anywhere under a contact."""
     found = []
     for _ in range(draws):
         top, left = map(int, rng.integers(0, (skin.rows - 6, skin.columns - 6)))

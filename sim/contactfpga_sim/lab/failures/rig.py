@@ -1,4 +1,4 @@
-"""A compiled board with the host's receiver on its line, in simulated time."""
+"""A compiled board with the host's receiver, in simulated time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contactfpga_sim.model.sheet.wiring import LineCuts
 
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)
-"""The sheet with guard lines, and their pins."""
+"""A sheet with guard lines, and their pins."""
 REVERSAL = REFERENCE.replace(scan="reversal", precharge_us=0.25, settle_us=0.5, release_us=0.05)
 REVERSAL_GUARDED = REVERSAL.replace(guard=True)
 
@@ -27,7 +27,7 @@ FRAME_BYTES = 28
 """Bytes of a frame of few zones; a scan that waits for the wire may be shorter."""
 
 HELD_SCANS = 5
-"""Scans that a frame is held, so that it reaches the host even if a hello intervenes."""
+"""Scans that hold a frame, so that it reaches the host even if a hello intervenes."""
 
 
 class Rig:
@@ -52,7 +52,7 @@ class Rig:
 
 
 def hello_clocks(skin: Skin) -> int:
-    """Scans whose frames the hello at power-up may displace, in clocks."""
+    """Clocks of scans whose frames the hello at power-up may displace."""
     scan = skin.derived.frame_clocks
     return scan * (math.ceil(HELLO_BYTES * 10 * skin.derived.bit_clocks / scan) + 2)
 
@@ -69,8 +69,7 @@ def still(skin: Skin, cells: np.ndarray, cuts: LineCuts | None = None) -> Zones:
 
 
 def seen(skin: Skin, frames: np.ndarray, cuts: LineCuts | None = None) -> list[Zones]:
-    """The host's frame for each of (n, rows, columns) bool frames of few zones, each pressed for some whole scans: the
-    last frame of each."""
+    """The host's last frame for each of (n, rows, columns) bool frames of few zones, pressed for some whole scans."""
     with Rig(skin) as rig:
         if cuts is not None:
             rig.board.cut(cuts.rows, cuts.columns)
@@ -93,12 +92,12 @@ def moments(cells: np.ndarray) -> tuple[int, int, int]:
 
 
 def reported(zones: Zones) -> list[tuple[int, int, int]]:
-    """The moments of a frame's zones, in order."""
+    """Moments of a frame's zones, in order."""
     return sorted((area, x, y) for area, x, y in zones.frame.moments.tolist())
 
 
 def places(zones: Zones) -> tuple[Place, ...]:
-    """The barycenters of a frame's zones, in cells."""
+    """Barycenters of a frame's zones, in cells."""
     return tuple((x / area, y / area) for area, x, y in sorted(zones.frame.moments.tolist(), key=_place))
 
 
@@ -108,7 +107,6 @@ def _place(sums: list[int]) -> tuple[float, float, int]:
 
 
 def faults(zones: Zones) -> tuple[str, ...]:
-    """Faults that a frame reports."""
     return (*sorted(zones.flags - {"fault"}), *sorted(zones.faults))
 
 

@@ -1,8 +1,7 @@
-"""Knobs of touch: close contacts, a light one, a moving one, bouncing switches, a winding arm, crossing shadows, too
-many zones.
+"""Knobs of touch: close, light and moving contacts, bouncing switches, a winding arm, crossing shadows, many zones.
 
-Fingers press a bare sheet, on which a switch closes under the middle of a contact whatever its force, and the starter
-kit's sheet with its cover.
+Fingers press a bare sheet, whose switches close under a contact's middle whatever its force, and the starter kit's
+covered sheet.
 """
 
 from __future__ import annotations
@@ -41,14 +40,13 @@ COVER = load_cover(STARTER.skin_path)
 
 
 def _middle(pitch_mm: float, rng: np.random.Generator) -> np.ndarray:
-    """Any place of a pitch near the middle of the sheet, in mm."""
     return pitch_mm * rng.uniform(7, 8, 2)
 
 
 def _pair(
     gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator, force_n: float | None = None
 ) -> Scene:
-    """Two fingers around :func:`_middle`, at any angle, each with this force."""
+    """Two fingers around :func:`_middle`, at any angle."""
     x, y = _middle(pitch_mm, rng)
     forces = {} if force_n is None else {"force_n": force_n}
     return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180), **forces))
@@ -62,7 +60,7 @@ def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generato
 
 
 def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius with this force each, on the starter kit's sheet."""
+    """Outcomes of two fingers of 8 mm radius on the starter kit's sheet."""
     skin = STARTER.skin
     scenes = (_pair(gap_mm, 8.0, skin.pitch_x_mm, rng, force_n) for _ in range(count))
     cells = np.array([scene.pressed(0.0, skin, COVER) for scene in scenes])
@@ -70,7 +68,6 @@ def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, co
 
 
 def _counted(zones: Zones, cells: np.ndarray, there: int) -> Outcome:
-    """Right if there are as many zones as contacts."""
     what = f"{plural(len(zones), 'zone')} of {plural(there, 'contact')}"
     return Outcome(len(zones) == there, faults(zones), what, cells=cells, zones=places(zones))
 
@@ -102,7 +99,6 @@ CLOSING = Knob(
 
 
 def _light(radius_mm: float, force_n: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """One finger anywhere near the middle of the starter kit's sheet."""
     skin, cells = STARTER.skin, []
     for _ in range(count):
         x, y = _middle(skin.pitch_x_mm, rng)
@@ -123,15 +119,15 @@ LIGHT = Knob(
 )
 
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
-"""Directions of motion: along columns and rows, both ways."""
+"""Directions along columns and rows, both ways."""
 
 FIRST, LAST = 2.0, 13.0
 """Start and end of a moving finger, in pitches."""
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame with the largest error of its zone at its time, for a finger of 10 N that starts at any phase;
-    infinite without exactly one zone."""
+    """The frame with the largest error of its zone, for a finger of 10 N from any phase; infinite without exactly
+    one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -186,7 +182,7 @@ BOUNCING = Skin(rows=4, columns=4, baud=6_000_000)
 
 
 def debounced(method: str) -> Skin:
-    """A sheet whose debounce times are :data:`DEBOUNCE_SCANS` scans."""
+    """A sheet with debounce times of :data:`DEBOUNCE_SCANS` scans."""
     scan_us = BOUNCING.derived.frame_clocks / BOUNCING.derived.clocks_per_us
     times = {"debounce_press_us": DEBOUNCE_SCANS * scan_us, "debounce_release_us": DEBOUNCE_SCANS * scan_us}
     return BOUNCING.replace(debounce=method, **times)
@@ -239,7 +235,7 @@ SKINS = {name: REFERENCE.replace(labeller=name) for name in LABELLERS}
 
 
 def arm(size: int, quarters: int) -> np.ndarray:
-    """(size, size) bool: an arm one cell wide that winds inward, a free cell between its turns."""
+    """(size, size) bool: an arm one cell wide that winds inward, with a free cell between turns."""
     cells = np.zeros((size, size), bool)
     y, x, (dy, dx) = 0, 0, (0, 1)
     cells[y, x] = True
@@ -252,7 +248,7 @@ def arm(size: int, quarters: int) -> np.ndarray:
 
 
 def _winding(skin: Skin, quarters: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of the winding arm, turned and mirrored at random."""
+    """Outcomes of the winding arm, randomly turned and mirrored."""
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)
@@ -310,7 +306,6 @@ CROSSING = Knob(
 
 
 def _many(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of isolated single cells."""
     cells = np.zeros((draws, skin.rows // 2, skin.columns // 2), bool)
     for each in cells:
         each.flat[rng.choice(each.size, int(count), replace=False)] = True

@@ -1,4 +1,4 @@
-"""The Skins to try: every method at every pitch under every cover, on sheets of one size."""
+"""Skins to try: every method, pitch and cover, on sheets of one size."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:
-    """The methods of a labeller; connectivity matters to exact ones."""
+    """Methods of a labeller; connectivity matters to exact ones."""
     settings = {"labeller": labeller.name, "report": "moments"}
     return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
 
 
 METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
-"""Methods to try. On-board division is not among them: it costs more LUT4 and saves only microseconds per zone."""
+"""Methods to try, without on-board division: it costs more LUT4 and saves only microseconds per zone."""
 
 COARSEST_MM, FINEST_MM = 32.0, 4.0
 """Range of pitches, with every whole number of columns."""
@@ -41,9 +41,8 @@ class Candidate:
     """Differences from the requested Skin, sorted by name."""
     skin: Skin | None
     refusal: str = ""
-    """Error message of Skin or Cover."""
+    """Error of Skin or Cover."""
     cover: Cover | None = None
-    """Cover through which contacts press."""
 
 
 def candidates(
@@ -56,7 +55,7 @@ def candidates(
     covers: Faces = BARE,
 ) -> list[Candidate]:
     """``base`` with each pitch (x, y) near the given ones that divides the sheet, each cover, method, scan and baud
-    rate. Default ``scans``: those that fit the columns of ``base``, with or without precharge."""
+    rate. Default ``scans``: those that fit ``base``'s columns, with or without precharge."""
     if scans is None:
         scans = [name for name, scan in SCANS.items() if not scan.waits or base.precharge_us]
     found = {}

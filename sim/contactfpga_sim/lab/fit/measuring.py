@@ -1,4 +1,4 @@
-"""Errors and times of one Skin on the scenes of one source, cached by their inputs."""
+"""Errors and times of a Skin on scenes of one source, cached by their inputs."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from contactfpga_sim.lab.fit.sources import Recorded, Source
 from contactfpga_sim.lab.fit.trial import FitTask
 
 Values = dict[str, list[float]]
-"""By metric, a value per scene or per fingertip touch."""
+"""By metric, a value per scene or fingertip touch."""
 
 
 def errors_of(
     task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, others: bool
 ) -> list[dict[str, Interval]]:
     """Errors by metric of each Skin's zones; all Skins have the same sheet and cover. ``others``: on all scenes
-    reserved for the report; else on as many as a decision needs. A recording has no chance in it: all frames count."""
+    reserved for the report, else on as many as a decision needs. All frames of a recording count."""
     count = source.most(task.count)
     ends = [count] if others or isinstance(source, Recorded) else racing.ends(count)
     values: list[Values] = [{} for _ in skins]
@@ -71,7 +71,7 @@ def _compared(looks: Sequence[Look], skin: Skin) -> Values:
 
 
 def exact(skin: Skin) -> bool:
-    """Whether its zones are exactly the connected pieces, and so depend on connectivity alone."""
+    """Whether zones are exactly the connected pieces, and so depend on connectivity alone."""
     return skin.report == "cells" or (skin.report == "moments" and labellers.find(skin.labeller).exact)
 
 

@@ -1,7 +1,7 @@
 """Sources of scenes: families, built-in scenes, scene files and recordings, one scene per number.
 
-Scenes depend on the source's content and the number only, never on name or order. Numbers below a count are for
-choosing, later ones for the report.
+Scenes depend on the source's content and the number, not on name or order. Numbers below a count are for choosing,
+later ones for the report.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, Scene
 
 SHIFT_MM = 10.0
-"""Largest random shift of a built-in scene along x and y."""
+"""Largest random shift of a built-in scene along an axis."""
 
 SECONDS = 1.0
-"""A built-in scene is sampled at a random instant of its first second."""
+"""A built-in scene is sampled at a random instant of this time."""
 
 COUNT = 500
 """Default number of choosing scenes."""
@@ -43,7 +43,7 @@ class Source(abc.ABC):
     """Scenes to choose a Skin with, and others to report."""
 
     def size_mm(self) -> Size | None:
-        """Sheet size that the scenes need; None: any."""
+        """Sheet size of the scenes; None: any."""
         return None
 
     def most(self, count: int) -> int:
@@ -61,7 +61,7 @@ class Source(abc.ABC):
     def cells(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[np.ndarray]:
-        """The pressed (R, C) bool cells of these scenes, without the true contacts."""
+        """Pressed (R, C) bool cells of these scenes, without true contacts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +114,7 @@ class BuiltIn(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Shifted:
-    """A time-dependent value, moved."""
+    """A moved time-dependent value."""
 
     value: Value
     by: float
@@ -129,7 +129,7 @@ def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
 
 @dataclasses.dataclass(frozen=True)
 class File(Placed):
-    """The contacts of a scene file."""
+    """Contacts of a scene file."""
 
     says: SceneFile
 
@@ -143,8 +143,8 @@ class File(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Recorded(Source):
-    """A recording: cells of one sheet without contacts. The truth is their connected pieces, by the requested Skin's
-    connectivity. Choosing scenes are from its first half, report scenes from the second, evenly spaced."""
+    """A recording of one sheet's cells. The truth is their connected pieces, by the requested Skin's connectivity.
+    Choosing scenes are from the first half, report scenes from the second, evenly spaced."""
 
     path: str
     digest: str
@@ -152,7 +152,6 @@ class Recorded(Source):
 
     @property
     def recording(self) -> Recording:
-        """The file's recording."""
         return _recording(self.path, self.digest, self.threshold)
 
     def size_mm(self) -> Size | None:
@@ -183,8 +182,7 @@ def _recording(path: str, digest: str, threshold: float | None) -> Recording:
 
 
 def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
-    """A source by the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a
-    recording.
+    """A source by name of a family or built-in scene, or by path: .toml of a scene file, .npz or .npy of a recording.
 
     ``seed`` of the places replaces the file's. ``threshold``: above it a recording's numbers are pressed. Families take
     precedence over scenes. Raises ValueError for anything else.

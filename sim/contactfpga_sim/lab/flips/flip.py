@@ -19,7 +19,7 @@ from contactfpga_sim.model.sheet.matrix import Contention
 SETTLED_STEPS = 4
 """Steps that the driver still hears once the board has recovered."""
 QUIET_S = {"always": 0.02, "on_change": 0.12}
-"""Longest silence that is not reported: frames or keep-alives are due earlier."""
+"""Longest unreported silence: frames or keep-alives are due earlier."""
 COUNTED = ("lost", "unexplained", "restarts", "foreign_skin", "foreign_version", "skin_changes", "unknown_kinds")
 """Driver counters that stay 0 on a good line."""
 
@@ -34,32 +34,30 @@ class Flip(NamedTuple):
 
 
 class FlipOutcome(NamedTuple):
-    """Outcome of a flip."""
-
     name: str
     memory: bool
     outcome: Outcome
     kind: str
-    """The error, or the means by which it is reported."""
+    """The error, or the means that reports it."""
     frames: int
-    """Number of silently wrong frames."""
+    """Silently wrong frames."""
     seconds: float
-    """Time from the first silently wrong frame until the next right one."""
+    """From the first silently wrong frame to the next right one."""
     gone_s: float
-    """Time of the board's full recovery; infinite if later than the study."""
+    """Time of full recovery; infinite if later than the study."""
     fights: int = 0
     """Clocks in which a column was driven against a row."""
 
 
 def module(name: str) -> str:
-    """The stage that a register or memory belongs to."""
+    """Stage of a register or memory."""
     parts = name.split(".")
     inner = parts[2:] if parts[0] == "dual" and len(parts) > 2 else parts
     return "comparison" if parts[0] == "dual" and len(parts) <= 2 else inner[0].split("$")[0]
 
 
 def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Flip]:
-    """Random flips, uniform over the bits of all registers, or of all memories, and over clocks."""
+    """Random flips, uniform over clocks and the bits of all registers, or all memories."""
     rng = np.random.default_rng([seed, memory])
     places = reference.board.places
     bits = np.array([place.bits * (place.memory == memory) for place in places])
@@ -74,7 +72,7 @@ def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Fli
 
 
 def follow(reference: Reference, flip: Flip) -> FlipOutcome:
-    """Flip the bit and judge the outcome."""
+    """Flip a bit and judge the outcome."""
     before = reference.board.fights
     listener, heard, gone_s = _run(reference, flip)
     return _judged(reference, flip, listener, heard, gone_s)._replace(fights=reference.board.fights - before)
@@ -132,13 +130,11 @@ def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFram
 
 
 def _advance(board: CompiledBoard, clocks: int) -> None:
-    """Run on, counting clocks in which pins are driven against each other."""
     with contextlib.suppress(Contention):
         board.run(clocks)
 
 
 def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame], gone_s: float, begun_s: float) -> str:
-    """The first way by which the host notices."""
     stats = listener.conversation.stats
     if listener.surprises:
         return "another Skin"

@@ -1,4 +1,4 @@
-"""The run without a flip: the reference for all others, with many entry points."""
+"""The run without a flip, with many entry points for others."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class DeliveredFrame(NamedTuple):
     """A frame that the driver delivered."""
 
     time_s: float
-    """Arrival of its last byte."""
+    """Arrival of the last byte."""
     said: touches.Said
     late_s: float
-    """Delay after its own scan time."""
+    """Delay after the scan."""
     flagged: bool
     restarts: int = 0
-    """Board restarts by the driver's count; board time restarts with each."""
+    """Board restarts by the driver's count; each restarts board time."""
 
 
 @dataclasses.dataclass
@@ -53,7 +53,7 @@ class Listener:
         return cls(Conversation("the board", expected=skin, rng=random.Random(1)))
 
     def hear(self, events: np.ndarray, clock_hz: int) -> list[DeliveredFrame]:
-        """Feed bytes as they arrived; each packet is delivered with its delimiter."""
+        """Feed bytes as they arrive; each packet is delivered with its delimiter."""
         data = events["data"].astype(np.uint8)
         ends = np.flatnonzero(data == framing.DELIMITER) + 1
         found: list[DeliveredFrame] = []
@@ -90,7 +90,7 @@ class Step(NamedTuple):
 class Reference:
     """A Skin's board with moving touches, from power-up until the last flip is over.
 
-    Each instance has a board of its own, ``board``, for flips.
+    Each instance has its own ``board`` for flips.
     """
 
     def __init__(self, skin: Skin):
@@ -116,7 +116,7 @@ class Reference:
 
     @property
     def slack_s(self) -> float:
-        """Allowed time shift of frames at another scan phase: two scans and a hello."""
+        """Allowed shift of frames at another scan phase: two scans and a hello."""
         return self.late_s[1] - self.late_s[0] + 0.5e-3
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The tables of docs/flips.md, and its curve of silently wrong flips against a design's cost."""
+"""Tables of docs/flips.md, and the curve of silently wrong flips against cost."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ KINDS = ("design", "outcome", "by", "flips")
 REGISTERS, MEMORIES = 400, 100
 """Flips of each design."""
 LONGEST_S = 25 * 60.0
-"""Time after which no more flips begin."""
+"""Time after which no flips begin."""
 LONG_S = 0.005
-"""Limit above which a fault spoils more than a frame or two."""
+"""Time above which a fault spoils more than a frame or two."""
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 """Outcomes in words."""
 
@@ -97,7 +97,7 @@ def _worst(rows: Sequence[Row]) -> str:
 
 
 def designs_table(found: FlipResults) -> str:
-    """A row for each design's registers, and one for its memories."""
+    """A row per design for registers, one for memories."""
     lines = []
     for design in found.designs:
         for memory, bits in ((False, design.registers), (True, design.memories)):
@@ -128,7 +128,7 @@ def _interval(share: summary.Share) -> str:
 
 
 def modules_table(found: FlipResults) -> str:
-    """Registers of the plain designs, by module."""
+    """Registers of plain designs, by module."""
     plain = [row for row in found.rows if not row.design.endswith("dual") and not row.found.memory]
     lines = []
     for module, some in summary.by(plain, summary.stage).items():
@@ -140,7 +140,7 @@ def modules_table(found: FlipResults) -> str:
 
 
 def ways_table(found: FlipResults) -> str:
-    """Errors and reports of each design."""
+    """Errors and reports by design."""
     lines = []
     for design in found.designs:
         some = [row for row in found.rows if row.design == design.name and row.found.outcome != "masked"]
@@ -151,7 +151,6 @@ def ways_table(found: FlipResults) -> str:
 
 
 def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
-    """Draw a line for each design, each plain one above its version with two copies."""
     import matplotlib as mpl
 
     plain = [design for design in designs if not design.name.endswith(", dual")]

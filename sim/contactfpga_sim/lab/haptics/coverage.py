@@ -1,4 +1,4 @@
-"""Simulated contacts on a flat sheet: a push rises, switches close, units read; the estimate against the truth."""
+"""Simulated contacts on a flat sheet: a push rises, switches close, units read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from contactfpga.skin.sheet import Sheet
 
 LINES = 16
 MIDDLE = 7
-"""Contacts are in the cell from this switch to the next."""
+"""The switch whose cell to the next holds the contacts."""
 
 POINT, PATCH = Model("halfspace", "point"), Model("bonded", "patch")
 BALL = Ball(0.005, 4.6e5)
@@ -29,7 +29,7 @@ RING_M = 0.075
 
 @functools.cache
 def reach_of(model: Model, ball: Ball = BALL) -> Reach:
-    """The reach of 5 mm of foam over the prototype's switches."""
+    """Reach of 5 mm of foam over the prototype's switches."""
     return Reach(PaddedSheet(Switch(), 0.005, ball), model)
 
 
@@ -54,42 +54,40 @@ class CoverageCase:
     assumed: Model = POINT
     true: Model = POINT
     true_spread: float | None = None
-    """True spread; None: as assumed."""
+    """None: as assumed."""
     true_sigma_n: float | None = None
     drift_n: float = 0.0
     """Drift of one unit."""
     ball: Ball = BALL
     """Ball of the true patch."""
     late_n: float = 0.0
-    """Rise of the push until it is measured."""
+    """Rise of the push until measured."""
     inside_mm: float | None = None
-    """Distance of contacts inside the outermost column; None: in the middle."""
+    """Distance inside the outermost column; None: in the middle."""
     wrong: str = ""
     """The violated assumption."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Coverage:
-    """Results over all contacts that closed a switch."""
+    """Results over contacts that closed a switch."""
 
     count: int
     rms_m: float
     barycenter_m: float
     """RMS error of the barycenter."""
     covered: float
-    """Share of contacts within the stated radius."""
+    """Share within the stated radius."""
     radius_m: float
     """Median stated radius."""
     theory_m: float
-    """Median of the smallest radius that noise allows; NaN without a formula."""
+    """Median smallest radius that noise allows; NaN without a formula."""
     disagreed: float
-    """Share of contacts for which the method reported that no place explains all."""
+    """Share for which the method reported that no place explains all."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pressed:
-    """One simulated contact."""
-
     x_m: float
     y_m: float
     push_n: float
@@ -99,7 +97,7 @@ class Pressed:
 
 
 def locator(case: CoverageCase) -> Locator:
-    """The locator under the case's assumptions."""
+    """Locator under the case's assumptions."""
     sheet = Sheet(
         rows=LINES,
         columns=LINES,
@@ -164,13 +162,13 @@ def _closings(case: CoverageCase, rng: np.random.Generator, one: Pressed) -> lis
 
 
 def by_barycenter(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Static estimate from the known push."""
+    """Static estimate from the push."""
     rows, columns = np.mean(one.cells, axis=0) * 1e-3 * case.pitch_mm
     return finder.barycenter(float(columns), float(rows), _measured(case, rng, one.push_n)), math.nan
 
 
 def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Static estimate from cells and known push."""
+    """Static estimate from cells and push."""
     return finder.locate(one.cells, _measured(case, rng, one.push_n)), math.nan
 
 
@@ -209,7 +207,7 @@ def _middle_m(case: CoverageCase) -> float:
 
 
 def bound_m(case: CoverageCase, one: Pressed) -> float:
-    """The smallest 95 % radius that noise allows, from the slope of each closing's force over the place (Cramér-Rao);
+    """Smallest 95 % radius that noise allows, from the slope of each closing's force over the place (Cramér-Rao);
     NaN with fewer than two closings, or with two in line with the contact."""
     reach, pitch = reach_of(case.assumed), 1e-3 * case.pitch_mm
     if not case.force_sigma_n and not case.spread:

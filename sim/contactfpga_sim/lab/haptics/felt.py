@@ -1,7 +1,7 @@
 """End to end: contacts press a sheet on three units, the compiled gateware sends, driver and haptics answer.
 
-A push rises as the arm's does, 1.6 N per ms. Once the first switch has closed, each method repeatedly estimates the
-place from the host's data so far.
+A push rises as the arm's does, 1.6 N per ms. Each method repeatedly estimates the place from the data since the first
+switch closed.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from contactfpga_sim.model.scenes.scene import Scene
 RATE_N_S = 1600.0
 MOST_N = 30.0
 LEAD_S = 1.5e-3
-"""Time from power-up until the first switch closes; the push begins earlier, without effect on the answers."""
+"""Time from power-up until the first switch closes; the push begins earlier without effect."""
 LOOK_S = 20e-6
 RING_M = 0.075
 GAIN_N = 0.02
 ZERO = 300.0
 
 TIMES_S = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 15e-3)
-"""Times after the first switch closed."""
+"""Times after the first closing."""
 
 METHODS = ("barycenter", "center of pressure", "closings", "closings + center of pressure")
 
@@ -48,7 +48,7 @@ class Setting:
     pitch_mm: float
     unit_sigma_n: float = 0.05
     spread: float = 0.0
-    """Relative spread of the switches' thresholds."""
+    """Relative spread of thresholds."""
     lines: int = 16
 
     @property
@@ -78,23 +78,22 @@ SETTINGS = (
 
 @dataclasses.dataclass(frozen=True)
 class Touching:
-    """A point force on the sheet whose push rises."""
+    """A point force whose push rises."""
 
     setting: Setting
     place_m: Floats
-    """Place on the sheet in m, (2,)."""
+    """(2,) place on the sheet."""
     seed: int
 
     @functools.cached_property
     def closing_n(self) -> Floats:
-        """(rows, columns): the push in N that closes each switch."""
+        """(rows, columns) push in N that closes each switch."""
         along = 1e-3 * self.setting.pitch_mm * np.arange(self.setting.lines)
         x, y = np.meshgrid(along, along)
         spread = 1 + self.setting.spread * np.random.default_rng([self.seed, 7]).standard_normal(x.shape)
         return reach_of(POINT).closing_n(np.hypot(x - self.place_m[0], y - self.place_m[1])) * np.maximum(spread, 0.1)
 
     def push(self, seconds: float) -> float:
-        """Push in N."""
         return min(MOST_N, max(0.0, float(self.closing_n.min()) + RATE_N_S * (seconds - LEAD_S)))
 
     def pressed(self, seconds: float) -> np.ndarray:
@@ -119,7 +118,7 @@ class Touching:
 
 @dataclasses.dataclass
 class FrameArrival:
-    """A frame, with the host times of it and its readings."""
+    """A frame, with host times of it and of its readings."""
 
     zones: Zones
     came_s: float
@@ -127,7 +126,6 @@ class FrameArrival:
 
 
 def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
-    """All frames until this time."""
     found: list[FrameArrival] = []
     open_ones: list[FrameArrival] = []
     with contactfpga.open(touching.board(), touching.setting.skin) as board:
@@ -142,12 +140,12 @@ def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
 
 
 def ramp(setting: Setting, seed: int) -> Touching:
-    """One contact anywhere in a cell in the middle."""
+    """One contact anywhere in a middle cell."""
     return Touching(setting, (MIDDLE + np.random.default_rng(seed).random(2)) * 1e-3 * setting.pitch_mm, seed)
 
 
 def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> dict[str, list[float]]:
-    """Errors in m of one contact: for each method at each of these rising times; NaN without an answer."""
+    """Errors in m of one contact, by method at these rising times; NaN without an answer."""
     touching, cells = ramp(setting, seed), setting.cells
     frames = heard(touching, LEAD_S + times_s[-1] + 0.2e-3)
     assert cells.noise.covariance is not None
@@ -171,7 +169,7 @@ def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> d
 def _places(
     finder: Locator, cells: LoadCells, watch: ClosingWatch, came: list[Zones], known: list[Zones]
 ) -> dict[str, tuple[float, float] | None]:
-    """Place on the sheet in m by each method."""
+    """Place on the sheet in m, by method."""
     zone = came[-1][0] if came and len(came[-1]) else None
     coarse = None if zone is None or zone.x_mm is None else (1e-3 * zone.x_mm, 1e-3 * (zone.y_mm or 0.0))
     center = None
@@ -191,8 +189,6 @@ def _places(
 
 @dataclasses.dataclass(frozen=True)
 class PairForces:
-    """Estimates for two contacts."""
-
     zones: int
     off_n: tuple[float, ...]
     """Error of each push, if there are two zones."""
@@ -204,12 +200,12 @@ KINDS = POINTS, AT_ONCE, ONE_FIRST = ("point", FINGER, f"{FINGER}, one of them a
 FIRST_S = 0.025
 """Time for which the first contact is alone."""
 BOTH = 4
-"""Frames of both contacts, the last of which counts."""
+"""Frames of both contacts, of which the last counts."""
 
 
 def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> PairForces:
-    """Two contacts at this distance at a random place and angle of the sheet of 10 mm, and their estimated pushes.
-    Points are where each alone closes a switch; fingers, wider than the pitch, are anywhere."""
+    """Pushes of two contacts at a distance, at a random place and angle of the sheet of 10 mm. Points are where each
+    alone closes a switch; fingers, wider than the pitch, are anywhere."""
     setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
     near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == POINTS else math.inf
@@ -240,7 +236,7 @@ def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) ->
 
 
 def pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Two places in mm, each nearer than ``near_mm`` to a switch."""
+    """Two places in mm, each within ``near_mm`` of a switch."""
     pitch = setting.pitch_mm
     while True:
         turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2

@@ -1,4 +1,4 @@
-"""Tables of docs/kits.md and of the README."""
+"""Tables of docs/kits.md and the README."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from contactfpga_sim.lab.spread import Spread
 from contactfpga_sim.lab.usb import BridgeSettings
 
 NAMES = ("starter", "fast")
-"""Names in the tables' order."""
 SEEDS = (1, 2, 3, 4, 5)
 """Seeds of place and route; the slowest counts."""
 COVER = "| run, 6.4 mm, tiles |"
@@ -34,8 +33,6 @@ ARM_PAPER = "| flush, point force | 10 | 1 | 5 |"
 
 
 class KitFigures(NamedTuple):
-    """Computed figures of a kit."""
-
     kit: Kit
     finger: Finger
     built: tuple[placed.Report, ...]
@@ -105,14 +102,13 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
 
 
 def _of_page(page: str, start: str, column: int) -> str:
-    """A cell of the table row with this beginning, up to a semicolon."""
+    """Cell of the table row with this beginning, up to a semicolon."""
     text = Path("docs", page).read_text(encoding="utf-8")
     found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
     return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
 
 
 def _worst_force(start: str) -> str:
-    """Worst and mean force of an arm's touches by UART."""
     text = Path("docs/arm.md").read_text(encoding="utf-8")
     line = next(line for line in text.splitlines() if line.startswith(start))
     mean, worst = line.strip("|").split("|")[5].split(" / ")
@@ -120,7 +116,7 @@ def _worst_force(start: str) -> str:
 
 
 def times_table(found: list[KitFigures]) -> str:
-    """Each stage of each kit."""
+    """Stages of each kit."""
     return writer.table(
         ("kit", "stage", "median, us", "99 %, us", "worst, us"),
         (writer.line(row) for one in found for row in _stages(one)),
@@ -140,7 +136,7 @@ def _stages(one: KitFigures) -> Iterator[tuple[str, ...]]:
 
 
 def built_table(found: list[KitFigures]) -> str:
-    """FPGA resources of each kit; Fmax is the slowest of :data:`SEEDS`."""
+    """FPGA resources of each kit; the slowest Fmax of :data:`SEEDS`."""
     lines = []
     for one in found:
         first, slowest = one.built[0], min(one.built, key=lambda report: report.fmax_mhz)
@@ -200,7 +196,7 @@ def _reversal(skin: Skin) -> Skin:
 
 
 def parts_table() -> str:
-    """Parts for each kit: the sheet's by count, and those of kit.toml."""
+    """Parts of each kit: the sheet's by count, and those of kit.toml."""
     lines = []
     for name in NAMES:
         kit = kits.kit(name)
@@ -216,7 +212,7 @@ def parts_table() -> str:
 
 
 def predictions_table() -> str:
-    """The kits' newest predictions side by side."""
+    """The kits' newest predictions."""
     both = {name: predictions.load(kits.kit(name)) for name in NAMES}
     lines = []
     for key in dict.fromkeys(key for found in both.values() for key in found):

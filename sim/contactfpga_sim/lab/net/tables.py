@@ -1,4 +1,4 @@
-"""The tables and the picture of docs/net.md."""
+"""Tables and picture of docs/net.md."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)
 GROWTH_MS = 10.0
 LINE_BYTES = 54 + 12
-"""Approximate overhead of a message: Ethernet, IP, TCP and Zenoh's header."""
+"""Approximate overhead of a message: Ethernet, IP, TCP and Zenoh."""
 GIGABIT = 1e9 / 8
 
 
 @functools.cache
 def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
-    """One measurement per run of this program. ``full`` has no default, since the cache distinguishes calls without
-    it."""
+    """One measurement per run of this program. The cache distinguishes calls without ``full``, so it has no default."""
     return load.measure(links, batch_ms / 1000, full)
 
 
@@ -57,7 +56,7 @@ def _ends(found: load.NetworkRun) -> tuple[float, float, float]:
 
 
 def thousand_table() -> str:
-    """Estimate for a thousand links, measured and computed."""
+    """Estimate for a thousand links."""
     found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
     frame = len(load.frames(1)[0])
@@ -94,13 +93,13 @@ def _ms(latency: tuple[float, float]) -> str:
 
 
 WHOLE = Path("docs/tables/net-links.csv")
-"""The whole table of links."""
+"""File of the whole table."""
 ENDS = {"publisher": style.BLUE, "router": style.VERMILLION, "reader": style.GREEN}
 SHARES = {"half arrive (p50)": style.BLUE, "99 % arrive (p99)": style.VERMILLION}
 
 
 def draw(folder: Path) -> Path:
-    """CPU time and latency by number of links, from :data:`WHOLE`."""
+    """CPU time and latency over links, from :data:`WHOLE`."""
     import matplotlib
 
     with WHOLE.open(newline="", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""Boards on pseudo-terminals in a process of their own, which notes the time before writing each frame."""
+"""Boards on pseudo-terminals in their own process, which notes the time before writing each frame."""
 
 from __future__ import annotations
 
@@ -18,13 +18,12 @@ ALIVE_S = 0.25
 
 
 class Pace(NamedTuple):
-    """Timing of the written frames."""
+    """Timing of written frames."""
 
     per_second: int
     at_once: int
     """Frames per write, as a USB port delivers them."""
     seconds: float
-    """Duration of a stream."""
 
     @property
     def step_us(self) -> int:
@@ -57,11 +56,11 @@ class Feeder:
         self.first = context.RawArray("q", boards)
         """Number of each board's first frame after the start."""
         self.written_s = context.RawArray("d", count)
-        """Time on ``time.monotonic`` just before each frame was written to the first board."""
+        """``time.monotonic`` just before each frame's write to the first board."""
         self.end = context.RawValue("q", -1)
         """Frames written by each board; -1: still writing."""
         self.greeted = context.RawValue("q", 0)
-        """Number of answered requests."""
+        """Answered requests."""
         self.process = context.Process(target=self._run, daemon=True)
         self.process.start()
 
@@ -126,7 +125,6 @@ class Feeder:
         self.go.set()
 
     def close(self) -> None:
-        """End the boards."""
         self.process.kill()
         self.process.join()
         for descriptor in self._masters + self._slaves:

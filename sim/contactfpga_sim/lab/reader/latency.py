@@ -1,4 +1,4 @@
-"""From the last byte to user code, with a thread in C or in Python that reads, beside a C program on the same line."""
+"""Delay from the last byte to user code, with a reading thread in C or Python, beside a C program on the same line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OPEN_S = 60.0
 ENDED_S = 0.8
 """Silence that ends a stream."""
 BEGUN = 20
-"""Frames after which a stream has begun; a few come while the board makes the others."""
+"""Frames that begin a stream; some come while the board makes others."""
 READERS = ("native", "thread")
 
 
@@ -34,7 +34,7 @@ class Found(NamedTuple):
     """Result of one stream."""
 
     us: np.ndarray
-    """From the last byte's write to user code, for each returned call."""
+    """From the last byte's write to user code, by returned call."""
     calls: float
     """Returned calls per second."""
 
@@ -93,7 +93,6 @@ def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
 
 @contextlib.contextmanager
 def computing(busy: bool) -> Iterator[None]:
-    """If ``busy``, a thread that only computes."""
     done: list[bool] = []
 
     def compute() -> None:

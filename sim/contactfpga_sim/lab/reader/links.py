@@ -1,4 +1,4 @@
-"""Load of many links of 1 kHz on the process that uses them, with either reader."""
+"""Load of many links of 1 kHz on the process that uses them."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from contactfpga_sim.lab.speed.driver import SKIN
 
 PACE = Pace(1_000, 1, 3.0)
 LOOP_S = 0.01
-"""How often each link is looked at."""
+"""Interval of looks at each link."""
 
 
 class Share(NamedTuple):
-    """What it takes."""
+    """Load and age of links."""
 
     used: float
-    """Of a core, by the process that uses the links, with all its threads."""
+    """Core share of the process with all its threads."""
     came: float
-    """Share of the frames that arrived while they were sent."""
+    """Share of frames that arrived while sent."""
     age_ms: float
     """Median age of a link's newest frame when taken."""
 
@@ -61,7 +61,6 @@ def _opened(port: str, reader: str) -> contactfpga.Board:
 
 
 def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str, feeder: Feeder) -> float:
-    """Age of a link's newest frame."""
     if call == "latest":
         zones = board.latest(10.0)
         time_us, arrived_s = zones.time_us, zones.arrived_s

@@ -1,4 +1,4 @@
-"""The figures of docs/recordings.md."""
+"""Tables of docs/recordings.md."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def stream(rate: int) -> Path:
 
 
 def sizes_table() -> str:
-    """Sizes (machine-independent, but for chunk ends) and speeds (of this machine)."""
+    """Sizes (machine-independent but for chunk ends) and this machine's speeds."""
     head = ("frames/s", "messages", "bytes per frame", "MB an hour", "frames per CPU second")
     rows = [head]
     with compute.folder() as place:
@@ -64,7 +64,7 @@ def reading_table() -> str:
 
 
 def loss_table() -> str:
-    """Loss when killed at several moments."""
+    """Loss by moment of the kill."""
     with compute.folder() as place:
         found = [compute.loss(stream(10_000), 0.5 + 0.237 * kill, place / str(kill)) for kill in range(KILLS)]
     rows = [

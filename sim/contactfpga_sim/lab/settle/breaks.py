@@ -1,4 +1,4 @@
-"""Knobs of the sheet's circuit under precharge, moved until a time or a level is missed."""
+"""Knobs of the circuit under precharge, moved until a time or level is missed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ def sweeps(name: str) -> dict[str, Sweep]:
 
 
 def _settled(circuit: Circuit, names: Sequence[str], size: int = SIZE) -> Outcome:
-    """Whether the circuit settles in time under each of these patterns."""
     found = []
     for name in names:
         phase = phases.settle(Network(circuit, patterns.named(size, size)[name]), Levels.of(circuit))
@@ -111,4 +110,4 @@ KNOBS = {
         ),
     )
 }
-"""Every knob by its name."""
+"""Knobs by name."""

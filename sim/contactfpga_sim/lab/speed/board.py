@@ -1,6 +1,6 @@
-"""Speed of the virtual board on this machine, over some Skins: `python -m contactfpga_sim.lab.speed.board`.
+"""Speed of the virtual board on this machine: `python -m contactfpga_sim.lab.speed.board`.
 
-It counts CPU time, as if on a core of its own, of the best of some runs. No test holds the figures.
+CPU time of the best of some runs. No test holds the figures.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ SKINS = {
 RUNS = 10
 
 RUN_S = 0.02
-"""Board time of a run."""
 
 
 def cycles_per_second(skin: Skin, scene: str = "two_fingers") -> float:

@@ -26,7 +26,7 @@ SKIN = contactfpga.Skin(clock_hz=3_000_000, baud=750_000, settle_us=25.0)
 
 REOPENED_S = 60.0
 GROWTH_MB = 30.0
-"""Allowed growth after the first tenth of the time, for Python itself."""
+"""Growth allowed to Python after the first tenth of the time."""
 
 
 class Soak:
@@ -90,7 +90,7 @@ class Soak:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run it; returns 1 if something was wrong."""
+    """Run it; return 1 if something was wrong."""
     parser = argparse.ArgumentParser(prog="make soak", description=__doc__)
     parser.add_argument("--seconds", type=numbers.SECONDS, default=3600.0, help="how long (default: an hour)")
     seconds = parser.parse_args(arguments).seconds
@@ -125,7 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _megabytes() -> float:
-    """Resident memory; 0 if the system does not report it."""
+    """Resident memory; 0 if unreported."""
     status = Path("/proc/self/statm")
     return int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6 if status.exists() else 0.0
 

@@ -20,7 +20,7 @@ from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_o
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)
-"""A wide sheet for long slides."""
+"""A sheet for long slides."""
 
 Y_MM = 73.0
 HZ = 1000.0
@@ -29,38 +29,38 @@ MOST = 480
 """Most placements per value; undecided ones count as broken."""
 
 Ids = list[list[int]]
-"""Ids from left to right, frame by frame, without frames that lack a zone."""
+"""Ids from left to right by frame, without frames that lack a zone."""
 
 Made = tuple[Zones, ...]
 
 Rates = list[tuple[float, rated.Rate]]
-"""Number of correct placements per value."""
+"""Correct placements by value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One parameter, moved until ids are lost."""
+    """A parameter, moved until ids are lost."""
 
     name: str
     title: str
     axis: str
     """The moved quantity, with its unit."""
     values: tuple[float, ...]
-    """Values in the order of the sweep."""
+    """Values in sweep order."""
     scene: Callable[[float, Random], Made]
-    """The frames for a value, at a random placement."""
+    """Frames for a value, at a random placement."""
     right: Callable[[Ids, float], bool]
     """Whether the ids are those of the contacts."""
     methods: Mapping[str, Callable[[], Update]]
     closed: Mapping[str, str]
-    """Break points by formula, for the methods that have one."""
+    """Break points by formula, by method."""
     helps: str
     """The remedy."""
 
     def rates(
         self, value: float, methods: Iterable[str], seed: int = 0, looks: Sequence[int] = rated.LOOKS
     ) -> dict[str, rated.Rate]:
-        """Correct placements at a value, for each method, on the same placements; as many as the decision needs."""
+        """Correct placements at a value, by method, on the same placements; as many as the decision needs."""
         hits = dict.fromkeys(methods, 0)
         found: dict[str, rated.Rate] = {}
         for number in range(MOST):
@@ -75,7 +75,7 @@ class Knob:
         return found
 
     def sweep(self, seed: int = 0) -> dict[str, Rates]:
-        """Rates for each method, value by value until too few are correct."""
+        """Rates by method, value by value until too few are correct."""
         found: dict[str, Rates] = {method: [] for method in self.methods}
         for value in self.values:
             whole = [method for method, rates in found.items() if not rates or holds(rates[-1][1])]
@@ -90,14 +90,14 @@ def holds(rate: rated.Rate) -> bool:
 
 
 def held_until(rates: Rates) -> float | None:
-    """The last value up to which enough are correct; None if there is none."""
+    """Last value up to which enough are correct, or None."""
     held = [value for value, rate in rates if holds(rate)]
     return held[-1] if held else None
 
 
 @functools.cache
 def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
-    """:meth:`Knob.sweep` of the knob of this name, cached."""
+    """:meth:`Knob.sweep` of this knob, cached."""
     key = repr((kept.made_by(__name__), name, seed))
 
     def new() -> dict[str, list[tuple[float, int, int]]]:
@@ -118,13 +118,12 @@ def sweeps() -> dict[str, dict[str, Rates]]:
 
 
 def _moved(rng: Random) -> tuple[float, float]:
-    """Random shift of a scene, in mm."""
     x, y = rng.uniform(0, SKIN.pitch_x_mm), rng.uniform(0, SKIN.pitch_y_mm)
     return float(x), float(y)
 
 
 def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
-    """(n, rows, columns) bool: the switches under a finger at n places, without a cover."""
+    """(n, rows, columns) bool: switches under a finger at n places, without a cover."""
     columns, rows = WIDE.pitch_x_mm * np.arange(WIDE.columns), WIDE.pitch_y_mm * np.arange(WIDE.rows)
     across, along = columns - xs_mm[:, None, None], rows[:, None] - y_mm
     closed: np.ndarray = across**2 + along**2 <= FINGER_MM**2
@@ -132,7 +131,6 @@ def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
 
 
 def _frames(times: Sequence[float], cells: np.ndarray) -> Made:
-    """The frames of (n, rows, columns) bool cells."""
     return tuple(zones_of(one, round(now * 1e6), WIDE)[0] for now, one in zip(times, cells))
 
 
@@ -158,7 +156,7 @@ def _one_id(ids: Ids, _value: float) -> bool:
 
 
 def _slide(step_mm: float, rng: Random, from_rest: bool) -> Made:
-    """Ten frames at this speed, optionally after ten of acceleration."""
+    """Ten frames at this speed, ``from_rest`` after ten of acceleration."""
     steps = [step_mm * (number + 1) / 10 for number in range(10 if from_rest else 0)] + [step_mm] * 9
     xs = [10.0]
     for step in steps:
@@ -328,4 +326,4 @@ LOST = Knob(
 )
 
 KNOBS = {knob.name: knob for knob in (SPEEDING, AT_ONCE, MEET, CROSS, BOUNCE, STUCK, LOST)}
-"""Every knob by its name."""
+"""Knobs by name."""

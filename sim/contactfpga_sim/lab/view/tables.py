@@ -1,4 +1,4 @@
-"""The figures of docs/view.md and the picture of the view, from a headless browser."""
+"""Figures of docs/view.md and pictures of the view, from a headless browser."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ WAIT_S = 0.7
 
 @dataclasses.dataclass(frozen=True)
 class Click:
-    """Times of one click, in s of ``time.time()``, and those spent in board and driver."""
+    """Times of a click, in s of ``time.time()``, and those spent in board and driver."""
 
     released: float
     """Mouse release in the browser."""
     touched: float
     """The finger is on the virtual board."""
     gateware_s: float
-    """Board time from the touch to the last byte of the first frame with the zone."""
+    """Board time from touch to last byte of the first frame with the zone."""
     driver_s: float
-    """Driver time from bytes to zones."""
+    """From bytes to zones."""
     read: float
     """The view has the zones."""
     queued: float
-    """The zones are on their way to the browser."""
+    """The zones leave for the browser."""
     drawn: float
-    """The zones are drawn in the browser."""
+    """The browser has drawn the zones."""
 
     @property
     def parts_s(self) -> dict[str, float]:
@@ -67,7 +67,7 @@ class Click:
 
 
 class Stopwatch:
-    """Notes a click's passage through the view, in :attr:`times`."""
+    """Notes a click's passage through the view."""
 
     def __init__(self, shown: ServedView):
         assert shown.hand is not None
@@ -168,16 +168,15 @@ def click_table(found: list[Click]) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class ProcessorLoad:
-    """CPU time per second of board time, in s."""
+    """CPU time per second of board time."""
 
     board: float
-    """Simulating the board."""
     rest: float
     """Driver and view, without a browser."""
 
 
 def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
-    """Load under these fingers, in CPU time, which other load does not affect."""
+    """Load under these fingers, in CPU time."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
     spent, read = [0.0], virtual.read
@@ -201,7 +200,6 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
 
 
 def load_table(shown: ServedView) -> str:
-    """Load untouched and touched."""
     rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
     for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
         load = load_of(shown, fingers)
@@ -213,23 +211,23 @@ def load_table(shown: ServedView) -> str:
 FRAMES, FRAME_MS = 32, 120
 """Frames of the looping clip, and their duration."""
 SWING_RAD = 0.22
-"""Swing of the camera to either side."""
+"""Camera swing to either side."""
 STEP_MS = 350
-"""Time between two frames for board and browser to follow."""
+"""Time for board and browser to follow a frame."""
 QUALITY = 50
 """Quality of a frame, of 100."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Shot:
-    """Content of a frame of the clip."""
+    """Content of a clip frame."""
 
     strokes: tuple[float, float]
-    """Place of the moving finger, in columns and rows."""
+    """Moving finger, in columns and rows."""
     presses: bool
     """Whether the other one presses."""
     turn_rad: float
-    """Angle of the camera from its first place."""
+    """Camera angle from its first place."""
 
 
 def shot(share: float) -> Shot:
@@ -240,7 +238,7 @@ def shot(share: float) -> Shot:
 
 
 def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
-    """Move fingers and camera, and wait until it is drawn."""
+    """Move fingers and camera, and wait until drawn."""
     hand, view, sheet = shown.hand, shown.view, sheet_of(shown)
     assert hand is not None
     assert isinstance(view, View)
@@ -260,7 +258,7 @@ def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
 
 
 PRESSED = 0.4, 11.6
-"""Place of the other finger, in columns and rows."""
+"""Other finger, in columns and rows."""
 
 
 def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path) -> None:
@@ -301,7 +299,7 @@ class ViewTimes(NamedTuple):
 
 
 def compute() -> ViewTimes:
-    """Open the view twice: without a browser, and with one that clicks."""
+    """Open the view without a browser, then with one that clicks."""
     flat = opening.ViewRequest(flat=True)  # all of its cells can be clicked from one side
     with opening.opened(flat, http_port=0) as shown:
         loads = load_table(shown)

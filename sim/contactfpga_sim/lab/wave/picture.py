@@ -1,4 +1,4 @@
-"""The picture of docs/wave.md: the output of `contactfpga wave` for the reference Skin."""
+"""Picture of docs/wave.md: `contactfpga wave` for the reference Skin."""
 
 from __future__ import annotations
 
