@@ -1,4 +1,4 @@
-"""Makes the tables and pictures of the pages: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
+"""Make the pages' tables and pictures: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def lacking(needs: Iterable[str]) -> list[str]:
 
 
 def make(study: Study) -> None:
-    """Write all sections and pictures of a study. Raises :class:`StudyError`, :class:`MissingExtra`."""
+    """Write a study's sections and pictures. Raises :class:`StudyError`, :class:`MissingExtra`."""
     if absent := lacking(study.needs):
         raise StudyError(f"{study.name} needs {', '.join(absent)}")
     for name in {study.page_of(section) for section in study.sections}:
@@ -72,7 +72,7 @@ def stale(study: Study) -> Iterator[str]:
 
 
 def listed(study: Study) -> str:
-    """A study's line in the list of studies."""
+    """A study's line in the list."""
     needs = f"; needs {', '.join(study.needs)}" if study.needs else ""
     return f"{study.name:<12} {study.page:<16} {study.minutes:>4g} min  {study.title}{needs}"
 

@@ -1,4 +1,4 @@
-"""Covers of switches in the studies, made of parts that one can buy or cut; nothing was built."""
+"""Covers of switches in the studies, of parts that one can buy or cut; nothing was built."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from collections.abc import Callable
 from contactfpga.design.cover import Cap, Cover, Switch
 
 GAP_MM = 0.6
-"""Gap between two caps."""
 
 FOAM_M = 2e-3
-"""Foam on caps."""
 
 DOME = Switch(force_n=0.4, travel_m=0.2e-3, spread=0.1, hysteresis=0.2)
 """A light metal dome switch."""

@@ -15,8 +15,8 @@ from contactfpga_sim.model.board.cache import cache_folder, put, ready, scratch,
 
 
 def made_by(module: str, *skins: Skin) -> str:
-    """Key of a module's results for Skins, as far as code decides: the module with its imports, without docstrings,
-    and the Skins with their choices."""
+    """Key of a module's results for Skins: the module with its imports, without docstrings, and the Skins with their
+    choices."""
     code = sources.digest(module, documented=False)
     key = (code, *((skin.to_toml(), sources.own(own_files(skin))) for skin in skins))
     return hashlib.sha256(repr(key).encode()).hexdigest()

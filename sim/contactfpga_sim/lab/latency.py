@@ -1,4 +1,4 @@
-"""Times from a touch of a resting sheet to the last byte and the contact pin, on the compiled gateware."""
+"""Times from a touch of a resting sheet to the last byte and the contact pin, on compiled gateware."""
 
 from __future__ import annotations
 
@@ -22,12 +22,10 @@ SCANS = 40
 """Scans within which a touch must be reported, beyond twice its debounce time."""
 
 TRIES = 50
-"""Attempts if a touch meets a hello or keep-alive."""
 
 CHANGES = 100
 
 MOVING_FRAMES = 300
-"""Approximate frames for the rate."""
 
 
 class RecordedTouch(NamedTuple):
@@ -36,14 +34,12 @@ class RecordedTouch(NamedTuple):
     last: int
     """End of the complete frame's last byte."""
     pin: int
-    """Rise of the contact pin."""
     received: ReceivedFrame
     """The complete frame, in times from power-up."""
     start: int
-    """Touch, from power-up."""
     stream: ByteStream
     byte: int
-    """Index of that last byte."""
+    """Index of the complete frame's last byte."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,11 +49,10 @@ class Latency:
     touch_to_last_byte_us: Spread
     touch_to_contact_us: Spread
     change_to_last_byte_us: Spread
-    """From the loss of a corner to the last byte, for a contact that just moved, so that the line is busy."""
+    """From the loss of a corner to the last byte, for a moving contact on a busy line."""
     frames_per_s: float
     """Rate while the contact moves."""
     bytes: int
-    """Largest frame with the contact."""
     touches: int
     recorded: tuple[RecordedTouch, ...] = dataclasses.field(default=(), repr=False)
 
@@ -89,7 +84,7 @@ def measure(
     step: Callable[[str, int], None] = lambda name, of: None,
     around_us: tuple[int, int] = (0, 0),
 ) -> Latency:
-    """Latency of a contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
+    """Latency of a contact of ``cells``, rows and columns, at every place, or at ``touches`` of them.
 
     Each touch follows a report of an empty sheet, at phases spread evenly over a scan; touches that meet a hello or
     keep-alive are repeated. ``step(kind, number of them)`` follows each. ``around_us``: recorded time before a touch,
@@ -156,17 +151,14 @@ class Bench:
         self._board.close()
 
     def send(self, data: bytes) -> None:
-        """Send bytes to the board."""
         self._board.send(data)
 
     def idle(self, clocks: int) -> None:
-        """Let clocks pass."""
         self._board.run(clocks)
         self._drop()
 
     def touch(self, cells: np.ndarray, share: float, before: int = 0, after: int = 0) -> RecordedTouch:
-        """Touch at this share of a scan; ``before`` and ``after``: recorded clocks before the touch and after its
-        frame."""
+        """Touch at this share of a scan, recording clocks ``before`` the touch and ``after`` its frame."""
         rest = max(3, before // self._scan + 2)
         for _ in range(TRIES):
             self._let_go()
@@ -193,7 +185,7 @@ class Bench:
         return RecordedTouch(last, pin - start, one, start, ByteStream(times, values, -before, until), byte)
 
     def change(self, contacts: list[np.ndarray], number: int, size: int) -> int:
-        """Clocks from a change to the last byte of its frame: the contact moves, then loses a corner."""
+        """Clocks from a change to its frame's last byte: the contact moves, then loses a corner."""
         hold = max(1, size * 10 * self._derived.bit_clocks // 2)
         places = [contacts[(11 * number + place) % len(contacts)] for place in range(8)]
         for cells in places:

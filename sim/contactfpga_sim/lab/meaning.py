@@ -1,4 +1,4 @@
-"""Fingerprints of the code of a section: the set of statements of all reached modules, without imports, comments,
+"""Fingerprints of a section's code: the set of statements of all reached modules, without imports, comments,
 docstrings and positions."""
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.model.board import sources
 
 LENGTH = 8
-"""Hexadecimal digits in a fingerprint."""
 
 
 def fingerprint(study: Study, section: str) -> str:
@@ -62,7 +61,6 @@ def _marks(file: Path) -> tuple[str, ...]:
 
 
 def _says_nothing(statement: ast.AST) -> bool:
-    """Whether a statement is an import, a docstring, or typing."""
     if isinstance(statement, ast.If):
         return isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
     if isinstance(statement, ast.Expr):

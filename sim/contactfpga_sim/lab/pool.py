@@ -22,15 +22,12 @@ usual_jobs: int | None = None
 """Default processes; None: one per core."""
 
 LINE_S = 5.0
-"""Interval of progress lines off a terminal."""
 
 
 @contextlib.contextmanager
 def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Executor]:
-    """An executor of ``jobs`` processes, :data:`usual_jobs` for None, or of the Dask cluster with this scheduler.
-
-    If the block ends by an error or Ctrl-C, remaining work is dropped, and no process stays.
-    """
+    """An executor of ``jobs`` processes, :data:`usual_jobs` for None, or of the Dask cluster with this scheduler. If
+    the block ends by an error or Ctrl-C, remaining work is dropped, and no process stays."""
     if dask is not None:
         with _cluster(dask) as workers:
             yield workers
@@ -58,7 +55,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 def alone() -> None:
-    """Call first in a worker: it and its children become one group that ends as a whole, and with its parent."""
+    """Call first in a worker: it and its children become a group that ends as a whole, and with its parent."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
     signal.signal(signal.SIGTERM, _leave)
@@ -97,8 +94,7 @@ def _signal(children: list[multiprocessing.process.BaseProcess], number: signal.
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[str, int], None]]:
-    """Progress on standard error: each call, with a kind of work and its pieces, counts one. Bars on a terminal,
-    else occasional lines."""
+    """Progress on standard error: each call, with a kind of work and its pieces, counts one."""
     with _bars() if terminal.of(sys.stderr).live else contextlib.nullcontext(_Lines()) as step:
         yield step
 

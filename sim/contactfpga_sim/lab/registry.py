@@ -1,8 +1,8 @@
 """Entries of studies. Each study has a folder beside this file, unless scripts make all of it, and an entry in
 ``studies.py``.
 
-An entry names functions as ``module:function`` of the study's folder, or ``folder/file.py:function`` of the project's,
-so that reading it needs none of the study's imports.
+An entry names functions as ``module:function`` of its folder, or ``folder/file.py:function`` of the project's, so that
+reading it imports nothing.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ class Section:
     """Text between two markers of a page."""
 
     makes: str
-    """The function of its text; it takes the study's result, or nothing."""
+    """The function of its text, of the study's result or of nothing."""
     page: str = ""
     """Page in ``docs``; empty: the study's."""
     needs: tuple[str, ...] = ()
     """Needs beyond :attr:`Study.needs`; without one the section stays."""
     sample: str = ""
-    """Function without arguments that makes part of the text, such as a row, in less than a minute."""
+    """Function without arguments that makes part of the text in less than a minute."""
     kept: str = ""
-    """Regular expression of the rows of its longest table to keep; empty: all."""
+    """Regular expression of rows to keep of its longest table; empty: all."""
     heads: str = ""
-    """Regular expression of the column headers to keep; empty: all."""
+    """Regular expression of column headers to keep; empty: all."""
     of_netlists: bool = False
-    """Whether it shows measurements by :mod:`.size`, so that netlists, not reached code, date it."""
+    """Whether netlists (:mod:`.size`), not reached code, date it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,11 +54,11 @@ class Study:
     minutes: float
     """Minutes on two cores without cached results."""
     sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
-    """Sections by marker name, in order of making."""
+    """Sections by marker, in order of making."""
     compute: str = ""
-    """Function whose result sections and pictures share, called on first use."""
+    """Function of the result that sections and pictures share, called on first use."""
     pictures: str = ""
-    """Function that draws into the pages' folder and returns the files."""
+    """Function that draws into the pages' folder and returns files."""
     extra: str = "sim"
     """Extra of ``pyproject.toml`` with its imports."""
     needs: tuple[str, ...] = ()
@@ -96,7 +96,7 @@ class StudyRun:
         return self.study.function(self.study.compute)()
 
     def call(self, place: str, *given: object) -> Any:
-        """Call the function at a place. Text is returned as pages spell it."""
+        """Call a function; text is returned as pages spell it."""
         function = self.study.function(place)
         parameters = inspect.signature(function).parameters.values()
         wanted = sum(one.default is one.empty for one in parameters)

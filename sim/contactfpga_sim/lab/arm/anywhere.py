@@ -1,4 +1,4 @@
-"""Peak forces of touches anywhere on the arm, by the parts of the sheet."""
+"""Peak forces of touches anywhere, by the parts of the sheet."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
 from contactfpga_sim.lab.flips.campaign import wilson
 
 TOUCHES = 120
-"""Touches per geometry."""
 
 SAME = 0.03
-"""Share within which both halves of the touches must agree for a worst value to be printed."""
+"""Share within which both halves of the touches must agree to print a worst value."""
 
 QUANTILE = 0.95
 
@@ -32,7 +31,6 @@ class Geometry(NamedTuple):
     """One of :data:`FACES`."""
     pitch_mm: float
     threshold_n: float
-    """Closing force of a switch."""
     foam_mm: float
 
     def case(self) -> Case:
@@ -66,7 +64,7 @@ FACES: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "caps": _CAP,
     "tiles": _CAP,
 }
-"""Changes to the paper's case by face, for a pitch in mm and a closing force in N."""
+"""Changes to the paper's case by face, for pitch in mm and closing force in N."""
 
 PAPER = Geometry("flush, point force", 10.0, 1.0, 5.0)
 BEST = Geometry("tiles", 6.4, 0.4, 5.0)
@@ -86,7 +84,7 @@ _CHANGES = (
 
 
 def _around(base: Geometry) -> list[Geometry]:
-    """The geometry, and all that differ from it in one part."""
+    """The geometry and its neighbors, each with one part changed."""
     return list(dict.fromkeys([base, *(base._replace(**change) for change in _CHANGES)]))
 
 
@@ -96,7 +94,7 @@ WAYS = ("6 ms", "UART", "pin", "limit alone")
 
 
 def ways(case: Case, skin: Skin, latency_s: float = 6e-3) -> tuple[Latencies, ...]:
-    """Latencies of :data:`WAYS`: one fixed, two measured through the gateware, none."""
+    """Latencies of :data:`WAYS`: one fixed, two from the gateware, none."""
     return ((latency_s,), *(places.measured_s(case, skin, way) for way in ("uart", "pin")), ())
 
 
@@ -130,7 +128,7 @@ def many(
 
 
 def study() -> dict[Geometry, list[Batch]]:
-    """Batches by geometry, all with the reference Skin's times, which the pitch does not change."""
+    """Batches by geometry, all with the reference Skin's times: the pitch does not change them."""
     known = ways(Case.load("paper"), Skin())
     return {
         geometry: places.batches(
@@ -146,8 +144,7 @@ def mean_n(halves: Sequence[Peaks]) -> float:
 
 
 def worst_text(halves: Sequence[Peaks]) -> str:
-    """The largest peak force in N if both halves of the touches agree on it, else the 95 % quantile with its
-    interval."""
+    """Largest peak force in N if both halves agree, else the 95 % quantile with its interval."""
     most = [float(half.force_n.max()) for half in halves]
     if max(most) <= (1 + SAME) * min(most):
         return f"{max(most):.1f}"
@@ -232,7 +229,7 @@ class Effect(NamedTuple):
 
 
 def effects(found: Mapping[Geometry, Found], base: Geometry) -> list[Effect]:
-    """Effects by UART of each geometry one change away from ``base``, and of the least latency instead of 6 ms."""
+    """Effects by UART of each geometry one change away from ``base``, and of the least latency."""
     uart = WAYS.index("UART")
     told = []
     for geometry in found:
@@ -260,7 +257,7 @@ def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
 
 
 def matters(found: Mapping[Geometry, Found]) -> str:
-    """A sentence on the most effective change to the paper's sheet, and on the best sheet."""
+    """A sentence on the best change to the paper's sheet, and on the best sheet."""
     least: dict[str, Effect] = {}
     for one in effects(found, PAPER):
         if one.factor not in least or one.newtons < least[one.factor].newtons:

@@ -1,4 +1,4 @@
-"""Parameters of a run of the arm, read from a TOML file."""
+"""Parameters of a run, read from a TOML file."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Case:
     usb: Usb = dataclasses.field(default_factory=Usb)
     run: Run = dataclasses.field(default_factory=Run)
     model: str = "point"
-    """Spread of force below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`). All but
-    ``point`` press as wide as Hertz's patch of the foam's R*."""
+    """Spread of force below the cover, one of :data:`MODELS`. All but ``point`` press as wide as Hertz's patch of
+    the foam's R*."""
     cap: Cap | None = None
-    """Cap on each switch; None: the foam presses the switches' flush faces."""
+    """None: the foam presses the switches' flush faces."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)
@@ -68,7 +68,6 @@ class Case:
 
     @functools.cached_property
     def cover(self) -> Cover:
-        """Cover on the switches."""
         foam = self.foam
         known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa, "poisson": foam.poisson}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
@@ -96,7 +95,7 @@ class Case:
 
     @classmethod
     def load(cls, name: str | Path) -> Case:
-        """Load a packaged case by name, or a TOML file, whose ``like`` names the case it differs from."""
+        """Load a packaged case by name, or a TOML file; its ``like`` names the case it differs from."""
         return _case(str(name), _values(str(name)))
 
 

@@ -1,4 +1,4 @@
-"""Parts of a case: link, motor, controller, foam, switches, touched things, and the host's link."""
+"""Parts of a case of the arm."""
 
 from __future__ import annotations
 
@@ -32,14 +32,13 @@ class _Checked:
 
 @dataclasses.dataclass(frozen=True)
 class ArmLink(_Checked):
-    """The arm on its one joint; gravity plays no part."""
+    """The arm on one joint, without gravity."""
 
     inertia_kgm2: float
     """J about the joint, without the motor."""
     lever_m: float
-    """Distance from the joint to where speeds are measured, and to touches without their own lever."""
+    """From the joint to where speeds are measured, and to touches without their own lever."""
     speed_m_s: float
-    """Speed of approach."""
     _zero = ("speed_m_s",)
 
 
@@ -56,7 +55,6 @@ class Motor(_Checked):
     inductance_h: float
     supply_v: float
     current_a: float
-    """Largest requested current."""
     current_gain: float
     """Gain of the current loop, in V/A."""
 
@@ -88,19 +86,18 @@ class Control(_Checked):
     reverse_m_s: float
     """Speed of the retreat, at the lever."""
     slowing_m_s2: float
-    """Deceleration after a contact."""
     torque_limit_nm: float
-    """Torque between motor and arm that causes a retreat whatever the sheet reports."""
+    """Torque that causes a retreat whatever the sheet reports."""
     sensor_nm: float = 3.0
     """Range at which the torque sensor saturates."""
     clear_s: float = 1e-3
-    """Time without contact after which it counts as resolved."""
+    """Time without contact that resolves it."""
     retreat_m: float = 0.01
-    """Longest retreat; always used after the torque limit, which cannot detect the end of a contact."""
+    """Longest retreat; always used after the torque limit, which cannot detect a contact's end."""
     watchdog_s: float = 20e-3
-    """Host silence after which the arm stops."""
+    """Host silence that stops the arm."""
     delay_s: float = 0.0
-    """Age of the measured speed and torque if the loop runs over a link."""
+    """Age of measurements if the loop runs over a link."""
     behavior: str = "reverse"
     """One of :data:`BEHAVIORS`."""
     virtual_kgm2: float = 0.02
@@ -119,14 +116,13 @@ class Foam(_Checked):
     modulus_pa: float
     poisson: float
     radius_m: float
-    """Effective radius R*."""
     thickness_m: float
     damping: float = 0.0
     """Damping in s/m, after Hunt and Crossley; 0: lossless."""
     base_n_m: float = 1e6
-    """Stiffness of the base, added once the foam is pressed flat."""
+    """Base, added once the foam is pressed flat."""
     cut: bool = False
-    """Whether foam is cut into tiles between the caps; the plant's spring stays that of whole foam."""
+    """Whether foam is cut into tiles; the plant's spring stays that of whole foam."""
     _zero = ("damping",)
 
     @functools.cached_property
@@ -153,13 +149,11 @@ class Contacts(_Checked):
     hysteresis: float = 0.2
     preload_n: float = 0.0
     bounce_s: float = 0.0
-    """Bounce time after closing and opening."""
     bounce_period_s: float = 0.4e-3
     _zero = ("travel_m", "spread", "hysteresis", "preload_n", "bounce_s")
 
     @functools.cached_property
     def switch(self) -> Switch:
-        """The switch without its bounce."""
         return Switch(self.force_n, self.area_m2, self.travel_m, self.spread, self.hysteresis, self.preload_n)
 
 
@@ -168,7 +162,7 @@ class Touch(_Checked):
     """A thing that the arm runs into, or that pushes it."""
 
     x_mm: float = 80.0
-    """Position along the columns of the flat sheet; column 0 is at 0."""
+    """Along the columns of the flat sheet; column 0 is at 0."""
     y_mm: float = 80.0
     lever_m: float | None = None
     """Distance from the joint; None: the link's."""
@@ -177,18 +171,16 @@ class Touch(_Checked):
     mass_kg: float = 0.0
     """Mass of the yielding part; 0: rigid."""
     stiffness_n_m: float = 0.0
-    """Stiffness of the mass's support."""
     damping_ns_m: float = 0.0
     push_m_s: float = 0.0
     """Speed toward the arm; 0: at rest."""
     push_m: float = 0.0
-    """Distance moved toward the arm."""
     hold_s: float = 0.0
-    """Time at the end of the push before an equally fast return."""
+    """Time at the push's end before an equally fast return."""
     _zero = ("x_mm", "y_mm", "gap_m", "mass_kg", "stiffness_n_m", "damping_ns_m", "push_m_s", "push_m", "hold_s")
 
     def pushed(self, seconds: float) -> tuple[float, float]:
-        """Distance and speed of the approach to the arm."""
+        """Distance and speed toward the arm."""
         if seconds <= 0 or not self.push_m_s:
             return 0.0, 0.0
         takes = self.push_m / self.push_m_s
@@ -202,14 +194,13 @@ class Touch(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Usb(_Checked):
-    """Path of bytes from the board's UART through a USB serial chip and the host to the program."""
+    """Path of bytes from UART through a USB serial chip to the program."""
 
     packet_bytes: float = 510
     """Bytes at which the chip sends before its timer ends."""
     timer_s: float = 1e-3
-    """Latency timer: the driver sets 1 ms; operating systems default to 16 ms."""
+    """Latency timer: 1 ms by the driver; operating systems default to 16 ms."""
     frame_s: float = 125e-6
-    """Polling interval of the host."""
     host_s: float = 0.1e-3
     """Time through the host's program to the controller."""
     _zero = ("timer_s", "host_s")
@@ -222,6 +213,5 @@ class Run(_Checked):
     step_s: float = 10e-6
     """Step of integrator and gateware exchange."""
     lead_s: float = 20e-3
-    """Time from power-up, the controller's first sample, to the touch; whole steps."""
+    """From power-up, the controller's first sample, to the touch; whole steps."""
     duration_s: float = 0.25
-    """Longest time from the touch to the end."""

@@ -1,4 +1,4 @@
-"""Pictures of a run, after the paper's Figs. 6 and 7; charts of force and thickness against latency."""
+"""Pictures of a run (the paper's Figs. 6 and 7), and charts of force and thickness over latency."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.VERMILLION, "linestyle": style.DASHES[0], "linewidth": 1.8},
     {"color": style.BLUE, "linestyle": style.DASHES[1], "linewidth": 1.8},
 )
-"""Line styles of the runs: after the given latency, by UART and by pin."""
+"""Line styles of the runs."""
 
 DRAWN = {"speed": ("speed_rad_s", "angular speed, rad/s"), "torque": ("sensor_nm", "torque between motor and arm, Nm")}
 NAMES = {"speed": "arm-fig6-speed", "torque": "arm-fig7-torque"}
@@ -73,7 +73,7 @@ LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3
 SPEEDS_M_S = tuple(0.02 * step for step in range(1, 31))
 THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
 INSTANTS = 8
-"""Touch instants of the gateware's runs, a controller period apart."""
+"""Touches of the gateware's runs, a controller period apart."""
 COLORS = {"6 ms": style.BLACK, "UART": style.VERMILLION, "pin": style.BLUE, "last byte": style.GREEN}
 BOUND_OF = "bound, "
 BOUND: dict[str, Any] = {"linewidth": 1.2, "linestyle": style.DASHES[2]}
@@ -82,6 +82,8 @@ TICKS_MS = (0.01, 0.1, 1, 10)
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
+    """Tasks by picture."""
+
     force: tuple[SweepTask, ...]
     sheet: dict[str, tuple[SweepTask, ...]]
     speed: dict[str, tuple[SweepTask, ...]]
@@ -118,7 +120,7 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
 
 
 def check(case: Case) -> None:
-    """Raise :class:`CaseError` for a case that has no charts."""
+    """Raise :class:`CaseError` for a case without charts."""
     if case.control.behavior != "reverse" or not case.link.speed_m_s:
         raise CaseError(
             f"behavior is {case.control.behavior!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"

@@ -1,6 +1,6 @@
-"""Touches anywhere on the sheet, with many controller phases and latencies.
+"""Touches anywhere on the sheet.
 
-Places fill pitch cells in the sheet's middle evenly; each has an instant between two controller samples and a latency
+Places fill pitch cells in the sheet's middle evenly; each has an instant between controller samples and a latency
 measured through the gateware.
 """
 
@@ -20,16 +20,16 @@ from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S
 
 ENDS_S = 20e-3
-"""A peak is over after this time plus that for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
+"""A peak is over after this and the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
 
 INSTANTS = 8
-"""Touches that measure a way's latencies through the gateware, a controller period apart."""
+"""Touches that measure latencies, a controller period apart."""
 
 SPAN = 3
-"""Pitches along each side of the touched square."""
+"""Pitches along each touched side."""
 
 SEEDS = (0, 1)
-"""Each seed makes half of the touches; a comparison of the halves shows the uncertainty."""
+"""Each makes half of the touches; the halves' difference shows the uncertainty."""
 
 Latencies = tuple[float, ...]
 """Equally likely latencies in s; empty: the sheet reports nothing."""
@@ -57,7 +57,7 @@ class Peaks:
 
 
 def check(case: Case) -> None:
-    """Raise :class:`CaseError` for a case that has no place to vary."""
+    """Raise :class:`CaseError` for a case without a place to vary."""
     if len(case.touch) != 1 or case.control.behavior != "reverse" or not case.link.speed_m_s:
         raise CaseError("touches anywhere need a case with one touch, behavior 'reverse' and a speed; take --places 0")
 
@@ -67,8 +67,7 @@ _GOLDEN = 1.32471795724
 
 
 def evenly(count: int, seed: int) -> Floats:
-    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others are even shares in random
-    order."""
+    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others are shuffled even shares."""
     rng = np.random.default_rng(seed)
     square = (rng.random(2) + np.outer(np.arange(count), [1 / _GOLDEN, 1 / _GOLDEN**2])) % 1
     orders = np.stack([rng.permutation(count) for _ in range(4)], axis=1)
@@ -76,14 +75,14 @@ def evenly(count: int, seed: int) -> Floats:
 
 
 def batches(case: Case, skin: Skin, ways: tuple[Latencies, ...], count: int) -> list[Batch]:
-    """``count`` touches, half of them by each seed."""
+    """Half of the touches by each seed."""
     check(case)
     return [Batch(case, skin, ways, math.ceil(count / len(SEEDS)), seed) for seed in SEEDS]
 
 
 def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
     """Peak force in N, peak indentation in m and whether the torque limit reacted first, of each touch for each way.
-    Cached by code."""
+    Cached."""
     what = dataclasses.asdict(dataclasses.replace(batch, skin=None))  # type: ignore[arg-type]
     key = f"{kept.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
     found: list[list[tuple[float, float, bool]]] = kept.kept("places", key, lambda: _touched(batch))
@@ -91,7 +90,7 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def peaks(found: list[list[list[tuple[float, float, bool]]]], way: int) -> list[Peaks]:
-    """Peaks of one way over several batches."""
+    """Peaks of one way."""
     arrays = [np.array(one[way], float) for one in found]
     return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0) for array in arrays]
 
@@ -121,7 +120,6 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
-    """A position in a middle cell of a side; ``inside`` and ``cell`` are shares from 0 to 1."""
     span = min(SPAN, count - 1)
     if not span:
         return 0.5 * inside * pitch_mm

@@ -1,4 +1,4 @@
-"""The experiment's numbers beside the paper's, as table and as JSON."""
+"""The experiment's numbers beside the paper's."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ class ReportLine(NamedTuple):
     """Field of :class:`contactfpga_sim.lab.arm.run.ArmResponse`."""
     unit: str
     scale: float
-    """Factor from SI to the unit."""
     paper: float | None
     """The paper's value, in SI."""
     stated: float | None
-    """Value expected of the consistent set, in SI."""
+    """Expected of the consistent set, in SI."""
 
 
 ROWS = (
@@ -50,7 +49,7 @@ NOTES = (
 
 
 def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -> dict[str, RunRecord]:
-    """Runs to compare side by side, by heading."""
+    """Runs side by side, by heading."""
     late = f"{1e3 * latency_s:g} ms"
     found = {
         late: run(case, "latency", latency_s=latency_s, skin=skin),
@@ -78,7 +77,7 @@ def deviation(row: ReportLine, outcome: ArmResponse) -> float | None:
 
 
 def table(found: dict[str, RunRecord], paper: bool) -> list[list[str]]:
-    """Headings and lines; with ``paper``, the paper's and the consistent set's numbers first."""
+    """Headings and lines; ``paper`` puts the paper's and consistent numbers first."""
     first = next(iter(found.values())).outcome
     lines = [["", *(["paper", "set"] if paper else []), *found]]
     if paper:
@@ -103,7 +102,7 @@ def _reasons(found: dict[str, RunRecord], paper: bool) -> list[str]:
 
 
 def as_json(found: dict[str, RunRecord], name: str) -> dict[str, Any]:
-    """All runs in SI units."""
+    """Runs in SI units."""
     first = next(iter(found.values())).outcome
     known: dict[str, Any] = {
         "case": name,
@@ -121,7 +120,7 @@ PUSH_HEADINGS = ("push, m/s", "peak torque, Nm", "peak force, N", "indentation, 
 
 
 def push_lines(pushes: list[Push]) -> list[list[str]]:
-    """Headings and a line per push."""
+    """Headings and pushes."""
     lines = [list(PUSH_HEADINGS)]
     for push in pushes:
         back = "-" if push.back_s is None else f"{1e3 * push.back_s:.0f}"

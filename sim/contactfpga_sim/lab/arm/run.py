@@ -39,16 +39,15 @@ class PlantTransport:
 
 
 AFTER_S = 0.25e-3
-"""Delay of the second torque reading after the reaction."""
+"""Delay of the second torque reading."""
 
 SLOW_M_S = 1e-3
-"""Speed below which a held arm counts as at rest."""
+"""Speed of an arm at rest."""
 
 WITH_UNITS = Skin(units=3, unit_sums=((1, 1, 1),), baud=6_000_000)
 """The reference Skin on three pressure units."""
 
 STAY_S = 20e-3
-"""Rest that ends a run."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +56,6 @@ class ArmResponse:
     or stops the arm."""
 
     closes_s: float | None
-    """Closing of the first switch."""
     detected_s: float | None
     """Arrival of the contact at the controller's input."""
     reacts_s: float | None
@@ -66,7 +64,6 @@ class ArmResponse:
     positive_s: float | None
     """Time from the reaction until the arm goes back."""
     torque_before_nm: float | None
-    """True torque at the reaction."""
     torque_after_nm: float | None
     """True torque :data:`AFTER_S` after the reaction."""
     force_before_n: float | None
@@ -74,18 +71,18 @@ class ArmResponse:
     peak_torque_nm: float
     peak_indentation_m: float
     bottomed: bool
-    """Whether the foam was pressed flat."""
     resolved_s: float | None
-    """Time from which all switches stay open."""
+    """Time from which switches stay open."""
     rest_s: float | None
-    """Time from which the arm stays at rest."""
     reversals: int
     zones: int
-    """Most zones that the host reported at once."""
+    """Most zones reported at once."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RunRecord:
+    """Record of a run."""
+
     outcome: ArmResponse
     course: np.ndarray
     """Structured array of a :class:`contactfpga_sim.lab.arm.world.CourseStep` per step."""
@@ -107,9 +104,8 @@ def run(
     """Let the arm run into the touched things.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: by
-    default the reference Skin, with units if the way needs them; ``to_peak``: end once the force has fallen to half of
-    its peak after the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its
-    gateware.
+    default the reference Skin, with units if needed; ``to_peak``: end once the force has fallen to half its peak. The
+    first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")

@@ -1,4 +1,4 @@
-"""Points of the charts: many short runs, in pieces for any executor."""
+"""Points of the charts: many short runs for any executor."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SweepPoint:
     peak_indentation_m: float
     closes_s: float
     takes_s: float
-    """Time from the switch to the controller's input."""
+    """From the switch to the controller's input."""
     thickness_m: float = math.nan
 
 
@@ -65,7 +65,7 @@ def sweep(
     step: Callable[[str, int], None] = lambda name, of: None,
     so_far: dict[SweepTask, SweepPoint] | None = None,
 ) -> list[SweepPoint]:
-    """The tasks' points in order. After each, ``so_far`` holds it, and ``step(name, number of all)`` is called."""
+    """The tasks' points in order. Each enters ``so_far``, then ``step(name, number of all)`` is called."""
     found = {} if so_far is None else so_far
     futures = {executor.submit(work, task): task for task in tasks}
     for future in as_completed(futures):
@@ -113,7 +113,7 @@ def _thinnest(task: SweepTask) -> SweepPoint:
 
 
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
-    """The longest time in s from a switch to the controller's input, by way, for one zone."""
+    """Longest time in s from a switch to the controller's input, by way, for one zone."""
     usb = case.usb
     scan = skin.derived.max_frame_slots * skin.derived.row_clocks / skin.clock_hz
     wire = latency_s(skin)
@@ -131,8 +131,8 @@ def closing_n(case: Case) -> float:
 
 
 def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
-    """The highest speed up to which no force exceeds the limit, interpolated. NaN if the slowest is too fast or the
-    fastest still safe."""
+    """Highest speed up to which no force exceeds the limit, interpolated; NaN if the slowest exceeds or the fastest
+    is safe."""
     worst = np.maximum.accumulate(forces)
     above = np.flatnonzero(worst > limit_n)
     if not worst[0] <= limit_n or not len(above):
@@ -143,7 +143,7 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
 
 
 def naive_speed(case: Case, limit_n: float, latency: float) -> float:
-    """(delta(limit) - delta(closing)) / latency, the speed that reaches the limit at the reaction. It is unsafe: the
-    arm still presses on."""
+    """(delta(limit) - delta(closing)) / latency, which reaches the limit at the reaction; unsafe, as the arm still
+    presses on."""
     depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
     return max(0.0, depth[0] - depth[1]) / latency

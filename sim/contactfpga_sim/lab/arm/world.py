@@ -24,7 +24,6 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3
 _PATCH_M = 1e-3
-"""Patch radius for models that do not use it."""
 
 _FINE = 1.1
 """Ratio of forces at which a wide patch is computed; in between, pressure per newton is linear."""
@@ -33,7 +32,7 @@ _LEAST_N = 0.01
 
 
 class Switches:
-    """The (rows, columns) switches under the case's cover."""
+    """The (rows, columns) switches under the cover."""
 
     def __init__(self, case: Case, skin: Skin):
         pitches = (skin.pitch_x_mm * _MM, skin.pitch_y_mm * _MM)
@@ -49,7 +48,7 @@ class Switches:
         self._bounces_until = -np.inf
 
     def forces_n(self, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) N on each switch from the touches' forces."""
+        """(rows, columns) N on each switch."""
         found = np.zeros(self._made.shape)
         for touch, force in zip(self._touches, forces_n):
             if force > 0:
@@ -57,8 +56,7 @@ class Switches:
         return found
 
     def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) bool closed switches at a moment; moments must not go back. Unchanged results are the same
-        array."""
+        """(rows, columns) bool closed switches; moments must not go back. Unchanged results are the same array."""
         if any(forces_n) or self._any:
             made = self._cells.closed_by(self.forces_n(forces_n), self._made)
             changed = made != self._made
@@ -94,7 +92,7 @@ class Switches:
 
 @functools.lru_cache(maxsize=2048)
 def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarray:
-    """(rows, columns) share of a force on each switch, from a round patch of this radius on the cover."""
+    """(rows, columns) share of a force on each switch, from a round patch on the cover."""
     part = Ellipse(radius_m, radius_m, x_mm * _MM, y_mm * _MM)
     return cells.forces_n([Load((part,), 1.0)])
 
@@ -102,7 +100,6 @@ def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarr
 THRESHOLD_N = 2.0
 """Threshold of the whole push; noise of the sum is 0.09 N."""
 GAIN_N = 0.02
-"""Newtons per step of the converter."""
 ZERO = 1000
 SIGMA_N = 0.05
 RING_MM = 75.0
@@ -112,7 +109,7 @@ FIRST_NUMBER = 129 * 128 + 1
 
 
 class UnitsUnderSheet:
-    """Three units in a triangle around the sheet's middle, under a weightless bumper."""
+    """Three units in a triangle under a weightless bumper."""
 
     def __init__(self, case: Case, skin: Skin):
         turn = np.radians([90, 210, 330])
@@ -139,9 +136,8 @@ class UnitsUnderSheet:
 
 
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
-"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the board's ``contact``
-pin; zones over UART and host; none but the torque limit; the pin of a board with pressure units alone; the pin of a
-board with both."""
+"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the ``contact`` pin;
+zones over UART and host; none but the torque limit; the pin with pressure units alone; the pin with both."""
 
 PINS = ("pin", "force", "both")
 UNITS = ("force", "both")
@@ -155,7 +151,7 @@ class Faults:
     """Time from which the board's pins freeze."""
     host_dies_s: float | None = None
     noise_s: tuple[float, float] | None = None
-    """Interval in which every byte (by its stop bit) has its lowest bit inverted."""
+    """Interval in which each byte (by its stop bit) has its lowest bit inverted."""
 
 
 class CourseStep(NamedTuple):
@@ -170,7 +166,6 @@ class CourseStep(NamedTuple):
     indentation_m: float
     closed: bool
     contact: bool
-    """Whether the controller knows the contact."""
 
 
 class World:
@@ -182,7 +177,7 @@ class World:
         self.controller = Controller(case)
         self.course: list[CourseStep] = []
         self.heard: list[tuple[float, int]] = []
-        """Host reports: arrival time at the controller, and number of zones."""
+        """Host reports: arrival at the controller, zones."""
         self.detected_s: float | None = None
         """Arrival of the first contact at the controller's input."""
         self.peak_n = 0.0
@@ -208,7 +203,6 @@ class World:
         self._ticks = round(case.control.period_s / case.run.step_s)
 
     def clock(self) -> float:
-        """Seconds since power-up."""
         return self._number * self.case.run.step_s
 
     @property
@@ -217,18 +211,17 @@ class World:
         return self.clock() - self.case.run.lead_s
 
     def delivered(self) -> bytes:
-        """Bytes that reached the host's program since the last call."""
+        """Bytes that reached the host since the last call."""
         data, self._bytes = self._bytes, b""
         return data
 
     def send(self, data: bytes) -> None:
-        """Send bytes to the board."""
         if self._board is not None and not self._dead():
             self._catch_up()
             self._board.send(data)
 
     def say(self, zones: int) -> None:
-        """Report the number of zones to the controller, after the host's delay."""
+        """Report zones to the controller, after the host's delay."""
         at = self.time_s + self.case.usb.host_s
         self.heard.append((at, zones))
         self._changes.append((at, zones > 0))
@@ -262,7 +255,6 @@ class World:
         self._host_frame()
 
     def close(self) -> None:
-        """Free the board."""
         if self._board is not None:
             self._board.close()
 

@@ -1,4 +1,4 @@
-"""A cover that folds at a joint and presses switches: shares of folds and of touches that are marked."""
+"""A cover that folds at a joint and presses switches: shares of folds and touches marked."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from contactfpga_sim.model.scenes.scene import Contact, Scene
 SKIN = Skin(report="cells")
 BEGINS_RAD, RANGE_RAD = 0.6, 2.0
 OFF_RAD = 0.01
-"""Standard deviation of the reported angle from the angle of folding."""
+"""Standard deviation of the reported angle."""
 FLICKER = 0.3
 """Chance that a cell at a fold's rim is open."""
 FINGER_MM = 9.0
 
 
 def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray:
-    """(rows, columns) bool crease across rows 0 to 3, from 0.6 rad on, that grows with the angle. Without ``rng``:
-    all cells it can press."""
+    """(rows, columns) bool crease across rows 0 to 3, from 0.6 rad on, growing with the angle. Without ``rng``: all
+    cells it can press."""
     cells = np.zeros((SKIN.rows, SKIN.columns), bool)
     if rng is not None:
         angle_rad += OFF_RAD * rng.standard_normal()
@@ -42,13 +42,13 @@ def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray
 
 
 def touch(x_mm: float, y_mm: float) -> np.ndarray:
-    """Cells that a finger presses."""
+    """Cells under a finger."""
     disc = Contact(shape=contacts.disc(FINGER_MM), x_mm=x_mm, y_mm=y_mm, force_n=10.0)
     return np.asarray(Scene((disc,)).pressed(0.0, SKIN), bool)
 
 
 def frame_of(cells: np.ndarray, skin: Skin = SKIN) -> Zones:
-    """The frame of pressed cells from a board with ``report = "cells"``."""
+    """A frame of cells from a board with ``report = "cells"``."""
     frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells, None)
     return Zones(frame, skin.sheet, 0)
 
@@ -70,7 +70,7 @@ class Rates:
     joined: float
     """Touches joined to the fold's zone, marked by mistake."""
     within: float
-    """Touches marked whose cells the fold can all press, which no switch can distinguish."""
+    """Touches marked whose cells the fold can all press: no switch can tell."""
     straight: float
     """Touches marked by mistake with the joint straight."""
 

@@ -33,7 +33,6 @@ class Socket:
         self._random = np.random.default_rng(1)
 
     def plug(self, skin: Skin = SKIN) -> None:
-        """Connect a board at power-up."""
         self.flash(skin)
         self.plugs += 1
 
@@ -47,7 +46,6 @@ class Socket:
         self.plugs += 1
 
     def opened(self, plan: Plan) -> contactfpga.Board:
-        """Open the port as a reader does."""
         if self.board is None:
             raise contactfpga.PortNotFound("no such port")
         return contactfpga.open(HeldPort(self), plan.skin, timeout=0.2)
@@ -129,15 +127,13 @@ class OutageTimes:
 
     statuses: tuple[str, ...]
     noticed_s: float
-    """Time from the fault to its report."""
     back_s: float
-    """Time from the fault's end to ok."""
     stale: int
-    """Looks at which an old frame passed for a new one beyond the link's ``late_s``."""
+    """Looks at which an old frame passed for new beyond ``late_s``."""
 
 
 def play(outage: Outage, folder: Path) -> OutageTimes:
-    """Run an outage; ``folder`` gets the Skin's file. Raises RuntimeError if the body never reports it."""
+    """Run an outage with the Skin's file in ``folder``. Raises RuntimeError if never reported."""
     (folder / "skin.toml").write_text(SKIN.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
     socket = Socket()
@@ -162,7 +158,7 @@ def play(outage: Outage, folder: Path) -> OutageTimes:
 def _until(
     reader: LinkReader, socket: Socket, status: str, seen: list[str], fresh_until_s: float = float("inf")
 ) -> int:
-    """Advance until the link has this status; return how often it was ok for too long."""
+    """Advance until this status; return how often the link was ok for too long."""
     end_s, stale = socket.now + LONGEST_S, 0
     while (found := reader.state().status) != status:
         if not seen or seen[-1] != found:

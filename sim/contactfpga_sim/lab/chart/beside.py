@@ -19,10 +19,9 @@ from contactfpga_sim.lab.covers import COVERS
 from contactfpga_sim.model.scenes.families import touches
 
 PITCH_MM = 6.4
-"""Pitch of the tiles under which rivals are drawn."""
+"""Pitch of the rivals' tiles."""
 
 TOUCHES = 50
-"""Most touches per family for a rival's point."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,12 +33,11 @@ class RivalMethod:
     touch_us: Quantile
     """Median from the foam's first touch."""
     errors: dict[str, Interval]
-    """Errors against the contacts, by metric."""
 
 
 def least_mm(task: Task) -> Interval | None:
-    """Lower bound in mm of any method's mean barycenter error on a task's cells; None for several contacts, or if
-    none is felt."""
+    """Lower bound in mm of any method's mean barycenter error on these cells; None for several contacts, or none
+    felt."""
     if task.family not in floor.ONE:
         return None
     try:
@@ -69,7 +67,7 @@ def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
 
 
 def bits_us(points: Sequence[Point]) -> float:
-    """Microseconds of the bits of the shortest frame, at the most common baud rate."""
+    """Microseconds of the shortest frame's bits, at the most common baud rate."""
     bauds = [point.task.skin.baud for point in points]
     usual = max(dict.fromkeys(bauds), key=bauds.count)
     return min(point.times.lower_bound_us for point in points if point.task.skin.baud == usual)

@@ -1,4 +1,4 @@
-"""Points of the chart: every method on every family of scenes, in pieces for any executor."""
+"""Points of the chart: every method on every family, for any executor."""
 
 from __future__ import annotations
 
@@ -25,13 +25,11 @@ from contactfpga_sim.model.scenes.scene import Scene
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 
 PIECE = 100
-"""Placements per piece of work."""
 
 TIMED = 200
-"""Placements that are also timed, one touch each."""
+"""Placements timed as touches."""
 
 DEVICE = sizes.UP5K
-"""Device of LUT4 counts and clocks."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,16 +39,15 @@ class Task:
     method: str
     skin: Skin
     cover: Cover | None
-    """None for a bare sheet."""
     family: str
     count: int
     seed: int
     checked: int = 2
-    """Touches that also go through the gateware."""
+    """Touches also through the gateware."""
 
 
 KINDS = ("total", "labeller", "sensing")
-"""Errors: zones against contacts, zones against connected pieces of cells, pieces against contacts."""
+"""Errors: zones against contacts, zones against connected cells, connected cells against contacts."""
 
 Found = dict[str, dict[str, list[float]]]
 """A value per scene, by kind and metric."""
@@ -65,14 +62,13 @@ class Point:
 
     task: Task
     errors: dict[str, dict[str, Interval]]
-    """By kind and metric."""
     times: Times
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
     """Labelling time on this host, if it labels."""
     least_mm: Interval | None = None
-    """Lower bound of any method's mean barycenter error on these cells."""
+    """Lower bound of any method's mean barycenter error here."""
 
 
 def study(
@@ -85,7 +81,7 @@ def study(
     """Work out all tasks; ``step(kind of work, pieces of that kind)`` follows each piece. A point enters ``so_far``
     once its errors and times are known, before its size.
 
-    Results of the same code are cached. ``executor`` is a process pool's or one with its interface, such as Dask's.
+    Results are cached by code. ``executor`` is a process pool's or alike, such as Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
     parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {
@@ -131,7 +127,7 @@ def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
 
 
 def accuracy(task: Task, first: int) -> Found:
-    """Errors by kind and metric of one piece of a task, once all forces have risen."""
+    """Errors by kind and metric of one piece, once all forces have risen."""
 
     def new() -> Found:
         scenes = _touches(task, first)
@@ -198,7 +194,7 @@ def front(points: Iterable[tuple[float, float]]) -> list[int]:
 
 
 def reached_us(point: Point) -> float:
-    """Median from the foam's first touch to the zones at the host, with host labelling if needed."""
+    """Median from the foam's first touch to the zones at the host, labelling included."""
     return point.times.touch_median_us.value + point.host_us
 
 
@@ -208,7 +204,7 @@ def covered(task: Task) -> bool:
 
 
 def to_build(points: Sequence[Point]) -> str:
-    """The covered method with the smallest mean share of miscounted scenes; the first of equals."""
+    """The covered method with the least mean share of miscounted scenes; the first of equals."""
     shares: dict[str, list[float]] = {}
     for point in points:
         if covered(point.task):

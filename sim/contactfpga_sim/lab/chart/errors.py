@@ -16,7 +16,6 @@ from contactfpga_sim.model.golden.frame import barycenter
 from contactfpga_sim.model.scenes.truth import Truth
 
 Z95 = 1.959963984540054
-"""Half width of the 95 % interval, in standard deviations."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,11 +33,10 @@ class Errors:
 
     miscounted: bool
     missed: float
-    """Share of true blobs without a partner."""
     barycenter_mm: float
     """Mean distance of matched pairs; NaN without pairs."""
     area: float
-    """Mean area difference of pairs over the true area; NaN without pairs."""
+    """Mean area difference over the true area; NaN without pairs."""
 
 
 METRICS = tuple(field.name for field in dataclasses.fields(Errors))
@@ -76,7 +74,7 @@ def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
 
 
 def method_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
-    """Zones by the Skin's labeller, or the host's with ``report = "cells"``; rounded if the board divides."""
+    """Zones by the labeller, or the host's with ``report = "cells"``; rounded if the board divides."""
     if skin.report == "cells":
         return exact_zones(cells, skin)
     work = label.labelling(cells, skin.connectivity, skin.labeller)
@@ -108,7 +106,7 @@ class Interval:
 
 
 def interval(values: Sequence[float]) -> Interval:
-    """Interval of values without NaN: normal approximation, or Wilson's for shares 0 or 1."""
+    """Interval of values without NaN: normal, or Wilson's for shares 0 or 1."""
     known = np.array([value for value in values if not math.isnan(value)], float)
     n = len(known)
     if not n:
@@ -134,8 +132,8 @@ class Quantile:
 
 
 def quantile(values: Sequence[float], share: float) -> Quantile:
-    """Least value that at least this share of values does not exceed; infinite values count. The interval is by
-    ranks (binomial), valid for any distribution."""
+    """Least value that at least this share does not exceed; infinite values count. The interval is by ranks
+    (binomial), for any distribution."""
     ordered = sorted(values)
     n = len(ordered)
     if not n:

@@ -1,11 +1,9 @@
-"""The least mean barycenter error of any method that sees only the closed cells.
+"""The least mean barycenter error of any method that sees only closed cells.
 
-Scenes have one contact away from the edge. Scenes with the same cells, up to moves, mirrors and turns, cannot be
-distinguished: the best estimate is their geometric median, and its mean distance is the floor. A median judged on its
-own scenes is optimistic, a lower bound of the floor; a median judged on other scenes is a usable method, an upper
-bound.
-
-Methods know the spread of closing forces, not each switch's own.
+Each scene has one contact away from the edge. Scenes with the same cells, up to moves, mirrors and turns, are
+indistinguishable: the best estimate is their geometric median, and its mean distance is the floor. A median judged on
+its own scenes is optimistic, a lower bound; one judged on other scenes is a usable method, an upper bound. Methods know
+the spread of closing forces, not each switch's own.
 """
 
 from __future__ import annotations
@@ -32,16 +30,15 @@ INNER = 12
 """Side in pitches of the contacts' square."""
 
 FOLDS = 10
-"""Folds of cross-validation."""
 
 DOUBT = 4.0
 """Weight, in scenes, of the barycenter in a median for other scenes."""
 
 ROUNDS = 40
-"""Rounds of Weiszfeld's iteration for a median."""
+"""Rounds of Weiszfeld's iteration."""
 
 LEAST = 1e-6
-"""Distance in pitches below which the pull on a median stops growing."""
+"""Distance in pitches below which a median's pull stops growing."""
 
 _MIRRORED = [np.diag(signs) for signs in ((1, 1), (-1, 1), (1, -1), (-1, -1))]
 _TURNED = _MIRRORED + [turn[::-1] for turn in _MIRRORED]
@@ -49,20 +46,16 @@ _TURNED = _MIRRORED + [turn[::-1] for turn in _MIRRORED]
 
 @dataclasses.dataclass(frozen=True)
 class Floor:
-    """Limits on a family of scenes; distances in mm, over scenes in which a switch closed."""
+    """Limits on a family of scenes, in mm, over scenes with a closed switch."""
 
     felt: Interval
     """Share of scenes with a closed switch."""
     barycenter_mm: Interval
-    """Error of the connected cells' barycenter."""
     lower_mm: Interval
-    """Statistical lower bound."""
     upper_mm: Interval
-    """Statistical upper bound."""
     table_mm: Interval
     """Error of a :class:`PlaceTable` of other scenes, from area and sums."""
     patterns: int
-    """Number of distinct patterns."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,8 +71,8 @@ class Seen:
 
 
 def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> Floor:
-    """The floor of ``count`` scenes of a family in :data:`ONE`. Only the Skin's pitch and connectivity count; cover
-    None is a bare sheet. Raises ValueError."""
+    """Floor of ``count`` scenes of a family in :data:`ONE`, by the Skin's pitch and connectivity; cover None is a
+    bare sheet. Raises ValueError."""
     sheet, scenes = inner(family, skin, count, seed, **options)
     pitch = np.array([skin.pitch_x_mm, skin.pitch_y_mm])
     cells = [scene.pressed(scene.settled_s, sheet, cover) for scene in scenes]
@@ -102,7 +95,7 @@ def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, *
 
 
 def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> PlaceTable:
-    """The table of :func:`floor`'s scenes, by which a host places zones of one contact."""
+    """The table of :func:`floor`'s scenes, by which a host places zones."""
     sheet, scenes = inner(family, skin, count, seed, **options)
     cells = [(scene, scene.pressed(scene.settled_s, sheet, cover)) for scene in scenes]
     found = seen([(scene, one) for scene, one in cells if one.any()], sheet)
@@ -166,7 +159,7 @@ def numbered(values: np.ndarray) -> np.ndarray:
 
 
 def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, folds: int) -> Interval:
-    """Distances from a number's median; with several folds, of other folds."""
+    """Distances from a number's median, with several folds from other folds'."""
     places, found = offsets * pitch_mm, np.zeros(len(offsets))
     count = int(numbers.max()) + 1
     if folds == 1:
@@ -188,7 +181,7 @@ def _learned(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
 
 
 def geometric_medians(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count, 2) geometric medians (Weiszfeld) of (n, 2) places by number; 0 for an unused number."""
+    """(count, 2) geometric medians (Weiszfeld) of (n, 2) places by number; 0 if unused."""
     weights = np.ones(len(places))
     medians = np.zeros((count, 2))
     for _ in range(ROUNDS):

@@ -1,7 +1,7 @@
-"""The README's picture: covers, pitches and closing forces, for fingers.
+"""The README's picture: covers, pitches and closing forces.
 
-The family `fingers` has two to five fingertips anywhere on 160 mm by 160 mm, where cover and pitch matter. Labellers,
-reports and rates that change little are in the table.
+The family `fingers` has two to five fingertips anywhere on 160 mm by 160 mm. Labellers, reports and rates that change
+little are in the table.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class Row(NamedTuple):
     color: str
     mark: str
     methods: dict[str, str]
-    """Methods by the words at their marks."""
+    """By the words at their marks."""
     spot: Spot = (8, 0)
     others: dict[tuple[str, str], Spot | None] = {}  # noqa: RUF012 - it is not changed
-    """By words and error, where others lie at the usual spot; None: no words."""
+    """By words and error, away from the usual spot; None: no words."""
 
 
 ROWS = {
@@ -105,13 +105,13 @@ PANELS = (
 
 
 def save(points: Sequence[Point], path: Path) -> Path:
-    """Draw the points of :data:`FAMILY`; all families decide the method to build. Equal points give equal files."""
+    """Draw the points of :data:`FAMILY`; equal points give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture(points), path)
 
 
 def picture(points: Sequence[Point]) -> Figure:
-    """Scenes miscounted, and barycenter error, over time from the foam's first touch."""
+    """Miscounts and barycenter error over time from the foam's first touch."""
     figure = style.new(5.2)
     method = to_build(points)
     some = {point.task.method: point for point in points if point.task.family == FAMILY}

@@ -1,4 +1,4 @@
-"""The chart page's tables of the least error of any method, and of other ways to read a sheet."""
+"""The chart page's tables of the least error and of rivals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from contactfpga_sim.model.scenes.families import touches
 
 PITCHES_MM = (5.0, 6.4, 8.0, 10.0)
 SCENES = 4000
-"""Scenes for each floor."""
 
 KNOWN_MM = 7.0
 """Radius of a finger of known size."""
@@ -37,7 +36,6 @@ CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
 
 RIVAL_PITCHES_MM = (6.4, 10.0)
 TOUCHES = 300
-"""Touches for each rival."""
 
 
 def floor_table() -> str:

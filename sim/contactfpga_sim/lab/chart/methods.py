@@ -19,11 +19,10 @@ PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
 PITCH_MM = PITCHES_MM[0]
 
 THRESHOLDS_N = (0.2, 0.6, 1.0)
-"""Closing forces besides the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
+"""Closing forces besides :data:`contactfpga_sim.lab.covers.DOME`'s 0.4 N."""
 
 MOST_ZONES = 32
-"""Zones per frame, enough for all scenes here. More would need longer row times for `run` and divider on the finest
-sheets."""
+"""Zones per frame, enough here; more would need longer row times on the finest sheets."""
 
 
 class Method(NamedTuple):
@@ -31,7 +30,7 @@ class Method(NamedTuple):
 
     skin: Skin
     cover: Cover | None
-    """None: a bare sheet, where a switch closes at any force if its middle is under a contact."""
+    """None: a bare sheet, whose switches close at any force if their middles are under a contact."""
 
 
 def sheet(pitch_mm: float, **settings: Any) -> Skin:
@@ -98,4 +97,4 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
-"""Methods by name, the plainest first; times are from the golden model of each one's gateware."""
+"""By name, the plainest first."""

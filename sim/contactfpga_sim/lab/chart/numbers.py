@@ -15,7 +15,6 @@ from contactfpga_sim.lab.chart.times import Times
 
 QUANTILES = ("touch_median_us", "touch_q95_us", "electric_median_us", "electric_q95_us")
 ENDS = ("", "_low", "_high", "_count")
-"""Field suffixes of an interval."""
 ERRORS = tuple(f"{kind}_{name}" for kind in KINDS for name in METRICS)
 SINGLE = ("bytes", "lower_bound_us", "host_us", "luts", "fmax_mhz")
 FIELDS = (
@@ -37,7 +36,7 @@ def command(point: Point) -> str:
 
 
 def write(points: Iterable[Point], path: Path) -> None:
-    """A line per point: times in us and errors with 95 % intervals, LUT4 and clock on the UP5K."""
+    """A line per point: times in us and errors with intervals, LUT4 and clock on the UP5K."""
     with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, FIELDS, lineterminator="\n")
         table.writeheader()

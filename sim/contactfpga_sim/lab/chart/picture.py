@@ -21,7 +21,6 @@ from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.covers import COVERS
 
 MARKERS = "sv^oDp"
-"""Markers by pitch, finest first."""
 
 COLORS = {
     "tiles": style.BLUE,
@@ -31,13 +30,12 @@ COLORS = {
     "other covers": style.PURPLE,
     "model": style.GREEN,
 }
-"""Colors of covers and rivals."""
 
 MISSED = 0.05
-"""Share of missed contacts from which a mark is hollow: its barycenter error is only of found ones."""
+"""Share of missed contacts that makes a mark hollow: its barycenter error is of found ones."""
 
 LINEAR = 0.01
-"""End of the linear scale, which shows 0; beyond it is logarithmic."""
+"""End of the linear scale, which shows 0, before the logarithmic one."""
 
 SMALL: dict[str, Any] = {"fontsize": style.SMALL}
 
@@ -50,7 +48,6 @@ class Metric(NamedTuple):
     scale: dict[str, Any]
     ticks: tuple[float, ...]
     ends: tuple[float, float]
-    """Ends of the axis, extended to points beyond."""
     show: Callable[[float], str]
 
 
@@ -63,7 +60,6 @@ TIMES_US = {
     20_000: "20 ms",
     100_000: "100 ms",
 }
-"""Ticks of the time axis."""
 
 NEVER_US = 500_000.0
 """Place of a median that is never felt."""
@@ -106,7 +102,7 @@ def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figu
 
 
 def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[RivalMethod]) -> None:
-    """One error of one family, on axes that hold all points."""
+    """One error of one family."""
     _axes(panel, points, metric)
     panel.set_xlabel(ALONG)
     some = [point for point in points if point.task.family == family]
@@ -140,7 +136,7 @@ def hollow(point: Point) -> bool:
 
 
 def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
-    """Axis ends, extended to hold all values."""
+    """Axis ends, extended to all values."""
     finite = [value for value in values if math.isfinite(value)]
     least, most = min(finite, default=usual[0]), max(finite, default=usual[1])
     return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)

@@ -1,8 +1,5 @@
-"""Models of other sensors under the same mechanics: no real device was measured.
-
-Each sees the same scenes through the same cover. Readings of analog elements, microcontroller times and part costs are
-assumptions.
-"""
+"""Models of other sensors under the same mechanics. No device was measured: readings of analog elements,
+microcontroller times and part costs are assumptions."""
 
 from __future__ import annotations
 
@@ -24,27 +21,25 @@ from contactfpga_sim.model.scenes.scene import Scene
 
 Random = np.random.Generator
 Readings = Callable[[Scene, float, Skin, Cover | None, Random], np.ndarray]
-"""(R, C) readings of a scene at a time in s, above 0 where touched."""
+"""(R, C) readings at a time in s, above 0 where touched."""
 
 STRIPS = 4
 """Groups of rows, each read at the middle of its time."""
 
 HALVINGS = 14
-"""Bisections of the rise time for the first touched element."""
 
 # ---- an analog array
 
 BITS = 8
 FULL_N = 10.0
-"""Force at full scale."""
 NOISE_COUNTS = 1.0
 """Standard deviation in converter steps."""
 CROSSTALK = 0.01
-"""Share of an element's force read by each of its four neighbors."""
+"""Share of a force read by each of four neighbors."""
 GAIN_SPREAD = 0.05
 """Relative standard deviation of calibrated gains."""
 THRESHOLD_N = 0.4
-"""Touch force of an element: the closing force of the studies' domes."""
+"""The closing force of the studies' domes."""
 HEAD_BYTES = 4
 """Header of an array's frame, which has a byte per element."""
 
@@ -56,7 +51,7 @@ ROW_CYCLES = 60
 CELL_CYCLES = 15
 """Cycles to store and label a cell in software."""
 SEND_CYCLES = 500
-"""Cycles to make a frame and hand it to UART or USB peripheral, which sends during the next scan."""
+"""Cycles to make a frame for UART or USB, which send during the next scan."""
 USB_SLOT_US, USB_BIT_US = 1000.0, 1 / 12
 
 # ---- rough prices of parts in USD, boards and the elements themselves not counted: assumed, no offers
@@ -67,16 +62,14 @@ DIODE_USD, AMPLIFIER_USD = 0.02, 0.8
 
 @dataclasses.dataclass(frozen=True)
 class Pace:
-    """Times in us on a sheet; scans repeat, and the newest ready one is sent."""
+    """Times in us; scans repeat, and the newest ready one is sent."""
 
     scan_us: float
     """From first row to last, evenly spread."""
     work_us: float
     """From a scan's end until its frame is ready."""
     loop_us: float
-    """Scan period."""
     wire_us: float
-    """Time of a frame on the wire."""
     slot_us: float = 0.0
     """Interval of sending instants; 0: any."""
 
@@ -89,7 +82,6 @@ class Rival:
     readings: Readings
     pace: Callable[[Skin], Pace]
     cost_usd: Callable[[Skin], float]
-    """Rough cost of parts."""
 
     def wires(self, skin: Skin) -> int:
         """Lines of the sheet."""
@@ -101,13 +93,12 @@ class Rival:
         return _blobs(self.readings(scene, scene.settled_s, skin, cover, rng), skin)
 
     def errors(self, scene: Scene, skin: Skin, cover: Cover | None) -> errors.Errors:
-        """Errors of :meth:`zones` against the contacts."""
         there = errors.contacts(scene.truth(scene.settled_s, skin))
         return errors.errors(self.zones(scene, skin, cover), there)
 
     def time_us(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
-        """Time from the first touch of the foam, at 0 s of a scene with rising forces, to the last byte of the first
-        frame that reports a contact; infinite if none does. ``rng`` draws the scan's phase."""
+        """Time from the foam's first touch, at 0 s of a scene with rising forces, to the last byte of the first
+        frame with a contact; infinite if none. ``rng`` draws the scan's phase."""
         first_s = self._first_s(scene, skin, cover, rng)
         if not math.isfinite(first_s):
             return math.inf
@@ -164,7 +155,7 @@ def _blobs(readings: np.ndarray, skin: Skin) -> list[Blob]:
 
 
 def switches(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
-    """1 for a closed switch. On a bare sheet, without force, all contacts close at the touch."""
+    """1 for a closed switch. On a bare sheet, all contacts close at the touch."""
     bare = cover is None or cover.model == "patch"
     return scene.pressed(scene.settled_s if bare else seconds, skin, cover).astype(float)
 
@@ -229,7 +220,7 @@ def _cells_usd(skin: Skin) -> float:
 
 
 def frame_bytes(skin: Skin, items: int) -> int:
-    """Bytes of a frame with this many items in our protocol, which a microcontroller may also use."""
+    """Bytes of a frame with this many items in our protocol."""
     plain = items * skin.derived.item_bytes + skin.derived.trailer_bytes
     return plain + math.ceil(plain / 254) + CHECK_BYTES + 1
 
@@ -262,4 +253,3 @@ RIVALS: dict[str, Rival] = {
         _cells_usd,
     ),
 }
-"""Rivals by name."""

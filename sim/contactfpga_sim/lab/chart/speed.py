@@ -1,5 +1,5 @@
-"""Times by the golden model, a sample also by the gateware: from a touch to the last byte of its complete frame, and
-for a constant scene frame time and rate."""
+"""Times by the golden model, a sample also by the gateware: from a touch to its complete frame's last byte; frame
+time and rate of a constant scene."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 
 FRAMES = 12
-"""Frames that measure the rate."""
 
 WARM_US = 1500.0
-"""Time after power-up by which the first hello is sent and the link works."""
+"""Time after power-up by which the link works."""
 
 
 def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
-    """Clocks from a frame's first row time to the end of its last byte, with nothing else on the wire.
+    """Clocks from a frame's first row time to its last byte, with nothing else on the wire.
 
     ``cells``: (R, C) bool, pressed from the start; ``size``: bytes of their frame, which the keep-alive repeats.
     """
@@ -76,10 +75,8 @@ def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[ReceivedFrame]:
 
 
 STEADY = 12
-"""Scenes also measured while constant."""
 
 MOST_SCANS = 4000
-"""Most scans until a touch is reported."""
 
 GOLDEN = 0.6180339887498949
 """Golden ratio, whose multiples sample a scan evenly."""
@@ -92,13 +89,11 @@ class Speed:
     median_us: float
     worst_us: float
     bound_us: float
-    """Median bound of scans that visit touched rows alone: (A + 1) row times, and the frame's bits."""
+    """Median bound of scans of touched rows alone: (A + 1) row times, and the frame's bits."""
     bytes: float
-    """Median bytes of the frame."""
     frame_us: float
-    """Median from a frame's first row time to its last byte, for a constant scene."""
+    """Median from first row time to last byte, for a constant scene."""
     frames_per_s: float
-    """Median frame rate of a constant scene."""
 
 
 def touch_cycle(skin: Skin, share: float) -> int:
@@ -111,8 +106,7 @@ def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> t
     """Clocks from a touch to the end of the first frame with all these (R, C) bool cells, which close at once after
     ``share`` of a scan; and the frame's bytes.
 
-    With ``check`` the compiled gateware must agree, else :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is
-    raised.
+    With ``check`` the compiled gateware must agree, else :class:`~contactfpga_sim.verify.cosim.compare.Mismatch`.
     """
     whole = int(cells.sum())
     return _until(skin, [(0, cells)], share, lambda frame: frame.cells == whole, check)
@@ -145,10 +139,9 @@ def _until(
 
 
 def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
-    """Speed over touches of (R, C) bool frames, each at another phase of the scan.
+    """Speed over touches of (R, C) bool frames, each at another phase.
 
-    The compiled gateware must agree on the first ``checked``, else
-    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is raised.
+    The first ``checked`` also go through the gateware, as in :func:`touch`.
     """
     derived = skin.derived
     us = skin.clock_hz / 1e6

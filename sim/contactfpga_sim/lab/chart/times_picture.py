@@ -1,4 +1,4 @@
-"""Cost of mechanics and electronics: a line per method, for one family."""
+"""Cost of mechanics and electronics by method, for one family."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ PARTS = {
     "from the first closed switch": style.ORANGE,
     "from the first touch of the foam": style.BLUE,
 }
-"""Meaning of each line, by color."""
 
 
 TITLE = f"{FAMILY}, to the last byte of the first frame with a contact: median, and a line to the 95 % quantile"

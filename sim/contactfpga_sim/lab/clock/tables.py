@@ -1,4 +1,4 @@
-"""Board time on the host's clock, over simulated transports: the fit's errors for docs/clock.md."""
+"""Board time on the host's clock over simulated transports, for docs/clock.md."""
 
 from __future__ import annotations
 
@@ -13,14 +13,13 @@ from contactfpga.driver.clock import ClockFit
 from contactfpga_sim.lab import writer
 
 SECONDS, SEEDS = 60.0, 8
-"""Device time of a run, and runs."""
 WANDER_PPM, WANDER_S = 1.0, 60.0
 """Swing of a crystal's rate with temperature, and period."""
 SENT_S = 150e-6
-"""From the sample of a frame's first row to its last byte, with WIRE_S for its bytes."""
+"""From the sample of the first row to the last byte, with WIRE_S for bytes."""
 WIRE_S = 57e-6
 REQUEST_S, SCAN_S = 30e-6, 100e-6
-"""Request time on the wire, and longest wait for the next scan."""
+"""Request on the wire, and longest wait for a scan."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,9 +35,8 @@ class Path:
     """Mean host delay, exponentially distributed."""
     rate_hz: float = 1000.0
     asked_s: float = 1.0
-    """Interval of requests."""
     stall: float = 0.0
-    """Share of frames delayed by 20 ms because the host is busy."""
+    """Share of frames 20 ms late because the host is busy."""
 
 
 PATHS = {
@@ -53,6 +51,8 @@ PATHS = {
 
 
 class Moment(NamedTuple):
+    """One frame."""
+
     time_us: int
     arrived_s: float
     sampled_s: float
@@ -75,7 +75,7 @@ class FrameTimes(NamedTuple):
 
 
 def moments(path: Path, ppm: float, seed: int, seconds: float = SECONDS) -> Iterator[Moment]:
-    """Frames as they arrive from a board whose clock is off by ``ppm``."""
+    """Frames of a board whose clock is off by ``ppm``."""
     rng = random.Random(seed)
     base_s, phase_s = rng.uniform(0, 1000), rng.uniform(0, path.tick_s)
     device_s = np.arange(1 / path.rate_hz, seconds, 1 / path.rate_hz)
@@ -110,13 +110,11 @@ class Accuracy(NamedTuple):
     """Errors over all runs of a path, without each first second."""
 
     late_s: float
-    """Mean delay from sample to arrival."""
     error_s: float
-    """Median magnitude of the error."""
+    """Median magnitude."""
     worst_s: float
-    """99 % quantile of errors."""
+    """99 % quantile."""
     sigma_s: float
-    """Median stated uncertainty."""
     within: float
     """Share of errors within two stated uncertainties."""
 
@@ -156,5 +154,5 @@ def accuracy_table(names: Iterable[str] = PATHS) -> str:
 
 
 def slow_sample() -> str:
-    """One row of :func:`accuracy_table`."""
+    """A row of :func:`accuracy_table`."""
     return accuracy_table(("slow",)).splitlines()[-1]

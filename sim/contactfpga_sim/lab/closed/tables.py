@@ -1,4 +1,4 @@
-"""Cost of joining zones over the seam of a closed sheet, for docs/labelling.md."""
+"""Cost of zones over the seam of a closed sheet, for docs/labelling.md."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contactfpga_sim.model.golden import volume
 
 CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]
 COLUMNS = 8
-"""Columns of the sheet whose last two rows are all tried."""
+"""Columns whose last two rows are all tried."""
 AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": True}
 
 
@@ -26,7 +26,7 @@ def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> 
 
 
 def clocks_table() -> str:
-    """Time of the last record over every pair of last rows, and bounds."""
+    """Time of the last record over all last rows, and bounds."""
     head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
     bounds = [f"bound of {lines} columns" for lines in size.SIZES]
     rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))

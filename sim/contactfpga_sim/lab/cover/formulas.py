@@ -18,10 +18,10 @@ from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import LADDER, Model, PaddedSheet
 
 FLOOR = 1e-13
-"""Errors below this are the reference's own, written as "less than"."""
+"""Errors below this are the reference's own."""
 
 STALLED = 200_000
-"""Steps after which Euler's method is abandoned."""
+"""Steps after which Euler's method gives up."""
 
 
 class Blow(NamedTuple):
@@ -175,7 +175,7 @@ def relative_errors(rule: Rule) -> list[float]:
 
 
 def seconds(call: Callable[[], object], repeats: int = 5) -> float:
-    """Shortest of several runs, each long enough to time."""
+    """Shortest of several runs."""
     call()
     count, took = 1, 0.0
     while took < 2e-3:

@@ -294,5 +294,5 @@ def failing_table() -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """Pictures of the command's answer and of the caps."""
+    """Pictures of the answer and the caps."""
     return [caps.draw(folder / "cover-caps.svg"), *drawing.draw(folder, "svg")]

@@ -34,22 +34,19 @@ class Canvas:
         self.axes.text(x, y, words, **{"va": "center", "fontsize": style.NORMAL, "color": style.INK} | how)
 
     def small(self, x: float, y: float, words: str, **how: Any) -> None:
-        """Draw secondary words."""
         self.text(x, y, words, **{"fontsize": style.SMALL, "color": style.SOFT} | how)
 
     def box(self, x: float, y: float, w: float, h: float, color: str, **how: Any) -> None:
-        """Draw a rectangle with its upper left corner at (x, y), tinted in a palette color."""
+        """Draw a rectangle from (x, y) down, in a tint."""
         from matplotlib.patches import Rectangle
 
         look: dict[str, Any] = {"fc": TINTS.get(color, color), "ec": color, "lw": 1} | how
         self.axes.add_patch(Rectangle((x, y), w, h, **look))
 
     def area(self, points: Sequence[tuple[float, float]], color: str, **how: Any) -> None:
-        """Draw a filled polygon."""
         self.axes.fill(*zip(*points, strict=True), **{"fc": color, "ec": "none", "lw": 0.8} | how)
 
     def line(self, *points: tuple[float, float], color: str = style.SOFT, **how: Any) -> None:
-        """Draw a line through points."""
         self.axes.plot(*zip(*points, strict=True), **{"color": color, "lw": 1, "solid_capstyle": "round"} | how)
 
     def arrow(self, *points: tuple[float, float], color: str = style.SOFT, both: bool = False) -> None:

@@ -17,14 +17,13 @@ PX_PER_MM = 17.0
 CELLS = 4
 LEFT = 62.0
 TOP = 190.0
-"""Top of the foam, px."""
 DIODE_HEIGHT_MM = 1.0
 """Height of a SOD-323 above its board."""
 SKIN_COLOR = "#e8c4a8"
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Draw a fingertip as wide as in docs/cover.md that closes two switches; the foam's own compression is omitted."""
+    """A fingertip as wide as in docs/cover.md closes two switches; the foam does not compress."""
     canvas = Canvas(404)
     cover = load_cover(kit.skin_path)
     assert cover is not None

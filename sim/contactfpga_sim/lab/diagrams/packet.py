@@ -1,4 +1,4 @@
-"""A map of a packet: bytes of a frame with one zone, their bits, and the fields of a hello."""
+"""A map of a packet: a frame's bytes and bits, and a hello's fields."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 LEFT, RIGHT = 16.0, 704.0
 HEIGHT = 34.0
 BITS = 32
-"""Bits in a line of bit fields."""
 
 
 class Field(NamedTuple):

@@ -11,9 +11,8 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 from contactfpga_sim.lab.finger.stages import ASSUMED_HOST_US
 
 SKIN, BOARD, HOST = (16, 184), (272, 146), (560, 144)
-"""Left end and width of each column, px."""
+"""Left end and width, px."""
 CELLS = 9
-"""Switches in the drawn row."""
 
 
 def draw(kit: Kit, path: Path) -> Path:

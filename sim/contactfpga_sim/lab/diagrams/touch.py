@@ -17,15 +17,13 @@ LANES = ("row is driven", "zone is found", "byte on the line", "contact")
 ROW, ZONE, BYTE, CONTACT = range(len(LANES))
 TOUCHED, OTHER = style.VERMILLION, style.SKY
 HALF = 0.3
-"""Half a bar's height; lanes are 1 apart."""
 BYTE_BITS = 10
-"""Bits of a byte with start and stop."""
 BEFORE_OFFER = 2
-"""Clocks from the last one that drives a row to its handover (docs/timing.md)."""
+"""Clocks from a row's last one to its handover (docs/timing.md)."""
 
 
 def draw(path: Path) -> Path:
-    """Draw a panel per kit, and one row of the raster scan between them."""
+    """A panel per kit, and one row of the raster scan between them."""
     figure = style.new(6.6)
     raster, slot, reversal = figure.subplots(3, 1, height_ratios=(4, 2.4, 4))
     starter, fast = (kits.kit(name).skin for name in ("starter", "fast"))
@@ -60,7 +58,7 @@ def _touch(axes: Any, skin: Skin, title: str) -> None:
 
 
 def _bars(skin: Skin, touch: wave.SimulatedTouch) -> Iterator[tuple[int, float, float, str]]:
-    """Lane, first clock, clocks and color of each bar."""
+    """Lane, first clock, clocks and color of bars."""
     trace, times = touch.trace, skin.derived
     for cycle, cells, _ in trace.rows:
         first = cycle - BEFORE_OFFER - times.settle_clocks

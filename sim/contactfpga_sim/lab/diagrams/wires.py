@@ -16,15 +16,12 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 STEP = 16.0
 TOP = 62.0
 BOARD_X, SHEET_X = 214.0, 470.0
-"""Wire ends, px."""
 PIN = 26.0
-"""Width of a pin's box."""
 POWER = {"5": GND, "6": SUPPLY, "11": GND, "12": SUPPLY}
 """Power pins of a PMOD connector (docs/boards.md)."""
 RAILS = {GND: style.BLACK, SUPPLY: style.VERMILLION}
 OUT = style.GREEN
 COLORS = style.BLUE, style.PURPLE, style.BROWN
-"""Wire colors by connector of the board."""
 
 
 class Pin(NamedTuple):
@@ -87,7 +84,7 @@ def _connectors(
     leads: dict[str, str],
     colors: dict[str, str],
 ) -> dict[str, list[tuple[float, float]]]:
-    """Draw pins below one another; return the ends of their wires."""
+    """Draw pins in a column; return wire ends."""
     found: dict[str, list[tuple[float, float]]] = {}
     y = TOP
     for name, pins in connectors.items():

@@ -1,4 +1,4 @@
-"""Knobs of the sheet's wiring: slow columns, weak switches, missing diodes, broken and stuck lines."""
+"""Knobs of the sheet's wiring."""
 
 from __future__ import annotations
 
@@ -58,7 +58,6 @@ LAZY_CIRCUIT = WEAKLY.replace(line_ohm=2000.0)
 
 
 def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> list[tuple[int, int]]:
-    """Random places of 2x2 fingers, at least ``free`` cells apart."""
     spots: list[tuple[int, int]] = []
     while len(spots) < count:
         row, column = map(int, rng.integers(0, (skin.rows - 1, skin.columns - 1)))
@@ -117,12 +116,12 @@ SETTLE = Knob(
 
 
 def bare(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of three fingers at corners of rectangles; one loses its switches' diodes one by one."""
+    """Outcomes of three fingers at corners of rectangles, one of which loses its diodes one by one."""
     return [_bare(skin, int(count), _rectangle(rng, skin)[:3], rng) for _ in range(draws)]
 
 
 def _rectangle(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
-    """Rectangle corners that leave a row and column between the 2x2 fingers on them."""
+    """Corners that leave a row and column between 2x2 fingers."""
     (y, x), (v, u) = _crossed(rng, skin)
     return [(y, x), (y, u), (v, x), (v, u)]
 
@@ -241,7 +240,7 @@ GHOST = Knob(
 
 
 PATIENT, PATIENT_GUARDED = (skin.replace(settle_us=5.0) for skin in (REVERSAL, REVERSAL_GUARDED))
-"""Skins whose columns allow the time of weak switches."""
+"""Skins with time for weak switches."""
 
 
 def _switch(skin: Skin, kiloohm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
@@ -332,7 +331,6 @@ MASKED = REFERENCE.replace(mask=((2, 3), (12, 2), (5, 12)))
 
 
 def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes with switches stuck away from the finger, masked ones first."""
     found = []
     for _ in range(draws):
         touch, beside = _finger_anywhere(rng, skin)
@@ -346,7 +344,7 @@ def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> li
 
 
 def _finger_anywhere(rng: np.random.Generator, skin: Skin) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, columns) bool each: a finger clear of the mask, and its cells with their neighbors."""
+    """(rows, columns) bool each: a finger clear of the mask, and its cells with neighbors."""
     while True:
         ((row, column),) = _apart(rng, skin, 1)
         touch, beside = finger(skin, (row, column)), np.zeros((skin.rows, skin.columns), bool)

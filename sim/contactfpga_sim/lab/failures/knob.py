@@ -17,15 +17,13 @@ class Outcome:
 
     right: bool
     told: tuple[str, ...] = ()
-    """Flags, counters and errors that reported a fault."""
+    """Flags, counters and errors."""
     what: str = ""
-    """The result in a few words."""
     amount: float = 0.0
-    """The number in the picture."""
+    """Number in the picture."""
     cells: np.ndarray | None = None
-    """(rows, columns) bool pressed cells to draw."""
+    """(rows, columns) bool, to draw."""
     zones: tuple[Place, ...] = ()
-    """Barycenters to draw."""
     rate: str = ""
     """Share of correct draws, if several."""
 
@@ -40,18 +38,15 @@ class Knob:
     """A quantity that is moved until something breaks."""
 
     name: str
-    """Name of the picture's file."""
     title: str
     axis: str
     """The quantity with its unit."""
     amount: str
     """Meaning of :attr:`Outcome.amount`."""
     values: tuple[float, ...]
-    """Values in sweep order."""
     runs: Mapping[str, Callable[[float], Outcome]]
     """Outcome at a value, by method or setting."""
     helps: str
-    """The remedy."""
     format: str = "{:,g}"
     unnoticed: str = ""
     """Why nothing reports a ``silent`` fault."""
@@ -63,7 +58,7 @@ class Knob:
     def sweep(
         self, step: Callable[[], None] = lambda: None, so_far: dict[str, Sweep] | None = None
     ) -> dict[str, Sweep]:
-        """Outcomes of all values and methods. After each, ``so_far`` holds it and ``step()`` is called."""
+        """Outcomes of all values and methods. Each enters ``so_far``, then ``step()`` is called."""
         found = {} if so_far is None else so_far
         for name, run in self.runs.items():
             found[name] = Sweep(self.values, tuple(map(run, self.values)))
@@ -85,18 +80,17 @@ class Sweep:
 
     @property
     def breaks_at(self) -> float | None:
-        """The first wrong value."""
         return None if self.broken is None else self.values[self.broken]
 
     @property
     def holds_until(self) -> float | None:
-        """The last value up to which all are right; None if the first is wrong."""
+        """Last value up to which all are right, or None."""
         last = len(self.values) if self.broken is None else self.broken
         return self.values[last - 1] if last else None
 
     @property
     def warns_at(self) -> float | None:
-        """The first value with a warning, if nothing is wrong there."""
+        """First value with a warning, if still right."""
         first = next((index for index, outcome in enumerate(self.outcomes) if outcome.told), None)
         return self.values[first] if first is not None and self.outcomes[first].right else None
 

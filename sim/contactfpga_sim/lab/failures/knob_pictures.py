@@ -1,6 +1,6 @@
 """A knob as a picture: the share of right draws by value, and the sheet before and at the first break.
 
-The SVG is hand-written, so that equal numbers make equal files.
+Hand-written SVG: equal numbers make equal files.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from contactfpga_sim.lab.failures.rated import Rated
 from contactfpga_sim.lab.failures.rig import plural
 
 LETTER = 7.5
-"""Width of a letter, in pixels."""
 
 
 class Span(NamedTuple):
@@ -33,10 +32,8 @@ class Span(NamedTuple):
 
 
 def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span], str]:
-    """The values' places in sweep order, and a note on the scale.
-
-    Evenly spaced or negative values are linear; others logarithmic, with a first 0 set apart.
-    """
+    """The values' places in sweep order, and a note on the scale: linear if evenly spaced or negative, else
+    logarithmic, with a first 0 set apart."""
     steps = np.diff(values)
     if np.allclose(steps, steps[0]) or min(values[1:]) <= 0:
         places, scale = np.array(values, float), ""
@@ -53,7 +50,7 @@ def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span
 
 
 def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
-    """Indexes of labeled values: even steps if evenly spaced, else all with room."""
+    """Labeled values: even steps if evenly spaced, else all with room."""
     wide = [span.end - span.start for span in spans]
     if np.allclose(wide, wide[0]):
         choices = [list(range(0, len(words), step)) for step in (1, 2, 4, 5, 10, 20, len(words))]
@@ -73,26 +70,22 @@ def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int
 
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
 TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}
-"""Height of a bar that repeats its color's meaning."""
 
 WORDS = {"right": "right", "warned": "right, warned", "told": "wrong, reported", "silent": "wrong, not noticed"}
-"""Words below the first bar of each kind."""
 
 NAME, LEFT, TOP, HIGH = 16, 190, 66, 44
-"""Left ends of a method's name and chart, the chart's top and height, in pixels."""
+"""Left ends of names and charts, a chart's top and height, in pixels."""
 
 BESIDE, ALONE = 274, 510
-"""Width of charts beside two sheets, and without."""
+"""Width of charts with and without sheets."""
 
 STEP = 96
-"""From one method's chart to the next."""
 
 SIDE, SHEETS = 104, (488, 604)
-"""Size of a sheet, and where each begins."""
 
 
 def svg(knob: Knob, methods: Mapping[str, Sweep]) -> str:
-    """The picture. Methods with equal outcomes at all values share a chart."""
+    """The picture; methods with equal outcomes share a chart."""
     charts = _alike(methods)
     method, sheets = _sheets(knob, methods)
     spans, scale = placed(knob.values, LEFT, BESIDE if sheets else ALONE)
@@ -131,7 +124,7 @@ def _level(knob: Knob) -> float | None:
 
 
 def _alike(methods: Mapping[str, Sweep]) -> list[tuple[list[str], tuple[Outcome, ...]]]:
-    """Names and outcomes of methods, together those with equal shares and reports."""
+    """Methods with equal shares and reports, together."""
     found: dict[Any, tuple[list[str], tuple[Outcome, ...]]] = {}
     for name, sweep in methods.items():
         key = tuple((outcome.amount, _kind(outcome)) for outcome in sweep.outcomes)

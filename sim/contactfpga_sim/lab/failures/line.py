@@ -1,4 +1,4 @@
-"""Knobs of the line and its ends: differing baud rates, noise, another clock, a slow host."""
+"""Knobs of the line and its ends."""
 
 from __future__ import annotations
 
@@ -34,13 +34,12 @@ class Line:
     edges: np.ndarray
     """(n,) float: clocks of level changes; the level begins high."""
     end: float
-    """Recorded clocks."""
     frames: tuple[bytes, ...]
     """Sent packets in order, without delimiters."""
 
     @classmethod
     def record(cls, skin: Skin, scans: int, seed: int) -> Line:
-        """Record a board whose sheet shows new random fingers in each scan."""
+        """Record a board under new random fingers in each scan."""
         rng = np.random.default_rng(seed)
         with Rig(skin, capture=("line",)) as rig:
             rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), hello_clocks(skin))
@@ -59,7 +58,7 @@ class Line:
             return cls(skin, edges, float(rig.board.cycle), tuple(packets))
 
     def noisy(self, rate_hz: float, seed: int) -> Line:
-        """The line with ``rate_hz`` pulses per second that invert the level for half a bit to two bits."""
+        """The line with ``rate_hz`` pulses per second that invert it for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
         bit = self.skin.derived.bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)
@@ -67,8 +66,8 @@ class Line:
         return dataclasses.replace(self, edges=np.sort(np.concatenate([self.edges, starts, starts + lengths])))
 
     def read(self, bit_clocks: float, phase: float = 0.0) -> bytes:
-        """Bytes that a UART reads at ``bit_clocks`` board clocks per bit, without those that lack a stop bit.
-        ``phase`` (0 to 1) delays its sampling by part of a sample."""
+        """Bytes that a UART reads at ``bit_clocks`` clocks per bit, without those that lack a stop bit. ``phase`` (0
+        to 1) delays sampling by part of a sample."""
         tick = bit_clocks / OVERSAMPLING
         data, now, last = bytearray(), 0.0, self.end + 12 * self.skin.derived.bit_clocks
         offsets = tick * (OVERSAMPLING * np.arange(10) + OVERSAMPLING // 2)
@@ -106,7 +105,6 @@ class HostDecoding:
     wrong: int
     """Arrived frames that were never sent."""
     told: tuple[str, ...]
-    """Nonzero counters, and errors."""
 
 
 def heard(line: Line, data: bytes, greeted: bytes = b"") -> HostDecoding:
@@ -130,7 +128,7 @@ def _decoded(data: bytes) -> tuple[list[str], Conversation]:
 
 
 def _sent(zones: Zones) -> dict[str, object]:
-    """A frame without the flags and board time that the host adds from earlier frames."""
+    """A frame without what the host adds from earlier frames."""
     own = {name: value for name, value in zones.to_dict().items() if not name.startswith("host_")}
     return own | {"flags": sorted(zones.frame.flags)}
 
@@ -146,11 +144,12 @@ RECORDED = 200
 
 @functools.cache
 def recorded(scans: int, seed: int) -> Line:
+    """A cached recorded line."""
     return Line.record(SKIN, scans, seed)
 
 
 def _of_line(found: HostDecoding) -> Outcome:
-    """Right if every frame arrives; an unsent frame is worse than a lost one, and silent."""
+    """Right if every frame arrives; an unsent one is worse than a lost one, and silent."""
     missing = found.sent - found.arrived
     what = f"{missing} of {found.sent} frames do not arrive"
     if found.wrong:
@@ -184,7 +183,7 @@ def _number(rng: np.random.Generator) -> int:
 
 
 def _asked(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of requests at the host's rate and any time: does a frame answer?"""
+    """Outcomes of requests at any time: does a frame answer?"""
     bit = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
     found = []
     with Rig(SKIN) as rig:
@@ -277,7 +276,7 @@ TTY_BYTES = 4095
 
 
 class SlowHost:
-    """A virtual board with an operating system's buffer, whose time passes while the host is busy."""
+    """A virtual board behind an operating system's buffer, whose time passes while the host works."""
 
     live, threaded = True, False
     name = "the slow host"
@@ -287,7 +286,6 @@ class SlowHost:
         self._waiting: deque[int] = deque()
 
     def work(self, seconds: float) -> None:
-        """Keep the host busy."""
         end = self._board.clock() + seconds
         while (left := end - self._board.clock()) > 1e-6:
             self._keep(self._board.read(min(left, 1e-4)))
@@ -313,7 +311,6 @@ class SlowHost:
 
 
 def _slow_host(milliseconds: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of cycles in which the driver reads all, then the host works."""
     transport = SlowHost()
     scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
     found = []
@@ -352,7 +349,7 @@ MAX_AGE_S = 0.005
 
 @functools.cache
 def _silence(max_age_s: float | None, phase: float) -> tuple[str, float]:
-    """Error and delay at a program that reads the newest frame of a board that stops at this phase."""
+    """Error and delay at a reader of a board that stops at this phase."""
     transport = DyingBoard()
     with Driver(transport) as board:
         board.greet(1.0)
@@ -378,7 +375,6 @@ def _told_late(max_age_s: float | None, milliseconds: float, rng: np.random.Gene
 
 
 PHASES = 32
-"""Shares of a scan at which a board stops."""
 
 SILENCE = Knob(
     name="silence",

@@ -1,4 +1,4 @@
-"""How often a method is right at a value, by a sequential test."""
+"""How often a method is right, by a sequential test."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from contactfpga_sim.lab.flips.campaign import wilson
 LEVEL = 0.95
 """Share that must be right for a value to hold."""
 LOOKS = (30, 120, 480, 1920)
-"""Draws before each test of the interval. At least 120, all right, show :data:`LEVEL`."""
+"""Draws before each test. At least 120, all right, show :data:`LEVEL`."""
 Z = 2.5
-"""z of Wilson's interval at one test, so that it holds at all four with 95 %."""
+"""z of Wilson's interval at each of four tests, for 95 % overall."""
 
 SHARE = "share of draws that are right"
 """Meaning of :attr:`contactfpga_sim.lab.failures.knob.Outcome.amount` here."""
 
 Draws = Callable[[float, np.random.Generator, int], Sequence[Outcome]]
-"""Outcomes by the knob's value, random numbers and number of draws."""
+"""Outcomes by value, random numbers and draws."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +34,6 @@ class Rate:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of the interval."""
         return wilson(self.right, self.of, Z)
 
     def reaches(self, level: float) -> bool | None:
@@ -49,10 +48,10 @@ class Rate:
 
 @dataclasses.dataclass(frozen=True)
 class Rated:
-    """A knob's method, tried in as many draws as the decision needs.
+    """A knob's method in as many draws as the decision needs.
 
-    A value holds if the interval is above the level; it fails if the interval is below, or still contains it after
-    ``most`` draws. All values share a seed.
+    A value holds if the interval is above the level; it fails if below, or still undecided after ``most`` draws. All
+    values share a seed.
     """
 
     draws: Draws
@@ -60,11 +59,11 @@ class Rated:
     most: int = LOOKS[-1]
     level: float = LEVEL
     telling: float = 1.0
-    """Share of wrong draws that must be reported, else the fault counts as unnoticed."""
+    """Share of wrong draws that must be reported, else the fault is unnoticed."""
 
     def __call__(self, value: float) -> Outcome:
-        """The rate at a value. Words and sheet are of a right draw if the value holds, else of a wrong one,
-        unreported if possible."""
+        """The rate at a value. Words and sheet are of a right draw if it holds, else of a wrong one, unreported if
+        possible."""
         rng = np.random.default_rng(self.seed)
         found: list[Outcome] = []
         for look in LOOKS:
@@ -77,8 +76,8 @@ class Rated:
 
 
 def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:
-    """One outcome of all draws, with the reports of half the draws if the value holds, else of at least ``telling``
-    of the wrong ones."""
+    """One outcome of all draws, with the reports of half the draws if the value holds, else of a share ``telling``
+    of wrong ones."""
     wrong = [one for one in found if not one.right]
     each = [{re.sub(r"\d+", "N", word) for word in one.told} for one in (found if holds else wrong)]
     told = set().union(*each) if holds or sum(map(bool, each)) >= telling * len(each) else set()

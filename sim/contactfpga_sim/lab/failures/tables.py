@@ -24,7 +24,7 @@ def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
 
 
 def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> list[str]:
-    """A knob's lines, with common cells in the first. ``pictured``: the page has its picture."""
+    """A knob's lines, common cells in the first. ``pictured``: the page has its picture."""
     title = f"[{knob.title}](#{knob.name})" if pictured else knob.title
     lines = []
     for number, (method, sweep) in enumerate(methods.items()):
@@ -53,7 +53,7 @@ def _rate(outcome: Outcome) -> str:
 
 
 def says(knob: Knob, sweep: Sweep) -> str:
-    """Reports at the break and before it, and whether something later passes unnoticed."""
+    """Reports at the break and before, and whether anything later is unnoticed."""
     assert sweep.broken is not None
     told = sweep.outcomes[sweep.broken].told
     parts = [", ".join(f"`{word}`" for word in told) if told else "**not noticed**"]
@@ -104,7 +104,6 @@ SAID = {
     "host": "No picture: beyond the limit, frames are lost and counted.",
     "silence": "No picture: the newest frame is as old as the silence is long.",
 }
-"""Sentences in place of repetitive pictures."""
 
 
 def pictures() -> str:
@@ -113,7 +112,7 @@ def pictures() -> str:
 
 
 def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> str:
-    """A heading per knob, and its picture from a folder of ``docs/images``, or a sentence."""
+    """A heading per knob, and a picture from a folder of ``docs/images``, or a sentence."""
     shown = {name: f"![{knob.title}](images/{folder}/{name}.svg)" for name, knob in knobs.items()} | dict(said)
     return "\n".join(f"### `{name}`\n\n{what}\n" for name, what in shown.items())
 
@@ -126,7 +125,7 @@ def compute() -> dict[str, dict[str, Sweep]]:
 
 
 def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None:
-    """Sweep the knobs in turn; each is in ``sweeps`` as soon as it is done."""
+    """Sweep the knobs in turn; each enters ``sweeps`` when done."""
     runs = sum(len(KNOBS[name].runs) for name in names)
     with progress() as step:
         for name in names:
@@ -143,6 +142,6 @@ def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
 
 
 def draw_for_page(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """Pictures in a folder of their own, without those that :data:`SAID` replaces."""
+    """Pictures in their own folder, without those that :data:`SAID` replaces."""
     (folder / "failures").mkdir(exist_ok=True)
     return draw(folder / "failures", {name: methods for name, methods in sweeps.items() if name not in SAID})

@@ -1,4 +1,4 @@
-"""Knobs of touch: close, light and moving contacts, bouncing switches, a winding arm, crossing shadows, many zones.
+"""Knobs of touch.
 
 Fingers press a bare sheet, whose switches close under a contact's middle whatever its force, and the starter kit's
 covered sheet.
@@ -46,21 +46,19 @@ def _middle(pitch_mm: float, rng: np.random.Generator) -> np.ndarray:
 def _pair(
     gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator, force_n: float | None = None
 ) -> Scene:
-    """Two fingers around :func:`_middle`, at any angle."""
     x, y = _middle(pitch_mm, rng)
     forces = {} if force_n is None else {"force_n": force_n}
     return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180), **forces))
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius; the gateware does not depend on the pitch."""
+    """Outcomes of two fingers; the gateware does not depend on the pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
 
 
 def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius on the starter kit's sheet."""
     skin = STARTER.skin
     scenes = (_pair(gap_mm, 8.0, skin.pitch_x_mm, rng, force_n) for _ in range(count))
     cells = np.array([scene.pressed(0.0, skin, COVER) for scene in scenes])
@@ -126,8 +124,7 @@ FIRST, LAST = 2.0, 13.0
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame with the largest error of its zone, for a finger of 10 N from any phase; infinite without exactly
-    one zone."""
+    """The frame with the largest error, for a finger of 10 N from any phase; infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -189,7 +186,7 @@ def debounced(method: str) -> Skin:
 
 
 def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
-    """Touches that the host sees when a switch closes, opens and closes again."""
+    """Touches at the host when a switch closes, opens and closes again."""
     rest, touch = np.zeros((2, 1, skin.rows, skin.columns), bool)
     touch[0, 2, 1] = True
     clocks = skin.derived.clocks_per_us
@@ -204,7 +201,7 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of a switch that closes at any phase for 30 to 300 us, then opens and closes again."""
+    """Outcomes of a switch that closes at any phase for 30 to 300 us, opens and closes again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)
@@ -235,7 +232,7 @@ SKINS = {name: REFERENCE.replace(labeller=name) for name in LABELLERS}
 
 
 def arm(size: int, quarters: int) -> np.ndarray:
-    """(size, size) bool: an arm one cell wide that winds inward, with a free cell between turns."""
+    """(size, size) bool: an arm one cell wide that winds inward with a free cell between turns."""
     cells = np.zeros((size, size), bool)
     y, x, (dy, dx) = 0, 0, (0, 1)
     cells[y, x] = True
@@ -248,7 +245,6 @@ def arm(size: int, quarters: int) -> np.ndarray:
 
 
 def _winding(skin: Skin, quarters: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of the winding arm, randomly turned and mirrored."""
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)

@@ -1,8 +1,7 @@
 """The host's share of a touch, measured: the driver reads a board on a pseudo-terminal.
 
-A second process is the board and its USB bridge: it runs the compiled gateware, answers requests, and writes each
-packet when the bridge would deliver it. Writing to the pseudo-terminal stands for the USB controller's interrupt and
-the kernel's driver.
+A second process is board and USB bridge: it runs the compiled gateware, answers requests, and writes each packet when
+the bridge would. Writing to the pseudo-terminal stands for the USB controller's interrupt and the kernel's driver.
 """
 
 from __future__ import annotations
@@ -29,26 +28,23 @@ from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
 TOUCHES = 100
 
 PHASE = 0.7548776662466927
-"""Its multiples sample a bridge period evenly, independent of the scan."""
+"""Its multiples sample a bridge period evenly."""
 
 LEAD_US = 5_000
-"""Time before a touch from which packets are written on time; earlier ones at once."""
+"""Time before a touch from which packets are written on time."""
 
 SPIN_S = 300e-6
 """Possible oversleep; the rest of a wait polls the clock."""
 
 LATE_S, LATE_US = 0.5e-3, 2_000
-"""A touch is left out if a busy machine wrote a packet late by more than LATE_S in the last LATE_US before it: a
-burst would keep the driver busy as no bridge does."""
+"""A touch is left out if a busy machine wrote a packet late by more than LATE_S in the last LATE_US before it:
+bursts would keep the driver busy."""
 
 TRIES = 3
-"""Most touches played per wanted one."""
 
 WAIT_S = 10.0
-"""Timeout for a frame."""
 
 TIME_MASK = (1 << 24) - 1
-"""Mask of a frame's time on the wire."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +54,6 @@ class HostShare:
     us: Spread
     touches: int
     left_out: int
-    """Touches left out (:data:`LATE_S`)."""
     machine: str
     times: MixedTimes = dataclasses.field(repr=False, compare=False)
 
@@ -70,8 +65,8 @@ def measured(
     touches: int = TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> HostShare | None:
-    """The host's share over touches by these (R, C) bool contacts in turn. None without pseudo-terminals, or on a
-    machine too busy for a touch."""
+    """The host's share over touches by these (R, C) bool contacts in turn. None without pseudo-terminals, or on too
+    busy a machine."""
     if not hasattr(os, "openpty"):
         return None
     found: list[float] = []
@@ -100,7 +95,6 @@ def measured(
 
 
 def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
-    """Microseconds to a touch's frame and zones in user code."""
     while True:
         zones = board.next(WAIT_S)
         tuple(zones)
@@ -110,7 +104,7 @@ def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
 
 
 def machine() -> str:
-    """This machine and its Python in a few words."""
+    """This machine and its Python."""
     processor = platform.processor() or platform.machine()
     if (about := Path("/proc/cpuinfo")).exists():
         names = [line.partition(":")[2].strip() for line in about.read_text().splitlines() if "model name" in line]
@@ -131,11 +125,10 @@ class _Player:
         self.port = os.ttyname(self._slave)
         self.go = context.Event()
         self.written_s = context.RawArray("d", touches)
-        """By touch, ``time.monotonic`` just before the write of the packet with its last byte."""
+        """``time.monotonic`` before the packet with the last byte, by touch."""
         self.time_us = context.RawArray("q", [-1] * touches)
-        """Frame time on the wire, by touch."""
         self.late_s = context.RawArray("d", touches)
-        """By touch, the largest lateness of that packet and those shortly before."""
+        """Largest lateness of recent packets, by touch."""
         self.process = context.Process(target=self._run, daemon=True)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A bar per stage from a touch to user code, with the paper's time beside their sum."""
+"""A bar per stage from touch to user code, and the paper's time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from contactfpga_sim.lab.spread import Spread
 EXACT, MEASURED, PAPER = style.BLUE, style.ORANGE, style.GRAY
 
 PALE = 0.35
-"""Share of color from median to worst."""
 
 
 def save(found: Finger, title: str, path: Path) -> Path:

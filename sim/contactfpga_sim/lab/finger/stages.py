@@ -17,10 +17,10 @@ from contactfpga_sim.lab.spread import MEDIAN, MOST, MixedTimes, Spread, summed
 from contactfpga_sim.lab.usb import BridgeSettings, delivered
 
 PAPER_US = 6000.0
-"""The paper's time for sheet and control, from a touch to the decision to turn back."""
+"""The paper's time from a touch to the decision to turn back."""
 
 ASSUMED_HOST_US = 1e6 * Usb().host_s
-"""Time from the host's USB controller to the decision, as in ``contactfpga study arm``."""
+"""From the host's USB controller to the decision, as in ``contactfpga study arm``."""
 
 
 class TooFast(ContactFPGAError, ValueError):
@@ -38,7 +38,6 @@ class Finger:
     usb_us: Spread
     """From the touch to the host's USB controller."""
     host: HostShare | None
-    """None if not measured."""
     user_code_us: Spread | None
     """From the touch to user code: each exact time with each measured one."""
 
@@ -48,7 +47,6 @@ class Finger:
         return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
 
     def as_json(self) -> dict[str, Any]:
-        """Results as plain values."""
         board = dataclasses.asdict(dataclasses.replace(self.board, recorded=()))
         del board["recorded"]
         shares = self.host
@@ -79,8 +77,8 @@ def measure(
     host_touches: int = host.TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> Finger:
-    """The board's stages by :func:`contactfpga_sim.lab.latency.measure`, the bridge's over all its phases, and the
-    host's over ``host_touches``, 0 for none.
+    """The board's stages by :func:`contactfpga_sim.lab.latency.measure`, the bridge's over all phases, and the host's
+    over ``host_touches``, 0 for none.
 
     Raises ValueError for a contact that does not fit, :class:`TooFast`, and :class:`~contactfpga_sim.lab.latency.Late`.
     """

@@ -1,4 +1,4 @@
-"""Cost of Skins in LUT4 from synthesis, computed only as far as ranking needs."""
+"""Cost of Skins in LUT4, computed only as far as ranking needs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from contactfpga_sim.lab import kept, size
 from contactfpga_sim.lab.fit.trial import SoFar, Step, Trial, gathered
 
 DEVICE = sizes.UP5K
-"""Device of the LUT4 counts."""
 
 
 def sized(
@@ -32,7 +31,7 @@ def sized(
 
 
 def luts_of(skin: Skin) -> int:
-    """LUT4 of the design on the :data:`DEVICE`; takes seconds unless cached."""
+    """LUT4 of the design; takes seconds unless cached."""
     key = f"{kept.made_by(__name__, skin)} {size.tools(DEVICE)}"  # spares looking at the netlist of the same Skin again
     found: int = kept.kept("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
     return found

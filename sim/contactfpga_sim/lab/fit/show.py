@@ -17,7 +17,7 @@ from contactfpga_sim.lab.fit.sources import Recorded
 from contactfpga_sim.lab.fit.trial import Fit, Measurement, Trial
 
 HEADS = ("zones by", "scan", "cover", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
-"""Column headings; cover and baud are omitted if all are equal."""
+"""Column headings; equal covers and bauds are omitted."""
 
 SHEETS = 12
 """Refused sheets that get a line: the finest."""
@@ -34,7 +34,7 @@ def printed(found: Fit) -> None:
 
 
 def printed_so_far(trials: Iterable[Trial]) -> None:
-    """Print results of an interrupted search."""
+    """Print an interrupted search."""
     _print(rows_so_far(trials))
 
 
@@ -44,9 +44,9 @@ def _print(lines: Sequence[Sequence[str]], keys: int = 4, bold: str | None = Non
 
 
 def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
-    """The head, a line for the refused ones of each sheet with fewer wires and of each cover on the answer's sheet,
-    the answer and the runner-up; without an answer a line per sheet, the nearest first. ``impossible``: end with
-    Skins that cannot exist."""
+    """The head, a line for the refused ones of each sheet with fewer wires and each cover on the answer's sheet,
+    answer and runner-up; without an answer a line per sheet, the nearest first. ``impossible``: end with Skins that
+    cannot exist."""
     lines = [_row(one, _why(one, of)) for one, of in _told(fit)]
     if fit.answer:
         lines.append(_row(fit.answer, "the answer"))
@@ -58,8 +58,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """Refused trials to show, with the number each represents: one per other cover on the answer's sheet and per
-    sheet with fewer wires up to :data:`SHEETS`; without an answer one per sheet."""
+    """Refused trials to show, each with the number it represents: one per other cover on the answer's sheet and per
+    sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer
@@ -89,13 +89,13 @@ def _without_same(table: list[list[str]]) -> list[list[str]]:
 
 
 def rows_so_far(trials: Iterable[Trial]) -> list[list[str]]:
-    """The head, and a line per measured Skin of an interrupted search, the nearest first."""
+    """The head, and a line per Skin of an interrupted search, the nearest first."""
     nearest = sorted(trials, key=lambda one: (one.excess, one.cost))
     return _without_same([list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)])
 
 
 def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
-    """Results of an interrupted search for JSON."""
+    """An interrupted search for JSON."""
     return {"interrupted": True, "measured": [_trial(one) for one in sorted(trials, key=lambda one: one.excess)]}
 
 
@@ -153,7 +153,7 @@ def name(trial: Trial) -> str:
 
 
 def reported(fit: Fit) -> list[list[str]]:
-    """The head, and a line per Skin and source on the other scenes."""
+    """The head, and a line per Skin and source on other scenes."""
     feels = any("unfelt" in one.errors for measured in fit.reported for one in measured)
     metrics = [*METRICS, "unfelt"] if feels else METRICS
     felt = [f"not felt at {fit.task.goals.felt_n:g} N"] * feels

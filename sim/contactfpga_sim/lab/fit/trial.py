@@ -21,9 +21,8 @@ class Measurement:
     """A Skin on the scenes of one source."""
 
     errors: dict[str, Interval]
-    """Errors by metric."""
     speed: Speed | None = None
-    """None if not measured, because errors are too large."""
+    """None if errors are too large."""
 
 
 DOUBT = ": too few scenes to tell"
@@ -31,8 +30,8 @@ DOUBT = ": too few scenes to tell"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Goals:
-    """Limits; None: no limit. A mean error meets its limit if the upper end of its 95 % interval does, so that
-    unseen scenes most likely agree; a time does if the worst measured one does."""
+    """Limits; None: no limit. The upper end of a mean error's 95 % interval must meet it, so that unseen scenes most
+    likely agree; so must the worst measured time."""
 
     miscounted: float | None = 0.05
     """Share of scenes with a wrong number of zones."""
@@ -43,11 +42,10 @@ class Goals:
     area: float | None = None
     """Mean error of a zone's area over the contact's."""
     latency_us: float | None = 1000.0
-    """From the touch to the last byte of the frame that holds all of it."""
+    """From the touch to the last byte of its complete frame."""
     unfelt: float | None = 0.01
-    """Share of fingertip touches that close no switch, under covers that depend on force."""
+    """Share of fingertip touches that close no switch, under covers with force."""
     felt_n: float = 2.0
-    """Force of these touches."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -56,8 +54,8 @@ class Goals:
                 raise ValueError(f"the limit of {field.name} is {value}; it must be above 0")
 
     def check_count(self, count: int, feeling: bool = False) -> None:
-        """Raise ValueError if this many scenes without an error could not show a share below its limit; ``feeling``:
-        includes fingertip touches."""
+        """Raise ValueError if this many scenes without error could not show a share below its limit; ``feeling``:
+        with fingertip touches."""
         for name, each in (("miscounted", 1), ("missed", 1), ("unfelt", TOUCHES if feeling else 0)):
             limit, of = getattr(self, name), count * each
             if of and limit is not None and Z95**2 / (of + Z95**2) > limit:
@@ -68,16 +66,12 @@ class Goals:
                 )
 
     def limits(self) -> list[tuple[str, float]]:
-        """Limits of errors by metric."""
         given = ((name, getattr(self, name)) for name, *_ in _ERRORS)
         return [(name, limit) for name, limit in given if limit is not None]
 
     def misses(self, found: Measurement, sure: bool = True) -> list[tuple[float, str]]:
-        """For each missed limit, the factor by which it is exceeded, and the measurement. If one is surely missed,
-        limits left open by few scenes are omitted.
-
-        ``sure``: judge errors by the upper ends of their intervals, else by their means.
-        """
+        """Each missed limit: factor of excess, and measurement. If one is surely missed, undecided limits are
+        omitted. ``sure``: judge errors by the upper ends of their intervals, else by means."""
         missed = list(self._missed(found, sure))
         beyond = [one for one in missed if not one[1].endswith(DOUBT)]
         return beyond or missed
@@ -108,7 +102,7 @@ class Goals:
         return max(ends, default=0.0)
 
     def excess(self, found: Measurement) -> float:
-        """Largest factor by which a limit is exceeded; 1 if all are met."""
+        """Largest factor of excess; 1 if all are met."""
         return max((over for over, _ in self.misses(found)), default=1.0)
 
 
@@ -132,25 +126,25 @@ SoFar = dict[Candidate, "Trial"]
 """Results by candidate so far, without those that Skin refuses."""
 
 Step = Callable[[str, int], None]
-"""Called after each piece of work with its kind, and the number of pieces of that kind."""
+"""Called after each piece with kind of work and pieces of that kind."""
 
 TIMED = 48
-"""Timed touches of each source."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FitTask:
+    """Inputs of a fit."""
+
     sources: tuple[Source, ...]
     names: tuple[str, ...]
-    """Names of the sources to show."""
     base: Skin
     goals: Goals
     count: int
-    """Choosing scenes of each source; as many others are for the report."""
+    """Choosing scenes of each source; the report has as many."""
     host_us: float | None = None
-    """Host time to find zones in a bitmap; None: the host does not."""
+    """Host time to label a bitmap; None: the host does not."""
     quick: bool = False
-    """Synthesize only those that meet the goals; refused ones with as many wires are not ranked."""
+    """Synthesize only those that meet the goals; do not rank refused ones with as many wires."""
     timed: int = TIMED
 
 
@@ -160,12 +154,11 @@ class Trial:
 
     candidate: Candidate
     measured: tuple[Measurement, ...] = ()
-    """One per source."""
     refusals: tuple[str, ...] = ()
     excess: float = math.inf
     margin: float = math.inf
     luts: int | None = None
-    """LUT4 on the :data:`contactfpga_sim.lab.fit.cost.DEVICE`; None if not computed."""
+    """None if not computed."""
 
     @property
     def skin(self) -> Skin:
@@ -179,7 +172,7 @@ class Trial:
 
     @property
     def bytes(self) -> float:
-        """Median bytes of a frame, of the source with the longest."""
+        """Median bytes of a frame, of the longest source."""
         return max((one.speed.bytes for one in self.measured if one.speed), default=math.nan)
 
     @property
@@ -196,13 +189,11 @@ class Fit:
     answer: Trial | None
     runner_up: Trial | None
     cheaper: tuple[Trial, ...]
-    """Refused trials cheaper than the answer, the cheapest first; without an answer, the nearest first."""
+    """Refused cheaper trials, the cheapest first; without an answer, the nearest first."""
     impossible: tuple[Trial, ...]
-    """Candidates that Skin refuses."""
     dearer: int
-    """Candidates more expensive than the answer."""
     reported: tuple[tuple[Measurement, ...], ...]
-    """Measurements of answer and runner-up, or of the nearest, on scenes not used to choose."""
+    """Answer and runner-up, or the nearest, on scenes not used to choose."""
     broken: tuple[str, ...]
     """Limits that the answer misses there."""
 
@@ -215,8 +206,8 @@ def gathered(
     before: int = 0,
     found: dict[Any, Any] | None = None,
 ) -> dict[Any, Any]:
-    """Result of each job, a function with arguments; ``before``: pieces of this kind already done; ``found``
-    receives each result at once."""
+    """Result of each job, a function with arguments; ``before``: pieces already done; ``found`` receives each at
+    once."""
     futures: dict[Future[Any], Any] = {executor.submit(*job): key for key, job in jobs.items()}
     found = {} if found is None else found
     for future in as_completed(futures):

@@ -1,4 +1,4 @@
-"""All flips of all designs in cached blocks, and their table."""
+"""All flips of all designs, in cached blocks."""
 
 from __future__ import annotations
 
@@ -39,12 +39,11 @@ def skin(design: str) -> Skin:
 
 
 def luts(design: str) -> int:
-    """LUT4 of the design on a UP5K, with the reference Skin's clock."""
+    """LUT4 of the design on a UP5K, at the reference Skin's clock."""
     return size.luts(lambda: Top(Skin(**DESIGNS[design])), sizes.UP5K)
 
 
 BLOCK = 25
-"""Flips per piece of work."""
 
 
 class Row(NamedTuple):
@@ -62,8 +61,8 @@ def run(
     done: Callable[[int], None],
     within_s: float | None = None,
 ) -> list[Row]:
-    """Flips of ``registers`` register bits and ``memories`` memory bits of each design. ``done`` receives the number of
-    blocks whenever one is finished.
+    """Flips of ``registers`` register and ``memories`` memory bits of each design. ``done`` receives the number of
+    blocks after each.
 
     ``within_s``: time after which only each design's first block is begun.
     """
@@ -113,7 +112,7 @@ def _key(design: str, memory: bool, block: int) -> str:
 
 
 def finished(names: Iterable[str]) -> list[Row]:
-    """Cached flips of these designs, of each the blocks before the first missing one."""
+    """Cached flips of these designs, before each one's first missing block."""
     return [
         Row(name, FlipOutcome(*one))
         for memory in (False, True)

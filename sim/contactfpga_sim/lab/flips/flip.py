@@ -1,4 +1,4 @@
-"""One flip, followed until it is gone or half a second is over, and the host's reaction."""
+"""One flip, followed until it is gone or half a second is over."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from contactfpga_sim.model.board.state import Bit, Storage
 from contactfpga_sim.model.sheet.matrix import Contention
 
 SETTLED_STEPS = 4
-"""Steps that the driver still hears once the board has recovered."""
+"""Steps heard after the board has recovered."""
 QUIET_S = {"always": 0.02, "on_change": 0.12}
-"""Longest unreported silence: frames or keep-alives are due earlier."""
+"""Longest unreported silence: frames or keep-alives come earlier."""
 COUNTED = ("lost", "unexplained", "restarts", "foreign_skin", "foreign_version", "skin_changes", "unknown_kinds")
 """Driver counters that stay 0 on a good line."""
 
@@ -34,13 +34,14 @@ class Flip(NamedTuple):
 
 
 class FlipOutcome(NamedTuple):
+    """Outcome of a flip."""
+
     name: str
     memory: bool
     outcome: Outcome
     kind: str
     """The error, or the means that reports it."""
     frames: int
-    """Silently wrong frames."""
     seconds: float
     """From the first silently wrong frame to the next right one."""
     gone_s: float
@@ -57,7 +58,7 @@ def module(name: str) -> str:
 
 
 def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Flip]:
-    """Random flips, uniform over clocks and the bits of all registers, or all memories."""
+    """Random flips, uniform over clocks and all register, or memory, bits."""
     rng = np.random.default_rng([seed, memory])
     places = reference.board.places
     bits = np.array([place.bits * (place.memory == memory) for place in places])
@@ -150,7 +151,7 @@ def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame],
 
 
 def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[DeliveredFrame, str]]:
-    """Frames with a wrong sheet or time, and moments of outdated frames."""
+    """Frames with a wrong sheet or time, and moments of outdated ones."""
     found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
     if reference.skin.send == "on_change":
         found += ((one, "stale") for one in _stale(reference, heard))
@@ -158,7 +159,7 @@ def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[Deli
 
 
 def _since_restart(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """Frames with times as if the board had not restarted."""
+    """Frames with times as if without a restart."""
     begun: dict[int, float] = {0: 0.0}
     for one in heard:
         shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)
@@ -174,7 +175,7 @@ def _kind(reference: Reference, one: DeliveredFrame) -> str:
 
 
 def _stale(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """The moment of each sheet change that the host learns too late."""
+    """Moments of sheet changes that the host learns too late."""
     late = reference.late_s[1] + reference.slack_s
     for before, after in itertools.pairwise(heard):
         if after.time_s - before.time_s > QUIET_S["on_change"]:

@@ -21,11 +21,9 @@ class Design(NamedTuple):
 
     name: str
     luts: int
-    """LUT4 of a UP5K."""
     registers: int
     """Flip-flop bits, including those around memories."""
     memories: int
-    """Bits of memory."""
 
 
 class Share(NamedTuple):
@@ -46,7 +44,7 @@ class Share(NamedTuple):
 
 
 def measured(names: Iterable[str]) -> list[Design]:
-    """Bits and LUT4 of designs; needs the programs of extra ``boards``."""
+    """Bits and LUT4 of designs; needs programs of extra ``boards``."""
     found = []
     for name in names:
         board = StateBoard(campaign.skin(name))
@@ -82,7 +80,7 @@ def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
 
 
 def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:
-    """Median and longest duration of silently wrong output, in ms."""
+    """Median and longest silently wrong output, in ms."""
     times = sorted(1e3 * row.found.seconds for row in rows if row.found.outcome == "silent")
     return (times[len(times) // 2], times[-1]) if times else (math.nan, math.nan)
 

@@ -25,13 +25,10 @@ COLUMNS = (
 MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
 KINDS = ("design", "outcome", "by", "flips")
 REGISTERS, MEMORIES = 400, 100
-"""Flips of each design."""
 LONGEST_S = 25 * 60.0
-"""Time after which no flips begin."""
 LONG_S = 0.005
-"""Time above which a fault spoils more than a frame or two."""
+"""Time above which a fault spoils many frames."""
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
-"""Outcomes in words."""
 
 
 class FlipResults(NamedTuple):
@@ -59,7 +56,7 @@ def draw(folder: Path, found: FlipResults) -> list[Path]:
 
 
 def worst_text(found: FlipResults) -> str:
-    """The worst flips of registers and memories, with one copy and with two, and their rate."""
+    """The worst flips of registers and memories, with one and two copies, and their rate."""
     rows = found.rows
     groups = [
         (f"Flips of {'memory' if memory else 'registers'} with {'two copies' if dual else 'one copy'}", some)

@@ -1,4 +1,4 @@
-"""Where force joined to location fails: one assumption is violated more and more until results are wrong.
+"""Where force joined to location fails: one assumption is violated more and more.
 
 Each value is tried with random contacts until it is clear whether the stated 95 % hold for 90 % of them. A failure
 counts as reported if half of the failing ones are.
@@ -27,25 +27,22 @@ HOLDS = 0.9
 """Required share of contacts within the stated interval, below 95 % to allow for chance."""
 
 TELLS = 0.5
-"""Share of failing contacts that must be reported."""
 
 CLOSE_N = 1.0
-"""Allowed error of a push."""
 
 PUSH_N, LEVER_M = 12.0, 0.05
 SURFACE = Cylinder(0.038)
 SIGMA_N = 0.05
 REACH_M = 0.0036
-"""Distance at which 12 N close switches; half of it is a zone's uncertainty along each axis."""
+"""Distance at which 12 N close switches; half of it is a zone's uncertainty by axis."""
 
 SLOW = 480
-"""Most draws of methods that need 10 ms each."""
+"""Most draws of slow methods, 10 ms each."""
 
 TRIES = 50
-"""Attempts per touch that closes a switch."""
 
 CHI2_3 = 7.815
-"""95 % quantile of chi-squared, three degrees of freedom."""
+"""95 % quantile of chi-squared with three degrees of freedom."""
 
 Random = np.random.Generator
 
@@ -61,7 +58,6 @@ class Disturbance:
     ends_n: float = math.inf
     """Range of a unit, either way."""
     elsewhere_m: float = 0.0
-    """Distance of the zone from the contact."""
     preload_n: float | None = None
 
 
@@ -138,7 +134,6 @@ def _center(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
 
 
 def _friction(kind: str, drag: float, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of two dragging fingers: whether the interval holds the first push, or its error."""
     made, trials = cells(Disturbance()), []
     for _ in range(count):
         places = [SURFACE.place(rng.uniform(0, 0.09), at) for at in (-0.03, 0.03)]
@@ -163,7 +158,6 @@ def holds(contact: Contact, push_n: float) -> bool:
 
 
 def _located(case: CoverageCase, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of places on a flat sheet, for contacts that close a switch."""
     finder, trials = coverage.locator(case), []
     for _ in range(TRIES * count):
         one = coverage.press(case, rng)
@@ -247,4 +241,3 @@ KNOBS = {
               "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
     )
 }  # fmt: skip
-"""Knobs by name, in the page's order."""

@@ -19,7 +19,7 @@ from contactfpga.skin.sheet import Sheet
 
 LINES = 16
 MIDDLE = 7
-"""The switch whose cell to the next holds the contacts."""
+"""Switch at a corner of the contacts' cell."""
 
 POINT, PATCH = Model("halfspace", "point"), Model("bonded", "patch")
 BALL = Ball(0.005, 4.6e5)
@@ -47,25 +47,21 @@ class CoverageCase:
     method: str
     pitch_mm: float
     push_n: tuple[float, float] = (5.0, 30.0)
-    """Range of the final push."""
     spread: float = 0.1
-    """Assumed spread of thresholds."""
     force_sigma_n: float = 0.5
     assumed: Model = POINT
     true: Model = POINT
     true_spread: float | None = None
-    """None: as assumed."""
+    """True spread of thresholds; None: as assumed."""
     true_sigma_n: float | None = None
     drift_n: float = 0.0
-    """Drift of one unit."""
     ball: Ball = BALL
     """Ball of the true patch."""
     late_n: float = 0.0
     """Rise of the push until measured."""
     inside_mm: float | None = None
-    """Distance inside the outermost column; None: in the middle."""
+    """Distance inside the outermost column; None: middle."""
     wrong: str = ""
-    """The violated assumption."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,19 +71,19 @@ class Coverage:
     count: int
     rms_m: float
     barycenter_m: float
-    """RMS error of the barycenter."""
     covered: float
     """Share within the stated radius."""
     radius_m: float
-    """Median stated radius."""
     theory_m: float
-    """Median smallest radius that noise allows; NaN without a formula."""
+    """Median smallest radius that noise allows; NaN if unknown."""
     disagreed: float
-    """Share for which the method reported that no place explains all."""
+    """Share for which the method reported a contradiction."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pressed:
+    """A simulated contact."""
+
     x_m: float
     y_m: float
     push_n: float
@@ -207,8 +203,8 @@ def _middle_m(case: CoverageCase) -> float:
 
 
 def bound_m(case: CoverageCase, one: Pressed) -> float:
-    """Smallest 95 % radius that noise allows, from the slope of each closing's force over the place (Cramér-Rao);
-    NaN with fewer than two closings, or with two in line with the contact."""
+    """Smallest 95 % radius that noise allows, from the slopes of closing forces over the place (Cramér-Rao); NaN
+    with fewer than two closings, or two in line with the contact."""
     reach, pitch = reach_of(case.assumed), 1e-3 * case.pitch_mm
     if not case.force_sigma_n and not case.spread:
         return math.nan
@@ -248,7 +244,6 @@ RIGHT = (
     CoverageCase("center of pressure", 10.0, (12.0, 12.0)),
     CoverageCase("closings + center of pressure", 5.0, RAMP),
 )
-"""Cases with true assumptions."""
 
 WRONG = (
     CoverageCase("set", 5.0, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
@@ -257,4 +252,3 @@ WRONG = (
     CoverageCase("closings", 5.0, RAMP, true_sigma_n=2.0, wrong="forces off by 2 N, taken for 0.5 N"),
     CoverageCase("center of pressure", 10.0, (12.0, 12.0), drift_n=0.2, wrong="a unit drifted by 0.2 N"),
 )
-"""Cases with violated assumptions."""

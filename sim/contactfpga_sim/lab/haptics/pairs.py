@@ -1,4 +1,4 @@
-"""Limits of two fingers' pushes: their uncertain places along the line through both, by geometry alone.
+"""Limits of two fingers' pushes by geometry: their uncertain places along the line through both.
 
 Three units on a plane measure the sum of the pushes and two moments. Each finger is a disc that closes the switches
 under it.
@@ -14,9 +14,8 @@ from contactfpga_sim.lab.haptics.felt import FINGER_MM, SETTINGS, pair
 METHODS = ("barycenters", "mean of all places that fit", "one place known")
 PUSH_N = 12.0
 STEP_MM = 0.4
-"""Grid of places."""
 DRAWN = 2000
-"""Pairs of places per pair of fingers."""
+"""Pairs of places drawn per pair of fingers."""
 
 
 def errors(apart_mm: float, count: int, seed: int = 1) -> dict[str, Floats]:
@@ -48,7 +47,7 @@ def _exert(places: Floats) -> Floats:
 
 
 def _pushes(places: Floats, wrench: Floats, covariance: Floats) -> Floats:
-    """(2,) pushes: least squares at each pair of places, averaged by the likelihood of the wrench."""
+    """(2,) pushes: least squares at pairs of places, averaged by the wrench's likelihood."""
     weight, matrix = np.linalg.inv(covariance), _exert(places)
     normal = matrix.transpose(0, 2, 1) @ weight @ matrix
     pushes = np.linalg.solve(normal, matrix.transpose(0, 2, 1) @ (weight @ wrench)[:, None])[:, :, 0]

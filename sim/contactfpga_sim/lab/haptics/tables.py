@@ -23,7 +23,6 @@ from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
 RING_M = 0.03
 CONTACTS = 1000
-"""Contacts per line of places."""
 
 NAMED = (
     "hexapod at mid-length, 45 degrees",
@@ -91,7 +90,6 @@ END_TO_END = 100
 """Contacts per line; `make campaign` presses 1,000 in all."""
 
 LIMITS = 1000
-"""Pairs of fingers for the limits."""
 APART_MM = (30.0, 60.0, 100.0)
 SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
 
@@ -104,7 +102,7 @@ def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] 
 
 
 def interval(errors: np.ndarray) -> tuple[float, float, float]:
-    """RMS with its 95 % interval from the spread of squares, without NaN."""
+    """RMS with its 95 % interval from the spread of squares."""
     squares = errors[~np.isnan(errors)] ** 2
     mean, half = squares.mean(), 1.96 * squares.std(ddof=1) / math.sqrt(len(squares))
     return math.sqrt(mean), math.sqrt(max(0.0, mean - half)), math.sqrt(mean + half)
@@ -157,7 +155,6 @@ def breaks_table() -> str:
 
 
 SAID = {"lifted": "The picture is that of [`clipping`](#clipping), but `lifted` reports every break."}
-"""Sentence in place of a repetitive picture."""
 
 
 def breaks_pictures() -> str:

@@ -1,1 +1,1 @@
-"""The kits: times from finger to user code, sizes, and predictions that a builder can test."""
+"""Times, sizes and testable predictions of the kits."""

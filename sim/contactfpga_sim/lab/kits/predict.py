@@ -1,8 +1,7 @@
 """Predictions of a kit with 95 % intervals.
 
 Gateware and bridge times are exact up to the crystal and the choice of touches. Circuit and cover are computed for
-draws of tolerances (:func:`drawn_circuit`, :func:`drawn_cover`); the interval is from 2.5 to 97.5 %. Tolerances were
-assumed, not measured.
+draws of assumed tolerances (:func:`drawn_circuit`, :func:`drawn_cover`), from 2.5 to 97.5 %.
 """
 
 from __future__ import annotations
@@ -41,9 +40,8 @@ DRAWS = 200
 TOUCHES = 100
 """Touches or breaks in a builder's measurement."""
 AWAKE_US, LONGEST_US = 700, 2000
-"""First line check after power-up, and latest report of a break."""
+"""First line check, and latest report of a break."""
 CRYSTAL = 1e-4
-"""Tolerance of a board's clock."""
 PRESSED_N = 2.0
 PLACES = tuple((x / 4, y / 4) for y in range(3) for x in range(3))
 """Finger middles, in pitches from a switch: on it, between two, among four, halfway."""
@@ -105,15 +103,13 @@ def _times(kit: Kit) -> Iterator[Prediction]:
 
 
 def reported(skin: Skin) -> MixedTimes:
-    """Time from a break of a row or column of an untouched sheet until `contact` reports it with `fail_safe`: the
-    first of each, at any instant between two checks."""
+    """Time from a break of a row or column of an untouched sheet until `contact` reports it with `fail_safe`, at any
+    instant between two checks."""
     with CompiledBoard(skin, ["contact"]) as board:
         return MixedTimes.mixed([_between_checks(board, {0: 0}, {}), _between_checks(board, {}, {0: 0})])
 
 
 def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[int, int]) -> MixedTimes:
-    """Times between the latest break that a check finds and the earliest that it misses."""
-
     def told(start: int) -> int:
         board.cut({}, {})
         board.restart()
@@ -138,8 +134,8 @@ def _near(rng: np.random.Generator, share: float) -> float:
 
 
 def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
-    """A sheet within tolerances: lines within 30 %, pins 25, pulls and series resistors 1; switches from 1 ohm to
-    the stated value; the diode's capacitance within 30, its current within a factor of 3."""
+    """A sheet within tolerances: lines 30 %, pins 25, pulls and series resistors 1; switches from 1 ohm to the
+    stated value; the diode's capacitance 30, its current a factor of 3."""
     near = functools.partial(_near, rng)
     diode = dataclasses.replace(
         circuit.diode,
@@ -197,8 +193,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
 
 
 def drawn_cover(cover: Cover, rng: np.random.Generator) -> Cover:
-    """A cover within tolerances: domes within 10 % of force and 25 of travel, foam within 30 % of modulus and 10 of
-    thickness."""
+    """A cover within tolerances: domes 10 % of force and 25 of travel, foam 30 % of modulus and 10 of thickness."""
     near = functools.partial(_near, rng)
     switch = dataclasses.replace(
         cover.switch, force_n=cover.switch.force_n * near(0.1), travel_m=cover.switch.travel_m * near(0.25)
@@ -230,7 +225,7 @@ def _cover(kit: Kit) -> Iterator[Prediction]:
 
 
 def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
-    """Force that closes a first switch at each of :data:`PLACES`; the first cover has no spread."""
+    """First closing force at each of :data:`PLACES`; the first cover has no spread."""
     if not seed:
         cover = dataclasses.replace(cover, switch=dataclasses.replace(cover.switch, spread=0.0))
     cells = Cells(cover, AROUND, AROUND, pitch_m, pitch_m, seed)

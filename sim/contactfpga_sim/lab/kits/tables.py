@@ -25,7 +25,7 @@ from contactfpga_sim.lab.usb import BridgeSettings
 
 NAMES = ("starter", "fast")
 SEEDS = (1, 2, 3, 4, 5)
-"""Seeds of place and route; the slowest counts."""
+"""Seeds of place and route."""
 COVER = "| run, 6.4 mm, tiles |"
 PAPER = "| run, 6.4 mm, paper |"
 ARM = "| tiles | 6.4 | 0.4 | 5 |"
@@ -33,6 +33,8 @@ ARM_PAPER = "| flush, point force | 10 | 1 | 5 |"
 
 
 class KitFigures(NamedTuple):
+    """Computed figures of a kit."""
+
     kit: Kit
     finger: Finger
     built: tuple[placed.Report, ...]
@@ -56,7 +58,7 @@ def _worst_first(us: Spread, digits: int = 0) -> str:
 
 
 def headline(found: list[KitFigures]) -> str:
-    """The README's table: worst first, both kits, and comparisons."""
+    """The README's table: both kits, and comparisons."""
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
     fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
     arm, paper_arm = (_worst_force(start) for start in (ARM, ARM_PAPER))
@@ -102,7 +104,7 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
 
 
 def _of_page(page: str, start: str, column: int) -> str:
-    """Cell of the table row with this beginning, up to a semicolon."""
+    """Cell of the row with this beginning, up to a semicolon."""
     text = Path("docs", page).read_text(encoding="utf-8")
     found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
     return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
@@ -136,7 +138,7 @@ def _stages(one: KitFigures) -> Iterator[tuple[str, ...]]:
 
 
 def built_table(found: list[KitFigures]) -> str:
-    """FPGA resources of each kit; the slowest Fmax of :data:`SEEDS`."""
+    """FPGA resources of each kit; Fmax is the slowest of :data:`SEEDS`."""
     lines = []
     for one in found:
         first, slowest = one.built[0], min(one.built, key=lambda report: report.fmax_mhz)
@@ -157,7 +159,7 @@ def built_table(found: list[KitFigures]) -> str:
 
 
 def pins_table() -> str:
-    """Sheets for an iCEBreaker's 23 pins, with guard lines and `alive` if they fit."""
+    """Sheets for an iCEBreaker's 23 pins."""
     kit = kits.kit("starter").skin
     cases = {
         "16x16, rows on registers, columns driven back (the kit)": kit,
@@ -196,7 +198,7 @@ def _reversal(skin: Skin) -> Skin:
 
 
 def parts_table() -> str:
-    """Parts of each kit: the sheet's by count, and those of kit.toml."""
+    """Parts of each kit."""
     lines = []
     for name in NAMES:
         kit = kits.kit(name)

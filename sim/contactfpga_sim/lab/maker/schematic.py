@@ -8,10 +8,8 @@ from typing import Any
 from contactfpga import picture_style as style
 
 SIZE = 4
-"""Rows and columns without guard lines."""
 STEP = 1.5
 LEFT, TOP = 2.6, 2.1
-"""Starts of rows and columns after their resistors."""
 WIRE = {"color": style.INK, "lw": 1.2, "solid_capstyle": "round"}
 
 
@@ -134,7 +132,6 @@ def _dot(axes: Any, x: float, y: float, color: str = style.INK) -> None:
 
 
 def _resistor(axes: Any, x: float, y: float, upright: bool, ls: Any = "solid") -> None:
-    """Draw a box of 0.6 from (x, y) upward or to the right."""
     from matplotlib.patches import Rectangle
 
     corner, size = ((x - 0.11, y), (0.22, 0.6)) if upright else ((x, y - 0.11), (0.6, 0.22))

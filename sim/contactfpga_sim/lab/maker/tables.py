@@ -12,7 +12,6 @@ from contactfpga_sim.lab.maker import schematic
 
 SIZE = 16
 PULLED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5600.0)
-"""Sheet of the schematic."""
 DIODES = {"Schottky (BAT54's kind)": SCHOTTKY, "silicon (1N4148's kind)": SILICON}
 PULLS_OHM = (1000.0, 2200.0, 4700.0, 10_000.0, 22_000.0, 47_000.0, 100_000.0)
 SERIES_OHM = (0.0, 33.0, 100.0, 220.0, 470.0)
@@ -48,7 +47,7 @@ def pulls_table() -> str:
 
 
 def series_table() -> str:
-    """Effect of a resistor at each pin on shorts, pulses and times."""
+    """Effect of pin resistors on shorts, pulses and times."""
     rows = [["resistor at each pin", "two pins shorted to each other", "pulses while lines charge", "`settle_us`"]]
     rows[0].append("left to VIL")
     for ohm in SERIES_OHM:

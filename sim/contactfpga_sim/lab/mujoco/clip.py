@@ -1,4 +1,4 @@
-"""Arms of docs/mujoco.md side by side: peak forces, and a clip from a headless browser."""
+"""Arms of docs/mujoco.md side by side: peak forces, and a clip."""
 
 from __future__ import annotations
 
@@ -22,16 +22,15 @@ ROBOT, SCENE, REFLEXES = (str(ARM / name) for name in ("pushed.toml", "scene.xml
 REFLEX = "BackOff"
 MEETINGS = 12
 NEAR_RAD, SPREAD_RAD = 0.4, 0.01
-"""Start angle 0.14 rad before the bar, and its range, so that scan and step have random phases."""
+"""Start angle before the bar, and its range, for random phases of scan and step."""
 STEP_S, ENDS_S = 1e-3, 0.25
-"""MuJoCo's step, and a time at which all have touched the bar and all but one let go."""
+"""MuJoCo's step, and a time at which all but one have touched and let go."""
 COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
-"""Times of approach and of touch in slow motion."""
+"""Times of approach and slow motion."""
 COMING, TOUCHING, STANDING = 10, 28, 15
-"""Frames of approach, touch and end."""
 FRAME_MS, SETTLE_MS, QUALITY = 100, 900, 55
 WIDTH, HEIGHT, TALL = 1120, 400, 700
-"""Pixels; TALL while choosing, so that the panel does not scroll."""
+"""Pixels; TALL while choosing, lest the panel scroll."""
 
 
 class Asked(SimulatedPace):
@@ -56,12 +55,12 @@ class Met:
     """Result of an arm's motion into the bar."""
 
     late_s: float
-    """From the touch to the reflex's next command; nan: none."""
+    """From the touch to the reflex's command; nan: none."""
     peak_n: float
 
 
 def meet(angle: float) -> list[Met]:
-    """The example's arm with each of :data:`contactfpga.tools.view.simulated.SKINS`, from this angle, with reflex."""
+    """The example's arm with reflex in each of :data:`contactfpga.tools.view.simulated.SKINS`, from this angle."""
     robots = SimulatedSource(ROBOT, SCENE, REFLEXES)
     robots.reflex, pace = REFLEX, paced(robots)
     robots.advance()

@@ -30,17 +30,16 @@ from contactfpga_sim.lab.writer import table_of
 
 ROD_M = 0.02
 SHEET_M = (0.06, 0.20)
-"""Start and length of the sheet on the forearm."""
+"""Sheet's start and length on the forearm."""
 RADIUS_M = 0.038
 LEAD_S, AFTER_S = 0.15, 0.2
-"""Times before the touch (if nothing bent) and after."""
+"""Times before and after the touch."""
 SERVO = (30.0, 10.0)
-"""Gain of the joints' speed controllers, Nm s/rad."""
+"""Gain of the joints' controllers, Nm s/rad."""
 LIMIT_NM = (40.0, 20.0)
 GAINS = (20.0, 50.0, 100.0, 200.0)
-"""Observer gains to try, 1/s."""
 SPRING = "0.1 0.1"
-"""MuJoCo's ``solref``: about 10 N/mm on this arm, lightly damped; a push grows over some 10 ms."""
+"""MuJoCo's ``solref``: about 10 N/mm on this arm, lightly damped."""
 FREE_S = 3.0
 
 SCENE = f"""<mujoco><option timestep="5e-4" gravity="0 0 0" integrator="implicitfast"/>
@@ -83,16 +82,14 @@ class Collision:
     """A moving forearm and a rod in its way."""
 
     angles: tuple[float, float]
-    """Joint angles at the touch."""
     speeds: tuple[float, float]
     place_m: float
-    """Position along the forearm."""
     wrong: Wrong
     seed: int
 
     @classmethod
     def drawn(cls, seed: int) -> Collision:
-        """Anywhere on the sheet but its last 20 mm, at 0.1 to 0.5 m/s across the forearm."""
+        """Anywhere on the sheet but its last 20 mm, at 0.1 to 0.5 m/s."""
         rng = np.random.default_rng(seed)
         angles = rng.uniform(-1.0, 1.0, 2)
         place = rng.uniform(SHEET_M[0] + 0.02, sum(SHEET_M) - 0.02)
@@ -154,7 +151,6 @@ class Arm:
         data.ctrl[:] = np.clip(torque, -np.array(LIMIT_NM), LIMIT_NM)
 
     def force_n(self, data: Any) -> float:
-        """Total force of all contacts."""
         total, wrench = 0.0, np.zeros(6)
         for number in range(data.ncon):
             mujoco.mj_contactForce(self.model, data, number, wrench)
@@ -162,13 +158,12 @@ class Arm:
         return total
 
     def touched_m(self, data: Any) -> float:
-        """Contact position along the forearm."""
         body = data.body("forearm")
         return float((body.xmat.reshape(3, 3).T @ (data.contact[0].pos - body.xpos))[0])
 
 
 Detector = Callable[[Any], tuple[bool, float | None, float]]
-"""Whether a contact is detected, its place along the forearm, and its certainty, from MuJoCo's data."""
+"""Whether a contact is detected, its place along the forearm, and its certainty."""
 
 
 def collide(
@@ -212,7 +207,7 @@ def by_sheet(arm: Arm, case: Collision) -> Heard:
 
 
 def by_observer(arm: Arm, case: Collision, gain: float, limits_nm: np.ndarray, reacts: bool = True) -> Heard:
-    """Detection by a residual beyond its limit; the place is from the largest residual."""
+    """Detection by a residual beyond its limit; the largest residual gives the place."""
     data = arm.meets(case)
     observer = Observer(gain, case.wrong, np.random.default_rng(case.seed))
 
@@ -224,7 +219,7 @@ def by_observer(arm: Arm, case: Collision, gain: float, limits_nm: np.ndarray, r
 
 
 def free(arm: Arm, seed: int) -> np.ndarray:
-    """(gains, n, 2) absolute residuals in Nm of a contact-free motion without its first 0.1 s."""
+    """(gains, n, 2) absolute residuals in Nm of a free motion after 0.1 s."""
     rng = np.random.default_rng(seed)
     wrong = Wrong.drawn(rng)
     observers = [Observer(gain, wrong, np.random.default_rng(seed)) for gain in GAINS]
@@ -241,8 +236,8 @@ def free(arm: Arm, seed: int) -> np.ndarray:
 
 
 def tuned(arm: Arm, free_runs: int, cases: Sequence[Collision]) -> tuple[float, np.ndarray]:
-    """Per gain the lowest limits without a false alarm in free motions; of these the gain with the least mean delay,
-    missed or early ones counting as :data:`AFTER_S`."""
+    """Per gain the lowest limits without a false alarm; of these the gain with the least mean delay, missed or early
+    ones counting as :data:`AFTER_S`."""
     limits = np.max([free(arm, seed).max(1) for seed in range(free_runs)], 0)
 
     def delay_s(number: int) -> float:
@@ -260,12 +255,12 @@ class Compared:
     gain: float
     limits_nm: np.ndarray
     alarms: int
-    """Of :attr:`free_runs` not used in tuning, those with a false alarm."""
+    """Those of :attr:`free_runs` outside tuning with a false alarm."""
     free_runs: int
     sheet: list[Heard]
     observer: list[Heard]
     none: list[Heard]
-    """Collisions without reaction, which would bend the residuals of the observer's place."""
+    """Collisions without a reaction, which would bend the residuals."""
 
 
 def compare(collisions: int = 200, free_runs: int = 100) -> Compared:

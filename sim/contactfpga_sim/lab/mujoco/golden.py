@@ -1,4 +1,4 @@
-"""A board with frames by the golden model, at most one a step, for speed."""
+"""A board with frames by the golden model, for speed."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from contactfpga_sim.model.golden.zones import Departure
 class GoldenBoard:
     """The part of :class:`contactfpga_sim.model.board.compiled.CompiledBoard` that a lockstep needs.
 
-    A frame has the cells at the end of a clock run. Zones equal the gateware's if cells rest for a scan; times differ
-    by up to a scan and a run. The line is the gateware's, byte by byte.
+    A frame has the cells at the end of a clock run, at most one a step. Zones equal the gateware's if cells rest for a
+    scan; times differ by up to a scan and a run.
     """
 
     def __init__(self, skin: Skin):
@@ -53,7 +53,6 @@ class GoldenBoard:
         """Ignored: there are no units."""
 
     def send(self, data: bytes) -> None:
-        """Send bytes to the board."""
         known, free = self._facts, 0
         if self._received:
             begun, before = self._received[-1]

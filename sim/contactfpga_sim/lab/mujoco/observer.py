@@ -1,5 +1,5 @@
-"""A momentum observer (De Luca and Mattone 2005; Haddadin, De Luca and Albu-Schaeffer 2017) of a two-joint arm, with
-realistic errors (:class:`Wrong`)."""
+"""A momentum observer of a two-joint arm, with realistic errors (De Luca and Mattone 2005; Haddadin, De Luca and
+Albu-Schaeffer 2017)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ MASS_KG = (1.5, 1.0)
 DAMPING = (0.4, 0.2)
 """Joint damping in Nm s/rad."""
 FRICTION_NM = (0.3, 0.15)
-"""Coulomb friction, which the observer knows as well as the damping."""
+"""Coulomb friction, known to the observer like the damping."""
 ROTOR = (0.03, 0.015)
-"""Inertia of motors and gears about the joints, in kg m2."""
+"""Motors and gears about the joints, kg m2."""
 CONTROL_S = 1e-3
 SLOW = 0.02
 """Speed in rad/s below which Coulomb friction is proportional to it."""
@@ -23,12 +23,12 @@ SLOW = 0.02
 
 @dataclasses.dataclass(frozen=True)
 class Wrong:
-    """Errors of the model as shares of the truth, and measurement noise."""
+    """Model errors as shares of the truth, and noise."""
 
     masses: tuple[float, float]
     friction: tuple[float, float]
     torque_nm: float = 0.05
-    """RMS noise of a sample."""
+    """RMS noise."""
     speed_rad_s: float = 0.002
 
     @classmethod

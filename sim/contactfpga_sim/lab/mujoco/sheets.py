@@ -24,12 +24,12 @@ from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
 from contactfpga_sim.lab.usb import BridgeSettings
 
 LEAD_S = 0.01
-"""Time from the boards' power-up to MuJoCo's first step."""
+"""From the boards' power-up to MuJoCo's first step."""
 LOOK_S = 2.5e-4
-"""Boards' step in s before MuJoCo's first step."""
+"""Boards' step before MuJoCo's first."""
 
 COVER = Cover(model="hertz")
-"""Cover of a Skin file without a table ``[cover]``."""
+"""Cover of a Skin file without ``[cover]``."""
 
 
 class Sheets(Mapping[str, WornSheet]):
@@ -99,7 +99,7 @@ class Sheets(Mapping[str, WornSheet]):
         return LEAD_S + self._steps * float(self.model.opt.timestep)
 
     def step(self) -> None:
-        """Take MuJoCo's next step, whose contacts press the sheets."""
+        """Take MuJoCo's next step."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         self._note_joints()
@@ -120,7 +120,6 @@ class Sheets(Mapping[str, WornSheet]):
         self._pushed[:] = 0.0
 
     def _press(self, foam: Mapping[tuple[int, int], Floats], touches: list[list[SheetTouch]]) -> None:
-        """Press this step's contacts and fingers (``touches``); ``foam``: force in N by contact and link."""
         data, plans = self.data, list(self.body.links.values())
         for number, second, owner in self._contacts():
             one = of_solver(self.model, data, number, second)
@@ -139,7 +138,7 @@ class Sheets(Mapping[str, WornSheet]):
                 yield number, side == 1, int(owners[number, side])
 
     def _point(self, owner: int, pushed: Floats) -> list[SheetTouch]:
-        """Let the fingers on a link push its body; adds to (nv,) ``pushed``."""
+        """Let fingers push a link's body; adds to (nv,) ``pushed``."""
         worn, number, found = list(self._worn.values())[owner], self._bodies[owner], []
         position, rotation = self.data.xpos[number], self.data.xmat[number].reshape(3, 3)
         for one in worn.fingers:
@@ -150,7 +149,7 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _push(self, pushed: Floats) -> dict[tuple[int, int], Floats]:
-        """Let the foam push bodies apart; adds to (nv,) ``pushed``. Returns forces in N by contact and link."""
+        """Let the foam push bodies apart; adds to (nv,) ``pushed``. Returns N by contact and link."""
         model, data = self.model, self.data
         found: dict[tuple[int, int], Floats] = {}
         for number, second, owner in self._contacts():
@@ -174,7 +173,7 @@ class Sheets(Mapping[str, WornSheet]):
 
     def snapshot(self) -> Snapshot:
         """All links as a program knows them now, like :meth:`contactfpga.body.OpenBody.latest`: touches at the scan
-        of the newest received frames."""
+        of the newest frames."""
         observed = {name: worn.observe() for name, worn in self._worn.items()}
         states = States(self.body.links, observed, self.clock())
         return Snapshot(self.body, self.clock(), states, self._history if self._joints else None)
@@ -217,7 +216,7 @@ def _body(model: Any, plan: Plan) -> int:
 
 
 def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
-    """Link number by geom, -1 for none; the last entry is for contacts without a geom."""
+    """Link number by geom, -1 for none; the last is for contacts without a geom."""
     owner = np.full(model.ngeom + 1, -1)
     for number, (name, of) in enumerate(zip(body.links, bodies)):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)

@@ -12,7 +12,7 @@ from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tools.view.fingers import Finger
 
 SLANT = 0.5
-"""Least cosine between contact and sheet normals for the cover, not another side of a box, to be pressed."""
+"""Least cosine between contact and sheet normals at which the cover is pressed, not another side."""
 
 
 class SheetTouch(NamedTuple):
@@ -21,13 +21,13 @@ class SheetTouch(NamedTuple):
     contact: int
     """Index in ``data.contact``; -1 for a finger."""
     point_m: Vector
-    """In the link's frame."""
+    """Point in the link's frame."""
     force_n: Vector
-    """On the link, in its frame, with friction."""
+    """Force on the link in its frame, with friction."""
     push_n: float
-    """Along the contact's normal, 0 or above."""
+    """Force along the normal, 0 or above."""
     x_mm: float | None
-    """On the sheet laid flat; None beside it."""
+    """Place on the flat sheet; None beside it."""
     y_mm: float | None
 
 
@@ -65,7 +65,7 @@ def by_finger(plan: Plan, finger: Finger) -> SheetTouch:
 
 
 def _place(plan: Plan, point_m: Floats, inward: Floats) -> tuple[float, float] | None:
-    """Place in mm on the flat sheet; None beside it, or on another side of its wearer."""
+    """Place in mm on the flat sheet; None beside it, or on its wearer's other sides."""
     skin, pose = plan.skin, plan.pose
     x, y = plan.laid.flat(vector(1e3 * ((point_m - pose.point_m) @ pose.rotation)))
     width, height = skin.columns * skin.pitch_x_mm, skin.rows * skin.pitch_y_mm
@@ -78,7 +78,7 @@ def _place(plan: Plan, point_m: Floats, inward: Floats) -> tuple[float, float] |
 
 
 def _around_mm(plan: Plan) -> float:
-    """Circumference of a cylinder whose ``flat`` leaves the turn open; else 0."""
+    """Circumference of a cylinder with an open turn; else 0."""
     skin = plan.skin
     if skin.closed:
         return skin.columns * skin.pitch_x_mm

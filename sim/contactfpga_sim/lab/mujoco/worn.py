@@ -1,4 +1,4 @@
-"""A link's sheet: switches under the cover, board, and USB chip."""
+"""A link's sheet: switches, board, and USB chip."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from contactfpga_sim.model.scenes.felt import LoadedUnits
 from contactfpga_sim.model.scenes.scene import around_m
 
 HOST_S = Usb().host_s
-"""From the host's USB controller to the program, as in ``contactfpga study arm``."""
+"""From the USB controller to the program, as in ``contactfpga study arm``."""
 
 POLL_S = 1e-6
-"""Time by which the board, but not the robot, advances in a read without waiting."""
+"""Advance of the board, but not the robot, in a read without waiting."""
 
 
 class WornSheet:
-    """A sheet on its link, in simulated time; :attr:`board` reads it like a real one."""
+    """A sheet on its link in simulated time; :attr:`board` reads it."""
 
     board: Board
 
@@ -42,13 +42,11 @@ class WornSheet:
         self.ball = Ball(radius_m, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson))
         self.touches: list[SheetTouch] = []
         self.fingers: tuple[Finger, ...] = ()
-        """Pushes from outside MuJoCo."""
         self.contact = False
-        """Level of the board's ``contact`` pin."""
         self.dead = False
-        """Set it to stop the board: pins freeze, nothing is sent."""
+        """Set it to freeze the board's pins and silence it."""
         self.line: Callable[[bytes], bytes] = bytes
-        """Transforms each packet from the USB chip; one that raises :class:`~contactfpga.PortLost` is a pulled plug."""
+        """Transforms each packet of the USB chip; if it raises :class:`~contactfpga.PortLost`, the plug is pulled."""
         pitches = (1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
         self._cells = cells_of(cover, skin.rows, skin.columns, *pitches, seed)
         self.forces_n: Floats = np.zeros((skin.rows, skin.columns))
@@ -67,8 +65,8 @@ class WornSheet:
         self._load()
 
     def cut(self, rows: Mapping[int, int] | None = None, columns: Mapping[int, int] | None = None) -> None:
-        """Cut lines of the sheet, like :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises
-        ContactFPGAError for golden zones."""
+        """Cut lines, like :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises ContactFPGAError
+        for golden zones."""
         if isinstance(self._device, GoldenBoard):
             raise ContactFPGAError("golden zones come from cells and know no lines: take the gateware")
         self._device.cut(rows or {}, columns or {})
@@ -78,12 +76,11 @@ class WornSheet:
     by_force = True
 
     def touch(self, fingers: Sequence[Finger]) -> None:
-        """From MuJoCo's next step on, push the link with these fingers along the normal; from any thread."""
+        """From the next step on, push the link with fingers along the normal; from any thread."""
         self.fingers = tuple(fingers)
 
     @property
     def pressed(self) -> np.ndarray:
-        """Same as :attr:`closed`."""
         return self.closed
 
     # ---- what MuJoCo does to it
@@ -142,7 +139,6 @@ class WornSheet:
                 self._coming.append((at + HOST_S, data))
 
     def clock(self) -> float:
-        """Seconds since power-up."""
         return self._clock_s
 
     def arrived(self) -> bytes:
@@ -153,14 +149,13 @@ class WornSheet:
         return found
 
     def send(self, data: bytes) -> None:
-        """Send bytes to the board."""
         if not self.dead:
             self._device.send(data)
 
     # ---- what the host knows of it
 
     def observe(self) -> tuple[LinkMemory, float]:
-        """Read all received frames; return knowledge of the link, and the board's clock."""
+        """Read all received frames; return the link's state and the board's clock."""
         try:
             while True:
                 self._take()
@@ -176,12 +171,11 @@ class WornSheet:
         self._known = LinkMemory(True, 0.0, zones, self._tracker.update(zones), sampled_s, sampled_s)
 
     def close(self) -> None:
-        """Free the board."""
         self._device.close()
 
 
 class SteppedPort:
-    """A :class:`contactfpga.driver.transport.SimulatedPort` by which the whole robot goes on while a program waits."""
+    """A :class:`contactfpga.driver.transport.SimulatedPort` that steps the whole robot while a program waits."""
 
     def __init__(self, worn: WornSheet, step: Callable[[], None], seed: int):
         self._worn, self._step = worn, step

@@ -18,11 +18,9 @@ from contactfpga_sim.verify.mutants.netlist import STAGES, Mutant
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 
 GROUPS: dict[str, Mapping[str, object]] = {"mutants": SKINS, "options": OPTIONS, "several": SEVERAL}
-"""Skins, or several sheets, by section of the page."""
+"""Skins by section of the page."""
 EACH = 40
-"""Mutants per Skin."""
 JOBS = 2
-"""Skins at a time."""
 CACHE = "CONTACTFPGA_CACHE"
 
 
@@ -69,7 +67,7 @@ def listed(results: Iterable[Result]) -> str:
 
 
 def run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> dict[str, list[Result]]:
-    """Results by Skin, with a progress bar each, or lines if stderr is no terminal."""
+    """Results by Skin, with progress bars, or lines off a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 

@@ -1,6 +1,6 @@
 """Links through a router, in four processes: boards with publishers, router, and two readers of half each.
 
-Boards run at full speed almost for free: frames are made beforehand, and delivered when due.
+Frames are made beforehand, and delivered when due, so that boards cost almost nothing.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from contactfpga_sim.model.golden.request import heard
 
 HELLO_S = 0.5
 GREETED_HZ = 20.0
-"""Frames per second before :meth:`Steady.go`."""
 
 
 @functools.cache
@@ -40,13 +39,13 @@ def frames(low: int) -> list[bytes]:
 
 
 def said(sent: int, number: int) -> bytes:
-    """Hello of a board that has sent this many frames and received this request."""
+    """Hello of a board after this many frames and this request."""
     counters = ((sent, SENT_DIGITS), (sent * STEP_US >> EPOCH_BITS, EPOCH_DIGITS), (number, HEARD_DIGITS), (0, 2))
     return hello(facts(SKIN), [value >> 7 * place & 127 for value, count in counters for place in range(count)])
 
 
 class Steady:
-    """A transport of a board that sends ``rate_hz`` frames per second after :meth:`go`."""
+    """A transport that sends ``rate_hz`` frames per second after :meth:`go`."""
 
     threaded = True
 
@@ -59,7 +58,7 @@ class Steady:
         self._begun_s, self._rate_hz = time.monotonic(), GREETED_HZ
 
     def go(self, begun_s: float, rate_hz: float) -> int:
-        """Send at this rate from that moment; return the first frame's number."""
+        """Send at this rate; return the first frame's number."""
         with self._lock:
             self._begun_s, self._rate_hz, self._first = begun_s, rate_hz, self._sent
             return self._sent
@@ -109,10 +108,8 @@ def number_of(time_us: int) -> int:
 
 SECONDS = 5.0
 FULL_HZ = 10_000.0
-"""Rate of the one fast link."""
 RATE_HZ = 1000.0
 BARE_BYTES = 100
-"""Message size of the bare pair."""
 LONG_S = 120.0
 
 
@@ -121,17 +118,15 @@ class NetworkRun(NamedTuple):
 
     links: int
     share: float
-    """Share of sent frames received by the end; others are in transit or lost."""
+    """Share of sent frames received by the end."""
     frames: float
-    """Received frames per second."""
     lost: int
-    """Frames and messages that did not arrive."""
+    """Frames and messages lost."""
     messages: float
-    """Messages per second."""
     cpu: dict[str, float]
     """Core share of publishers, router and readers."""
     latency: tuple[float, float]
-    """p50 and p99 from a frame due at the port to its reader, for one link."""
+    """p50 and p99 from due at the port to reader, for one link."""
     bare: tuple[float, float]
     """p50 and p99 of the bare pair, from put to callback."""
 
@@ -216,7 +211,7 @@ def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full
 
 
 def _beat(bare: Any, until_s: float) -> None:
-    """Run the bare pair: 1,000 messages per second with their times."""
+    """1,000 messages per second with their times."""
     while (now_s := time.monotonic()) < until_s:
         bare.put(np.float64(now_s).tobytes() + bytes(BARE_BYTES - 8))
         time.sleep(1 / RATE_HZ)
@@ -249,7 +244,6 @@ def _read(pipe: Connection, endpoint: str, links: range, batch_s: float, full: b
 
 
 def _probed(board: contactfpga.Board, first: int, begun_s: float, until_s: float) -> list[float]:
-    """Delay of each frame of one link."""
     found = []
     with board.subscribe(maxsize=1 << 16) as frames:
         while time.monotonic() < until_s:

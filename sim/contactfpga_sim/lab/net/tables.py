@@ -16,13 +16,13 @@ BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)
 GROWTH_MS = 10.0
 LINE_BYTES = 54 + 12
-"""Approximate overhead of a message: Ethernet, IP, TCP and Zenoh."""
+"""Approximate overhead of a message."""
 GIGABIT = 1e9 / 8
 
 
 @functools.cache
 def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
-    """One measurement per run of this program. The cache distinguishes calls without ``full``, so it has no default."""
+    """One measurement per run of this program; the cache needs ``full`` in the call."""
     return load.measure(links, batch_ms / 1000, full)
 
 
@@ -93,7 +93,6 @@ def _ms(latency: tuple[float, float]) -> str:
 
 
 WHOLE = Path("docs/tables/net-links.csv")
-"""File of the whole table."""
 ENDS = {"publisher": style.BLUE, "router": style.VERMILLION, "reader": style.GREEN}
 SHARES = {"half arrive (p50)": style.BLUE, "99 % arrive (p99)": style.VERMILLION}
 

@@ -1,4 +1,4 @@
-"""Times from the wire to the host, by the model of the USB bridge, for the boards pages."""
+"""Times from wire to host by the model of the USB bridge, for the boards pages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from contactfpga_sim.lab.usb import DEFAULT_TIMER_MS, BridgeSettings
 TOUCHES = 24
 
 BRIDGES = {"high speed": BOARDS["icebreaker"].bridge, "full speed": BOARDS["ulx3s-12f"].bridge}
-"""Bridges, each for all of its speed."""
 
 SET = {"set by the rule": {}, "as new": {"timer_ms": DEFAULT_TIMER_MS, "event": None}}
 """Settings of ``contactfpga doctor``, and after power-up."""
@@ -31,7 +30,7 @@ class BridgeRow(NamedTuple):
 
 
 def rows() -> list[BridgeRow]:
-    """Each bridge in each setting, for sheets that send each scan and that send changes."""
+    """Each bridge and setting, for sheets that send each scan and that send changes."""
     fast = Skin.load(examples() / "fast.toml")
     found = []
     for speed, chip in BRIDGES.items():
@@ -47,6 +46,7 @@ def bridge_table() -> str:
 
 
 def bridge_row(row: BridgeRow) -> str:
+    """A row of :func:`bridge_table`."""
     chip = BRIDGES[row.speed]
     settings = BridgeSettings(chip, **SET[row.settings])  # type: ignore[arg-type]
     found = stages.measure(row.skin, settings, touches=TOUCHES, host_touches=0)

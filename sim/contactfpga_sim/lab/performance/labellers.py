@@ -1,5 +1,5 @@
-"""Latency of the labeller's last record, in clocks from a frame's last row: over touches at every place, recordings,
-and shapes that break labellers."""
+"""Clocks of the labeller's last record from a frame's last row: over touches at every place, recordings, and shapes
+that break labellers."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
 
 TOUCHES = 400
-"""Scenes of each family, at random places, angles and sizes."""
+"""Random scenes of each family."""
 
 SEED = 20
 
 
 def labeller_table() -> str:
-    """Latency over touches and shapes that break labellers, and the bound."""
+    """Latency over touches and breaking shapes, and the bound."""
     place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
     lines = []
     for size in (16, 32, 64):
@@ -71,13 +71,13 @@ def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
 
 
 def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
-    """Bound on the clocks from a frame's last row to its last record: the end mark is a clock later."""
+    """Most clocks from a frame's last row to its last record: the end mark is a clock later."""
     skin = Skin(rows=16, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=15.0)
     return skin.derived.label_clocks - 1
 
 
 def worst_last_record_clocks(skin: Skin) -> int:
-    """Worst clocks over shapes that break labellers, in the compiled gateware."""
+    """Worst clocks over breaking shapes, in compiled gateware."""
     with LabelBench(skin) as bench:
         frames = np.stack([cells for _, cells in variants(skin.rows, skin.columns)])
         return int(bench.run(frames).last_record_clocks.max())
@@ -93,16 +93,14 @@ def touches(skin: Skin) -> np.ndarray:
 
 def last_rows(frames: np.ndarray) -> np.ndarray:
     """(m, 2) uint64 words: the last two rows if the sheet ends after any row of (n, R, C) bool frames, or one row
-    later, if a cell is pressed in them. Every zone there leaves with the last row, so no other row decides the
-    latency."""
+    later, if a cell is pressed in them. Every zone there leaves with the last row, so no other row decides."""
     words = np.pad(to_words(frames), ((0, 0), (1, 1)))
     pairs = np.stack([words[:, :-1], words[:, 1:]], axis=-1).reshape(-1, 2)
     return pairs[pairs.any(axis=1)]
 
 
 def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The last two rows at every whole-cell offset of frames, partly off the sheet too: (k, 2, C) bool, and their
-    counts."""
+    """The last two rows at every whole-cell offset of frames, also partly off the sheet: (k, 2, C) bool, and counts."""
     columns = frames.shape[2]
     sheet = np.uint64((1 << columns) - 1)
     pairs = last_rows(frames)
@@ -112,7 +110,7 @@ def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct nonempty words as (k, 2, C) bool, and their counts."""
+    """Distinct nonempty words as (k, 2, C) bool, and counts."""
     # One number a pair: unique() by number is many times faster than by rows.
     pairs = np.ascontiguousarray(pairs[pairs.any(axis=1)])
     different, count = np.unique(pairs.view([("before", "<u8"), ("last", "<u8")]), return_counts=True)

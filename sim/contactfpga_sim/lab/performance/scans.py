@@ -1,4 +1,4 @@
-"""Figures of scans in clock cycles of the gateware."""
+"""Figures of scans in the gateware's clock cycles."""
 
 from __future__ import annotations
 
@@ -21,15 +21,13 @@ from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS
 
 INSTANTS = 96
-"""Touch instants, evenly over a scan."""
 
 RECORDINGS = Path("../shared/data")
-"""Folder of recordings outside the project."""
 
 RECORDED = 100
 
 HELD_SCANS = 4
-"""Scan periods that a frame is held; a sheet recorded a hundred times per second holds it longer."""
+"""Scan periods that a frame is held; real sheets hold it longer."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -41,11 +39,10 @@ SETTINGS = {
 
 
 REPORTS = ("moments", "barycenter")
-"""Reports with zones."""
 
 
 class EventTimes(NamedTuple):
-    """Median and worst us from a switch closing to an event, over touch phases."""
+    """Median and worst us from a closing to an event, over touch phases."""
 
     median: float
     worst: float
@@ -67,7 +64,7 @@ def one_switch(skin: Skin, row: int) -> np.ndarray:
 
 
 def dots_in_last_row(skin: Skin) -> np.ndarray:
-    """(R, C) bool: every other switch of the last row, the most zones that end in one row with 8-connectivity."""
+    """(R, C) bool: every other switch of the last row, the most zones that end in one row."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[-1, ::2] = True
     return cells
@@ -75,7 +72,7 @@ def dots_in_last_row(skin: Skin) -> np.ndarray:
 
 def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, EventTimes]:
     """From switches of one row closing to the pin, and to the first and last byte of their frame. Default: one
-    switch in the first row, the worst, as the rest of the scan follows."""
+    switch in the first row, the worst."""
     frame = skin.derived.frame_clocks
     touched = one_switch(skin, 0) if touched is None else touched
     untouched = np.zeros_like(touched)
@@ -93,7 +90,6 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
 
 
 def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:
-    """Cycles of a frame's first start bit and last stop bit."""
     received = board.take("received")
     for got in frames_in(skin, zip(received["cycle"].tolist(), received["data"].tolist())):
         if got.frame.cells:
@@ -143,17 +139,15 @@ def report_row(name: str, skin: Skin) -> str:
 
 
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
-    """Frame time of an adaptive scan by the golden model, and its speedup over a raster scan.
-
-    ``scenes``: (n, R, C) bool frames by name.
-    """
+    """Frame time of an adaptive scan by the golden model, and its speedup over a raster scan, for scenes of (n, R,
+    C) bool frames."""
     head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
     return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
 
 
 def gain_row(name: str, frames: np.ndarray) -> str:
-    """A row of :func:`gain_table`. Each frame is held for some scan periods: most scans see a sheet at rest. The
-    mean is of the frame under way at a random instant."""
+    """A row of :func:`gain_table`. Each frame is held for some scans: most see a sheet at rest. The mean is of the
+    frame under way at a random instant."""
     _, rows, columns = frames.shape
     known = facts(adaptive_skin(rows, columns))
     hold = HELD_SCANS * known.scan_clocks
@@ -173,7 +167,7 @@ def gain_row(name: str, frames: np.ndarray) -> str:
 
 
 def built_in_scenes() -> dict[str, np.ndarray]:
-    """(n, 16, 16) frames of every contact scene: one at rest, 50 over half a second of the moving one."""
+    """(n, 16, 16) frames of every contact scene, 50 over half a second of the moving one."""
     skin = adaptive_skin(16, 16)
     times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
     return {
@@ -220,10 +214,10 @@ FAST_SKINS = {
     "64x64, palm": (FAST_64, (10, 10)),
     "64x64, any pattern": (FAST_64.replace(settle_us=2.9, project_us=8.2), (3, 3)),
 }
-"""Fast Skins; the last has the times of docs/settle.md for any pressed switches."""
+"""Fast Skins; the last has docs/settle.md's times for any pressed switches."""
 
 TOUCHES = 196
-"""Places of a contact; on 16x16 every place of 3x3 cells."""
+"""Places of a contact."""
 
 
 def latency_table() -> str:
@@ -255,7 +249,7 @@ def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
 
 
 def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
-    """Projection, a row time per touched row, and frame bits; and the worst touch's excess."""
+    """Row times of touched rows plus frame bits; and the worst touch's excess."""
     if not skin.reads_rows:
         return ""
     derived = skin.derived

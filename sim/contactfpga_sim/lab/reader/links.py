@@ -1,4 +1,4 @@
-"""Load of many links of 1 kHz on the process that uses them."""
+"""Load of many 1 kHz links on the process that uses them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from contactfpga_sim.lab.speed.driver import SKIN
 
 PACE = Pace(1_000, 1, 3.0)
 LOOP_S = 0.01
-"""Interval of looks at each link."""
 
 
 class Share(NamedTuple):
@@ -26,11 +25,10 @@ class Share(NamedTuple):
     came: float
     """Share of frames that arrived while sent."""
     age_ms: float
-    """Median age of a link's newest frame when taken."""
 
 
 def measured(reader: str, links: int, call: str) -> Share:
-    """``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
+    """Load of links; ``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
     with contextlib.closing(Feeder(links, PACE)) as feeder, contextlib.ExitStack() as opened:
         with ThreadPoolExecutor(4) as workers:
             boards = list(workers.map(lambda port: _opened(port, reader), feeder.ports))

@@ -1,6 +1,6 @@
 """Tables of the delay of frames to user code.
 
-Methods alternate, so that other load affects all equally. Times are this machine's; no test holds them.
+Methods alternate, so that other load affects all equally. No test holds these times.
 """
 
 from __future__ import annotations
@@ -91,5 +91,6 @@ def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
 
 
 def conditions() -> str:
+    """Other load on the machine."""
     load = os.getloadavg()[0]
     return f"Measured with {os.cpu_count()} cores and a load of {load:.1f} at the end of this table."

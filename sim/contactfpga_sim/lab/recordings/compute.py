@@ -28,7 +28,7 @@ SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
 """Boards by approximate frame rate."""
 
 _PIECE = struct.Struct("<dQ")
-"""Arrival times of bytes, and their number by then."""
+"""Arrival times of bytes, and their number."""
 
 
 def finger(seconds: float) -> np.ndarray:
@@ -40,12 +40,13 @@ def finger(seconds: float) -> np.ndarray:
 
 @contextlib.contextmanager
 def folder() -> Iterator[Path]:
+    """A temporary folder."""
     with tempfile.TemporaryDirectory() as name:
         yield Path(name)
 
 
 def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
-    """Write a board's bytes under a circling finger; return the number of frames."""
+    """Write a board's bytes under a circling finger; return the frames' number."""
     with contactfpga.open(VirtualBoard(skin, finger), record=path) as board:
         count = 1
         while board.clock() < seconds:
@@ -61,7 +62,7 @@ class Cost:
     frames_per_s: float
     bytes_per_frame: float
     frames_per_cpu_s: float
-    """Frames received and written, with all of the driver's work."""
+    """With all of the driver's work."""
 
     @property
     def mb_an_hour(self) -> float:
@@ -88,7 +89,6 @@ class Reading:
     rows: float
     """Rows of a table, with tracks."""
     parquet_bytes: float
-    """Bytes per frame."""
 
 
 def reading(path: Path, into: Path) -> Reading:
@@ -106,11 +106,9 @@ class Loss:
     """Loss after a kill -9."""
 
     came: int
-    """Arrived bytes."""
     lost: int
-    """Arrived bytes missing in the recovered file."""
     lost_s: float
-    """From the last recovered byte to the last one that arrived."""
+    """From the last recovered byte to the last arrived one."""
 
 
 def loss(source: Path, seconds: float, place: Path) -> Loss:
@@ -133,7 +131,6 @@ def loss(source: Path, seconds: float, place: Path) -> Loss:
 
 
 def _record(port: str, file: str, log: str) -> None:
-    """The process to kill; it logs arrivals itself."""
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT)
     count = 0
 

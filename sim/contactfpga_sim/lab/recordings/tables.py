@@ -14,7 +14,6 @@ from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.recordings import compute
 
 SECONDS = {10_000: 3.0, 1_000: 5.0}
-"""Device time by frames per second."""
 KILLS = 8
 
 
@@ -28,7 +27,7 @@ def stream(rate: int) -> Path:
 
 
 def sizes_table() -> str:
-    """Sizes (machine-independent but for chunk ends) and this machine's speeds."""
+    """Sizes (but for chunk ends, machine-independent), and this machine's speeds."""
     head = ("frames/s", "messages", "bytes per frame", "MB an hour", "frames per CPU second")
     rows = [head]
     with compute.folder() as place:

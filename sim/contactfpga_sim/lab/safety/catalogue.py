@@ -1,7 +1,4 @@
-"""Electrical faults of docs/safety.md, with places and effects.
-
-To add one, add an entry to :data:`FAULTS`; study and page follow.
-"""
+"""Electrical faults of docs/safety.md. To add one, extend :data:`FAULTS`; study and page follow."""
 
 from __future__ import annotations
 
@@ -25,9 +22,9 @@ class SheetFault:
     """A fault of the sheet; cells are (row, column)."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut rows: first column whose switches no longer reach the pin; 0 also for a driver that never selects."""
+    """Cut rows: first column that no longer reaches the pin; 0 also for a driver that never selects."""
     columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut columns: first row whose switches no longer reach the pin; 0 also for an input that always reads released."""
+    """Cut columns: first row that no longer reaches the pin; 0 also for an input that always reads released."""
     selected: tuple[int, ...] = ()
     """Rows constantly at the selecting level."""
     stuck: tuple[int, ...] = ()
@@ -39,19 +36,15 @@ class SheetFault:
     bare: tuple[Cell, ...] = ()
     """Switches with shorted diodes."""
     joined_rows: tuple[Cell, ...] = ()
-    """Pairs of shorted rows."""
     joined_columns: tuple[Cell, ...] = ()
-    """Pairs of shorted columns."""
     pulls_win: bool = False
-    """Whether undefined levels, with two opposing pins, read as released."""
+    """Whether undefined levels, of two opposing pins, read as released."""
     line: ColumnLine | None = None
     """Settling of the columns; None: instant."""
     running: bool = True
     """Whether the board has supply, clock and configuration."""
     connected: bool = True
-    """Whether bytes reach the host."""
     contact_connected: bool = True
-    """Whether pin `contact` reaches the robot."""
 
     def middle(self, rows: int, columns: int) -> Cell:
         """A cell of the fault."""
@@ -80,7 +73,6 @@ class SheetFault:
         board.press(read[:-1, :-1])
 
     def _read(self, closed: np.ndarray) -> np.ndarray:
-        """Switches that read pressed, given the closed ones of an extended sheet."""
         cells = closed.copy()
         for cell in self.closed:
             cells[cell] = True
@@ -109,7 +101,6 @@ class Fault:
     effect: str
     """The error if unnoticed."""
     places: Places
-    """Places by name."""
     left: str
     """The user's remedy; for an unreported fault the reason."""
     host: str = ""
@@ -133,7 +124,6 @@ def _cut_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _row_chips(skin: Skin) -> Mapping[str, SheetFault]:
-    """A failed connector or 74HC595: its rows, or all later rows too."""
     firsts = range(0, skin.rows, 8)
     alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
     return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
@@ -301,4 +291,3 @@ FAULTS: Mapping[str, Fault] = {
         "take zones as the second way to a stop; test the stop at every start",
     ),
 }
-"""Electrical faults by name."""

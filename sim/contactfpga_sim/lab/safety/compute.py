@@ -1,5 +1,5 @@
-"""Every fault at every place, in every scene: its reports, their times, and earlier errors. For self-test faults the
-compiled board is powered up and pin `contact` is watched."""
+"""Every fault at every place, in every scene: its reports, their times, and earlier errors. Self-test faults also
+power up the compiled board."""
 
 from __future__ import annotations
 
@@ -51,7 +51,6 @@ class Place:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Content of the first flagged frames."""
         return tuple(dict.fromkeys(word for told in self.scenes.values() for word in told.words))
 
 
@@ -75,7 +74,7 @@ def found(skin: str, fault: str) -> tuple[Place, ...]:
 
 
 def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
-    """Number of harmful places whose fault one of these channels reports, and of all harmful places."""
+    """Harmful places whose fault these channels report, and all harmful places."""
     harmful = [place for place in found(skin, fault) if place.harmful]
     return sum(any(place.us(channel) is not None for channel in channels) for place in harmful), len(harmful)
 
@@ -83,7 +82,6 @@ def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
 TESTED = Skin.load(examples() / "fast.toml").replace(guard=True, self_test=True, fail_safe=True, alive=True)
 
 HOST = "self_test"
-"""Faults by :attr:`~contactfpga_sim.lab.safety.catalogue.Fault.host`."""
 
 
 def clocks(skin: Skin) -> int:
@@ -94,7 +92,7 @@ def clocks(skin: Skin) -> int:
 
 
 def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
-    """Time of the pin's report in us from power-up, with the switches of shorted diodes pressed; None: none."""
+    """Time of the pin's report in us from power-up, with shorted diodes' switches pressed; None: none."""
     cells = np.zeros((1, skin.rows, skin.columns), bool)
     for cell in hurt.bare:
         cells[0][cell] = True
@@ -107,7 +105,7 @@ def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
 
 @functools.cache
 def times_at_start(fault: str) -> dict[str, float | None]:
-    """Time of the self-test's report by place; empty for other faults."""
+    """Self-test report times by place; empty for other faults."""
     if FAULTS[fault].host != HOST:
         return {}
     return {name: told_us(hurt) for name, hurt in places(TESTED, fault)}

@@ -16,7 +16,6 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
     "these and `self_test`": ("guarded", ("flags", "deadline", "alive", compute.HOST)),
 }
-"""Options with Skin and reporting channels."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
 
 
@@ -61,7 +60,6 @@ def coverage_table() -> str:
 
 
 def _told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
-    """:func:`compute.told`, with the self-test if among the channels."""
     tested = compute.times_at_start(fault) if compute.HOST in channels else {}
     if not tested:
         return compute.told(skin, fault, channels)

@@ -1,4 +1,4 @@
-"""One fault at one place: the compiled board scans a sheet that gets the fault."""
+"""One fault at one place of the compiled board's sheet."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments,
 from contactfpga_sim.lab.safety.catalogue import SheetFault
 
 LONGEST_US = 5000
-"""Time after which a fault counts as unreported."""
+"""Time that makes a fault unreported."""
 STEP_US = 8
-"""Resolution of the times."""
 QUIET_US = 2500
-"""Time without an edge of `alive` at which a watchdog acts: two and a half of its half periods."""
+"""Time without an edge of `alive` at which a watchdog acts: two and a half half periods."""
 DEADLINE_US = 1000
-"""The host's deadline for frames; ten frames is a short one."""
+"""The host's deadline: ten frames is a short one."""
 
 WARM_UP_US = 3000
-"""Run time after the hello, by which frames arrive and `alive` toggles."""
+"""Run time after the hello."""
 SEEN_SCANS = 6
-"""Scans for which a reported fault is watched further."""
+"""Scans watched after a report."""
 
 PINS = ("contact", "alive")
 
@@ -34,9 +33,8 @@ class Told:
     """Result of a fault in one scene, in us from the fault."""
 
     by: Mapping[str, int]
-    """Report times: by the frames' ``flags``, a host's ``deadline``, the pins ``contact`` and ``alive``."""
+    """Report times by ``flags``, a host's ``deadline``, pins ``contact`` and ``alive``."""
     words: tuple[str, ...]
-    """Content of the first flagged frame."""
     wrong: int
     """Wrong frames before the flag or the end."""
     harmful: bool

@@ -1,4 +1,4 @@
-"""The picture in docs/scenes.md, hand-written, so that equal scenes make equal files."""
+"""The picture in docs/scenes.md, hand-written: equal scenes make equal files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from contactfpga_sim.model.scenes.scene import Scene, sheet
 
 ACROSS = 4
 PANEL, MARGIN, LINE, FOOT = 160, 16, 16, 24
-"""Panel size, margin, title height and room for the scale, in pixels."""
 
 HEAD = 4 * LINE
 OUTLINE = style.VERMILLION
@@ -39,7 +38,7 @@ class Panel:
 
 
 def panels() -> list[Panel]:
-    """Scenes of families whose covered switches are pressed; two fingers under every kind of cover."""
+    """Some families' scenes with pressed switches; two fingers under every kind of cover."""
     hand, foot = (_square(size, pitch) for size, pitch in ((32, 5.0), (64, 5.0)))
     drawn = [
         Panel(name, f"pitch {skin.pitch_x_mm:g} mm", placements(name, 1, seed, skin)[0], skin, Cover())
@@ -110,7 +109,6 @@ def _panel(panel: Panel) -> list[str]:
 
 
 def _scale(sheet_mm: float, scale: float) -> list[str]:
-    """A scale bar of at most 0.4 of the sheet's width."""
     long_mm = max((one for one in SCALES_MM if one <= 0.4 * sheet_mm), default=SCALES_MM[0])
     wide = long_mm * scale
     return [

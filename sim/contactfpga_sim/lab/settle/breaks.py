@@ -13,10 +13,9 @@ from contactfpga.design.circuit.phases import Levels
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 
 SETTLE_US, PRECHARGE_US = 0.5, 0.25
-"""Times of a fast scan."""
 SIZE = 16
 HIGH_V = Circuit().high_v
-"""Level below which a column no longer reads as unpressed."""
+"""Level below which a column reads as pressed or unclear."""
 US = 1e6
 
 
@@ -110,4 +109,3 @@ KNOBS = {
         ),
     )
 }
-"""Knobs by name."""

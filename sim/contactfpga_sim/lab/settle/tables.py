@@ -17,7 +17,6 @@ from contactfpga_sim.model.sheet import agreement
 from contactfpga_sim.model.sheet.agreement import SpiceComparison
 
 GAP_US = 1 / 24
-"""One clock at 24 MHz."""
 NAMES = ("precharge", "gap", "select", "gap")
 
 

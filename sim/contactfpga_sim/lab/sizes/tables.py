@@ -16,7 +16,6 @@ from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size, writer
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
-"""Sheets on the boards page besides default ones."""
 FAST = Path("examples/fast.toml")
 
 
@@ -27,13 +26,11 @@ FAULTS: dict[str, dict[str, Any]] = {
     "`guard`, `fail_safe` and `alive`": {"guard": True, "fail_safe": True, "alive": True},
     "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
 }
-"""Fault-reporting options by title."""
 FAST_FAULTS: dict[str, dict[str, Any]] = {
     "`guard`": {"guard": True},
     "`self_test`": {"self_test": True},
     "`guard` and `self_test`": {"guard": True, "self_test": True},
 }
-"""Fault-reporting options of a line-reversal scan."""
 
 WEIGHTS = (
     (1, 2, 3, -4, 5, 6, 7, 8),
@@ -78,7 +75,7 @@ def _fault_rows(skin: Skin, name: str, table: dict[str, dict[str, Any]]) -> list
 
 
 def units_table() -> str:
-    """The reference Skin with pressure units and their weighted sums."""
+    """The reference Skin with pressure units and weighted sums."""
     reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
     rows = []
     for units, sums in ((1, 0), (3, 1), (6, 0), (6, 4), (8, 4)):
@@ -89,7 +86,7 @@ def units_table() -> str:
 
 
 def boards_table() -> str:
-    """Sheets that the boards page names, built for their boards."""
+    """Sheets of the boards page, built for their boards."""
     head = ("board", "FPGA", "clock", "sheet", "LUT4", "flip-flops", "block RAMs", "logic cells", "Fmax")
     lines = []
     for board in BOARDS.values():

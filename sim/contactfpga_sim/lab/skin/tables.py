@@ -1,4 +1,4 @@
-"""The Skin page's table: each field with default and docstring as Markdown."""
+"""The Skin page's table of fields, from their docstrings."""
 
 from __future__ import annotations
 

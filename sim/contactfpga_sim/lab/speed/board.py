@@ -1,7 +1,5 @@
-"""Speed of the virtual board on this machine: `python -m contactfpga_sim.lab.speed.board`.
-
-CPU time of the best of some runs. No test holds the figures.
-"""
+"""CPU time of the virtual board on this machine, the best of some runs: `python -m contactfpga_sim.lab.speed.board`.
+No test holds it."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ RUN_S = 0.02
 
 
 def cycles_per_second(skin: Skin, scene: str = "two_fingers") -> float:
-    """Clock cycles per second of the board alone, without a client."""
+    """Clock cycles per second of the board without a client."""
     cycles = round(RUN_S * skin.clock_hz)
     with VirtualBoard(skin, scene) as board:
         board.advance(cycles)  # the first run finds cold caches

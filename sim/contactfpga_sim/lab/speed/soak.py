@@ -1,9 +1,9 @@
 """A board in real time and its driver for an hour: `make soak`. Nothing may grow, or be lost unreported.
 
 The virtual board runs on a pseudo-terminal; three threads read it, one requests, subscriptions come and go, and the
-port is reopened now and then. Each line is a minute: frames, losses, memory and open descriptors of this process. The
-status is 1 if a frame was repeated or out of order, a count does not add up, memory or descriptors grew, or no frame
-arrived. The first period with a wrong frame or count is the last.
+port is reopened. Each line is a minute: frames, losses, memory and open descriptors. The status is 1 if a frame was
+repeated or out of order, a count does not add up, memory or descriptors grew, or no frame arrived. The first period
+with a wrong frame or count is the last.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from contactfpga.tools.console import interrupt, numbers
 from contactfpga_sim.model.board.pty_board import PtyBoard
 
 SKIN = contactfpga.Skin(clock_hz=3_000_000, baud=750_000, settle_us=25.0)
-"""A Skin with a clock that a busy machine holds."""
 
 REOPENED_S = 60.0
 GROWTH_MB = 30.0
@@ -38,7 +37,6 @@ class Soak:
         self._port = port
 
     def run(self, seconds: float) -> None:
-        """Read for this long, then release the port."""
         self.opened += 1
         with contactfpga.open(self._port, timeout=10.0) as board:
             until = time.monotonic() + seconds

@@ -1,6 +1,6 @@
 """Where ids are lost: one knob at a time, moved until fewer than 95 % of random placements keep them.
 
-A placement shifts the scene by up to a pitch along both axes, and its frames by up to one frame.
+A placement shifts the scene by up to a pitch along both axes, and its frames by up to one.
 """
 
 from __future__ import annotations
@@ -20,13 +20,12 @@ from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_o
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)
-"""A sheet for long slides."""
 
 Y_MM = 73.0
 HZ = 1000.0
 
 MOST = 480
-"""Most placements per value; undecided ones count as broken."""
+"""Most placements per value; undecided ones break."""
 
 Ids = list[list[int]]
 """Ids from left to right by frame, without frames that lack a zone."""
@@ -34,7 +33,6 @@ Ids = list[list[int]]
 Made = tuple[Zones, ...]
 
 Rates = list[tuple[float, rated.Rate]]
-"""Correct placements by value."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +44,6 @@ class Knob:
     axis: str
     """The moved quantity, with its unit."""
     values: tuple[float, ...]
-    """Values in sweep order."""
     scene: Callable[[float, Random], Made]
     """Frames for a value, at a random placement."""
     right: Callable[[Ids, float], bool]
@@ -55,12 +52,11 @@ class Knob:
     closed: Mapping[str, str]
     """Break points by formula, by method."""
     helps: str
-    """The remedy."""
 
     def rates(
         self, value: float, methods: Iterable[str], seed: int = 0, looks: Sequence[int] = rated.LOOKS
     ) -> dict[str, rated.Rate]:
-        """Correct placements at a value, by method, on the same placements; as many as the decision needs."""
+        """Correct placements at a value, the same for each method; as many as the decision needs."""
         hits = dict.fromkeys(methods, 0)
         found: dict[str, rated.Rate] = {}
         for number in range(MOST):
@@ -123,7 +119,7 @@ def _moved(rng: Random) -> tuple[float, float]:
 
 
 def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
-    """(n, rows, columns) bool: switches under a finger at n places, without a cover."""
+    """(n, rows, columns) bool: bare switches under a finger at n places."""
     columns, rows = WIDE.pitch_x_mm * np.arange(WIDE.columns), WIDE.pitch_y_mm * np.arange(WIDE.rows)
     across, along = columns - xs_mm[:, None, None], rows[:, None] - y_mm
     closed: np.ndarray = across**2 + along**2 <= FINGER_MM**2
@@ -156,7 +152,6 @@ def _one_id(ids: Ids, _value: float) -> bool:
 
 
 def _slide(step_mm: float, rng: Random, from_rest: bool) -> Made:
-    """Ten frames at this speed, ``from_rest`` after ten of acceleration."""
     steps = [step_mm * (number + 1) / 10 for number in range(10 if from_rest else 0)] + [step_mm] * 9
     xs = [10.0]
     for step in steps:
@@ -194,7 +189,7 @@ SPEEDING, AT_ONCE = (
 
 
 def _pair(distance_mm: float, rng: Random) -> Made:
-    """Two fingers that start 60 mm apart, stay 0.1 s at this distance, and go back, at 400 mm/s relative speed."""
+    """Two fingers that start 60 mm apart, stay 0.1 s at this distance, and part, at 400 mm/s relative speed."""
     travel = (60 - distance_mm) / 400
     x_mm, y_mm = _moved(rng)
     now = _times(2 * travel + 0.19, rng, 250.0)
@@ -238,7 +233,7 @@ CROSS = Knob(
 
 
 def _open(open_ms: float, rng: Random) -> Made:
-    """A finger whose switches open once for this long, at 2,000 frames per second."""
+    """A finger whose switches open once, at 2,000 frames per second."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.04, rng, 2000.0))
     lifted = (now >= 0.01) & (now < 0.01 + open_ms / 1000)
@@ -276,7 +271,7 @@ BOUNCE = Knob(
 
 
 def _stuck(count: float, rng: Random) -> Made:
-    """A finger that slides at 300 mm/s along a row with stuck switches 40 mm apart, to 20 mm past the fourth."""
+    """A finger at 300 mm/s along a row with stuck switches 40 mm apart, to 20 mm past the fourth."""
     x_mm, y_mm = _moved(rng)
     now = _times(0.69, rng, 125.0)
     cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)
@@ -302,7 +297,7 @@ STUCK = Knob(
 
 
 def _gap(ms: float, rng: Random) -> Made:
-    """A finger that slides for 0.1 s, then without frames for this long, then for 0.1 s more."""
+    """A finger that slides for 0.1 s, without frames for this long, then for 0.1 s."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.2, rng, 500.0))
     half = len(now) // 2
@@ -326,4 +321,3 @@ LOST = Knob(
 )
 
 KNOBS = {knob.name: knob for knob in (SPEEDING, AT_ONCE, MEET, CROSS, BOUNCE, STUCK, LOST)}
-"""Knobs by name."""

@@ -19,7 +19,7 @@ PACED = 3
 """Frames per write: 12,000 per second, slightly more than the reference Skin's."""
 
 PERIOD, TOUCHED = 64, 16
-"""Frames from touch to touch, a divisor of FRAMES, and frames of a touch."""
+"""Frames from touch to touch, a divisor of FRAMES, and of a touch."""
 
 ROUNDS = 4
 
@@ -27,12 +27,12 @@ HEAD = ("stops on a touch", "median", "99 %", "worst", "stops on silence")
 
 
 class ReactionTimes(NamedTuple):
-    """Times in us from the last byte of the first frame with a touch to the loop's decision."""
+    """Times in us from the last byte of a touch's first frame to the decision."""
 
     found_us: list[float]
-    """In increasing order."""
+    """Times in increasing order."""
     silent: int
-    """Stops because the machine paused beyond the deadline."""
+    """Stops because the machine paused too long."""
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -43,6 +43,7 @@ class ReactionTimes(NamedTuple):
 
 
 def example() -> ModuleType:
+    """The module ``examples/reflex.py``."""
     spec = importlib.util.spec_from_file_location("reflex", contactfpga.examples() / "reflex.py")
     assert spec is not None
     assert spec.loader is not None
@@ -52,7 +53,7 @@ def example() -> ModuleType:
 
 
 def measured(rounds: int = ROUNDS) -> ReactionTimes:
-    """Run the loop repeatedly, each time from an untouched sheet."""
+    """Run the loop repeatedly, from an untouched sheet."""
     loop, found, last, silent = example(), [], (rounds - 1) * FRAMES, 0
 
     def touched(number: int) -> bool:

@@ -1,7 +1,5 @@
-"""Scores of the tracker, two baselines and a published tracker on random scenes and recordings.
-
-Ids are judged by py-motmetrics: MOTA, IDF1, id switches.
-"""
+"""Scores of the tracker, two baselines and a published tracker on random scenes and recordings: MOTA, IDF1 and id
+switches by py-motmetrics."""
 
 from __future__ import annotations
 
@@ -37,7 +35,6 @@ class Nearest:
         self._next_id = 1
 
     def update(self, zones: Zones) -> dict[int, tuple[float, float]]:
-        """The place of each id."""
         places = [(zone.x_mm, zone.y_mm) for zone in zones if zone.x_mm is not None and zone.y_mm is not None]
         pairs = sorted(
             (math.dist(place, old), index, name)
@@ -57,7 +54,7 @@ class Nearest:
 
 
 class ConstantVelocity:
-    """Baseline that extrapolates the last speed for 0.1 s, and matches zones by least total distance."""
+    """Baseline that extrapolates speed for 0.1 s, and matches zones by least total distance."""
 
     def __init__(self, gate_mm: float = 20.0, coast_s: float = 0.1, smooth_s: float = 0.02):
         self._gate_mm, self._coast_s, self._smooth_s = gate_mm, coast_s, smooth_s
@@ -87,7 +84,7 @@ class ConstantVelocity:
 
 
 def places_of(ahead: np.ndarray, places: np.ndarray, gate_mm: float) -> list[int]:
-    """Number of the place of each of (n, 2) expected places, -1 beyond the gate."""
+    """Place number of each of (n, 2) expected places, -1 beyond the gate."""
     from scipy.optimize import linear_sum_assignment
 
     apart = np.linalg.norm(ahead[:, None] - places, axis=2)
@@ -98,17 +95,15 @@ def places_of(ahead: np.ndarray, places: np.ndarray, gate_mm: float) -> list[int
 
 
 NEAR_MM = 15.0
-"""Largest distance of an id from its contact."""
 
 JUDGED_HZ = 200.0
 """Most judged frames per second; all are tracked."""
 
 Update = Callable[[Zones], dict[int, Place]]
-"""Place of each id after a frame."""
 
 
 def ours() -> Update:
-    """The tracker with default settings; ids of zones in the frame, as for the others."""
+    """The tracker with default settings; ids of zones in the frame, as for others."""
     tracker = Tracker()
 
     def update(zones: Zones) -> dict[int, Place]:
@@ -119,17 +114,18 @@ def ours() -> Update:
 
 
 def constant_velocity() -> Update:
+    """The constant-velocity baseline."""
     return ConstantVelocity().update
 
 
 NORFAIR_HOLD = 2
-"""Frames for which Norfair keeps an unseen id: the best of 2 frames, 0.1 and 0.3 s on the tuning scenes at 100 Hz."""
+"""Frames for which Norfair keeps an unseen id: the best of 2 frames, 0.1 and 0.3 s on tuning scenes."""
 
 
 def norfair() -> Update:
-    """Norfair, a published tracker: Kalman filters of constant velocity and a gate of 20 mm. Raises ImportError.
+    """Norfair, a published tracker: Kalman filters of constant velocity, a gate of 20 mm. Raises ImportError.
 
-    It requires numpy below 2 without need, so no extra has it (see docs/tracking.md).
+    It requires numpy below 2 without need, so no extra has it (docs/tracking.md).
     """
     published: Any = importlib.import_module("norfair")
     tracker = published.Tracker("euclidean", 20.0, hit_counter_max=NORFAIR_HOLD, initialization_delay=0)
@@ -153,14 +149,16 @@ TRACKERS: dict[str, Callable[[], Update]] = {
 
 @dataclasses.dataclass(frozen=True)
 class Score:
+    """Scores of a tracker."""
+
     frames: int
     mota: float
     idf1: float
     switches: int
     idf1_each: tuple[float, ...] = ()
-    """IDF1 of each scene; nan if nothing could be distinguished."""
+    """IDF1 by scene; nan if nothing could be distinguished."""
     counted: tuple[float, ...] = ()
-    """Weight of each scene: judged places of contacts and ids."""
+    """Weight by scene: judged places of contacts and ids."""
 
     @property
     def switches_per_1000(self) -> float:
@@ -185,7 +183,7 @@ class Score:
 
 
 def half(pulls: np.ndarray) -> float:
-    """Half of the 95 % interval of a weighted mean, by Student's t; nan without any."""
+    """Half of a weighted mean's 95 % interval, by Student's t; nan without any."""
     from scipy.stats import t
 
     pulls = pulls[~np.isnan(pulls)]
@@ -236,7 +234,6 @@ def _near(distance: float, limit: float) -> float:
 
 
 MOST = 1500
-"""Most frames of a recording."""
 
 
 def skin_of(recording: Recording) -> Skin:
@@ -247,7 +244,7 @@ def skin_of(recording: Recording) -> Skin:
 
 
 def histories(path: Path, every: int) -> list[list[FrameTruth]]:
-    """Stretches of a recording between jumps of the scene, one of ``every`` frames, with the truth from all."""
+    """Stretches of a recording between jumps, one of ``every`` frames, with the truth from all."""
     recording = Recording.load(path)
     skin = skin_of(recording)
     pressed = recording.pressed[:MOST]
@@ -276,12 +273,12 @@ class _Linker:
         self._before = np.zeros(size, int)
         self._names: dict[int, int] = {}
         self._inside: dict[int, dict[int, np.ndarray]] = {}
-        """By name: zones merged into this one, with their last cells."""
+        """Zones merged into this one, by name, with last cells."""
         self._fresh = 0
 
     def take(self, labels: np.ndarray) -> dict[int, int]:
-        """Name of each label: the previous zone with most shared cells, the largest share first; a merged zone's
-        name when it reappears in place; else a new one."""
+        """Name of each label: the previous zone with most shared cells, largest share first; a merged zone's name
+        when it reappears in place; else a new one."""
         before, both = self._before, (self._before > 0) & (labels > 0)
         shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
         ranked = shares.T[np.argsort(-counts, kind="stable")].tolist()
@@ -317,18 +314,16 @@ class _Linker:
 RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
 
 JUDGED_RATES = RATES_HZ[1:]
-"""Rates at which the tracker must not be worse than another."""
+"""Rates at which the tracker must not be worse."""
 
 MOST_FRAMES = 6_000
 
 SCENES = 12
-"""Scenes per family. The tracker was tuned on others, numbered from 1000."""
+"""Scenes per family; the tracker was tuned on those from 1000 on."""
 
 EVERY = (1, 4)
-"""One of this many frames of a recording is used."""
 
 Scores = dict[str, Score]
-"""Scores by tracker."""
 
 
 @functools.cache
@@ -351,7 +346,7 @@ def _scored(family: str, rate_hz: float, count: int, names: Iterable[str]) -> di
 
 
 def ahead(ours: Score, other: Score) -> tuple[float, float]:
-    """Excess of the first IDF1 on the same scenes, and half of its 95 % interval."""
+    """Excess of the first IDF1, and half of its 95 % interval."""
     return ours.idf1 - other.idf1, half(ours.pulls - other.pulls)
 
 

@@ -53,8 +53,7 @@ WATCH = """
     };
 }
 """
-"""``watch(x, y)``: check drawn frames until a zone's barycenter, by its unique color, is at that share of the
-canvas."""
+"""``watch(x, y)``: wait for a zone's barycenter, by its unique color, at that share of the canvas."""
 
 
 def program() -> str | None:
@@ -96,11 +95,10 @@ class Visitor:
         self.page.mouse.up()
 
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
-        """Drag from first to last place, held for a while; the button stays down."""
+        """Drag from first to last place and hold; the button stays down."""
         self._drag([self.place(*place) for place in places], hold_ms)
 
     def drag_in_space(self, *points_m: np.ndarray, hold_ms: int = 300) -> None:
-        """Drag along places in the scene."""
         self._drag([self._seen(point) for point in points_m], hold_ms)
 
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
@@ -142,7 +140,7 @@ def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 @contextlib.contextmanager
 def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = False) -> Iterator[Visitor]:
-    """Open a view in a browser while a thread runs it; ``dark``: whether its user prefers dark pages."""
+    """Open a view in a browser while a thread runs it; ``dark``: its user prefers dark pages."""
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Figures of docs/view.md and pictures of the view, from a headless browser."""
+"""Figures and pictures of docs/view.md, from a headless browser."""
 
 from __future__ import annotations
 
@@ -29,31 +29,27 @@ from contactfpga_sim.lab.view import browser
 CLICKS = 20
 PACED_S = 4.0
 WAIT_S = 0.7
-"""Time between two clicks, long enough that they are no drag."""
+"""Time between clicks, long enough that they are no drag."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Click:
-    """Times of a click, in s of ``time.time()``, and those spent in board and driver."""
+    """Times of a click, in s of ``time.time()``, with those spent in board and driver."""
 
     released: float
-    """Mouse release in the browser."""
     touched: float
-    """The finger is on the virtual board."""
+    """Finger on the virtual board."""
     gateware_s: float
-    """Board time from touch to last byte of the first frame with the zone."""
+    """From touch to last byte of its first frame."""
     driver_s: float
     """From bytes to zones."""
     read: float
-    """The view has the zones."""
     queued: float
     """The zones leave for the browser."""
     drawn: float
-    """The browser has drawn the zones."""
 
     @property
     def parts_s(self) -> dict[str, float]:
-        """The click's time by part."""
         board = self.read - self.touched
         return {
             "browser and viser: from the mouse to the view": self.touched - self.released,
@@ -176,7 +172,7 @@ class ProcessorLoad:
 
 
 def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
-    """Load under these fingers, in CPU time."""
+    """CPU load under these fingers."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
     spent, read = [0.0], virtual.read
@@ -200,6 +196,7 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
 
 
 def load_table(shown: ServedView) -> str:
+    """Load with and without touches."""
     rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
     for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
         load = load_of(shown, fingers)
@@ -209,13 +206,11 @@ def load_table(shown: ServedView) -> str:
 
 
 FRAMES, FRAME_MS = 32, 120
-"""Frames of the looping clip, and their duration."""
+"""Frames of the clip, and their duration."""
 SWING_RAD = 0.22
-"""Camera swing to either side."""
 STEP_MS = 350
-"""Time for board and browser to follow a frame."""
+"""Time to follow a frame."""
 QUALITY = 50
-"""Quality of a frame, of 100."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -225,13 +220,11 @@ class Shot:
     strokes: tuple[float, float]
     """Moving finger, in columns and rows."""
     presses: bool
-    """Whether the other one presses."""
     turn_rad: float
-    """Camera angle from its first place."""
 
 
 def shot(share: float) -> Shot:
-    """A moment of the clip, 0 to 1: the finger circles once while the camera swings once."""
+    """A moment of the clip, 0 to 1: finger and camera go around once."""
     turn = 2 * math.pi * share
     place = 2.2 - 1.5 * math.cos(turn), 6.5 - 3.8 * math.sin(turn)
     return Shot(place, 0.3 < share < 0.75, SWING_RAD * math.sin(turn))
@@ -258,7 +251,6 @@ def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
 
 
 PRESSED = 0.4, 11.6
-"""Other finger, in columns and rows."""
 
 
 def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path) -> None:
@@ -318,7 +310,7 @@ def clicks_table(times: ViewTimes) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The view in a browser, at rest and in motion, and the picture of a recording."""
+    """The view at rest and in motion, and a recording's picture."""
     image, clip, drawn = folder / "view.png", folder / "view.webp", folder / "plot.svg"
     plotted(drawn)
     with opening.opened(http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:
