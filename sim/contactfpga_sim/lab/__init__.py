@@ -1,1 +1,1 @@
-"""Studies behind the tables and pictures of the pages."""
+"""Studies that make the tables and pictures of the pages."""

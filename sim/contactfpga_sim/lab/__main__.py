@@ -99,7 +99,7 @@ def main() -> int:
 
 
 def _make_all(chosen: Iterable[Study], strict: bool) -> int:
-    """With ``strict``, a study that cannot be made here is an error."""
+    """Make each study; with ``strict`` one that cannot be made here is an error."""
     for study in chosen:
         try:
             make(study)

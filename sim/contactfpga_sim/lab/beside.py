@@ -20,8 +20,8 @@ _PARTED = re.compile(
 
 
 def part(text: str, kept: str, file: Path, heads: str = "") -> str:
-    """A section with the rows of its longest table that match ``kept``, and a link to the file with all; only the
-    link if none matches. ``heads`` matches headers to keep."""
+    """A section with the rows of its longest table that match the regular expression ``kept``, and a link to the
+    file with all; only the link if none matches. ``heads`` matches the headers to keep."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]

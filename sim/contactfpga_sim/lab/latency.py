@@ -49,7 +49,7 @@ class Latency:
     touch_to_last_byte_us: Spread
     touch_to_contact_us: Spread
     change_to_last_byte_us: Spread
-    """From the loss of a corner to the last byte, for a moving contact on a busy line."""
+    """Time from the loss of a corner to the last byte, for a moving contact on a busy line."""
     frames_per_s: float
     """Rate while the contact moves."""
     bytes: int

@@ -47,7 +47,7 @@ class Study:
     """Outputs and needs of a study."""
 
     name: str
-    """Its folder."""
+    """Name of its folder."""
     title: str
     page: str
     """Page in ``docs``."""

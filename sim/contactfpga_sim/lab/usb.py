@@ -26,6 +26,7 @@ from contactfpga.driver.health import EVENT_CHAR, LATENCY_MS
 from contactfpga_sim.lab.spread import MixedTimes
 
 STATUS_BYTES = 2
+"""Status bytes at the start of each packet (AN232B-04)."""
 
 OVERHEAD_BYTES = {False: 13, True: 55}
 """Bus bytes of a bulk packet besides data: full and high speed (USB 2.0, tables 5-9 and 5-10)."""

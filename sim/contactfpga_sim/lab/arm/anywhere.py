@@ -19,7 +19,7 @@ from contactfpga_sim.lab.flips.campaign import wilson
 TOUCHES = 120
 
 SAME = 0.03
-"""Share within which both halves of the touches must agree to print a worst value."""
+"""Largest relative difference of the two halves of the touches at which a worst value is printed."""
 
 QUANTILE = 0.95
 

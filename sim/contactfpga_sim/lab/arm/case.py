@@ -41,7 +41,7 @@ class Case:
     """Spread of force below the cover, one of :data:`MODELS`. All but ``point`` press as wide as Hertz's patch of
     the foam's R*."""
     cap: Cap | None = None
-    """None: the foam presses the switches' flush faces."""
+    """Cap on each switch; None: the foam presses the switches' flush faces."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)

@@ -15,7 +15,7 @@ FASTEST_M_S = 5.0
 """Upper end of the search for the fastest push."""
 
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
-"""Pushes shown, as shares of the fastest."""
+"""Pushes as shares of the fastest one that the arm yields to."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Push:
     peak_indentation_m: float
     yields_m: float
     back_s: float | None
-    """From the first touch until the arm is back for good; None: not in this run."""
+    """Time from the first touch until the arm is back for good; None: not in this run."""
     stopped: bool
 
 

@@ -37,7 +37,7 @@ class ArmLink(_Checked):
     inertia_kgm2: float
     """J about the joint, without the motor."""
     lever_m: float
-    """From the joint to where speeds are measured, and to touches without their own lever."""
+    """Distance from the joint to where speeds are measured, and to touches without their own lever."""
     speed_m_s: float
     _zero = ("speed_m_s",)
 
@@ -162,7 +162,7 @@ class Touch(_Checked):
     """A thing that the arm runs into, or that pushes it."""
 
     x_mm: float = 80.0
-    """Along the columns of the flat sheet; column 0 is at 0."""
+    """Place along the columns of the flat sheet; column 0 is at 0."""
     y_mm: float = 80.0
     lever_m: float | None = None
     """Distance from the joint; None: the link's."""
@@ -213,5 +213,5 @@ class Run(_Checked):
     step_s: float = 10e-6
     """Step of integrator and gateware exchange."""
     lead_s: float = 20e-3
-    """From power-up, the controller's first sample, to the touch; whole steps."""
+    """Time from power-up, the controller's first sample, to the touch; a whole number of steps."""
     duration_s: float = 0.25

@@ -20,7 +20,7 @@ from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S
 
 ENDS_S = 20e-3
-"""A peak is over after this and the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
+"""Time that, with the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`, ends a peak."""
 
 INSTANTS = 8
 """Touches that measure latencies, a controller period apart."""
@@ -29,7 +29,7 @@ SPAN = 3
 """Pitches along each touched side."""
 
 SEEDS = (0, 1)
-"""Each makes half of the touches; the halves' difference shows the uncertainty."""
+"""Seeds of half of the touches each; the halves' difference shows the uncertainty."""
 
 Latencies = tuple[float, ...]
 """Equally likely latencies in s; empty: the sheet reports nothing."""

@@ -120,7 +120,7 @@ PUSH_HEADINGS = ("push, m/s", "peak torque, Nm", "peak force, N", "indentation, 
 
 
 def push_lines(pushes: list[Push]) -> list[list[str]]:
-    """Headings and pushes."""
+    """Headings and a line per push."""
     lines = [list(PUSH_HEADINGS)]
     for push in pushes:
         back = "-" if push.back_s is None else f"{1e3 * push.back_s:.0f}"

@@ -39,7 +39,7 @@ class PlantTransport:
 
 
 AFTER_S = 0.25e-3
-"""Delay of the second torque reading."""
+"""Delay of the second torque reading after the reaction."""
 
 SLOW_M_S = 1e-3
 """Speed of an arm at rest."""
@@ -76,7 +76,7 @@ class ArmResponse:
     rest_s: float | None
     reversals: int
     zones: int
-    """Most zones reported at once."""
+    """Most zones that the host reported at once."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,8 +104,8 @@ def run(
     """Let the arm run into the touched things.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: by
-    default the reference Skin, with units if needed; ``to_peak``: end once the force has fallen to half its peak. The
-    first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its gateware.
+    default the reference Skin, with units if needed; ``to_peak``: end once the force has fallen to half its peak after
+    the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")

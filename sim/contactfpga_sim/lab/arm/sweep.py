@@ -49,7 +49,7 @@ class SweepPoint:
     peak_indentation_m: float
     closes_s: float
     takes_s: float
-    """From the switch to the controller's input."""
+    """Time from the switch to the controller's input."""
     thickness_m: float = math.nan
 
 

@@ -98,7 +98,7 @@ def set_table(found: ArmRuns) -> str:
 
 
 def failure_table() -> str:
-    """Results of :data:`FAILURES`."""
+    """Results of runs with faults."""
     lines = [["", "way", "reacts, ms", "because of", "peak force, N", "indentation, mm", "reversals", "at rest, ms"]]
     for failure in FAILURES:
         found = run(Case.load("paper").but(**failure.changes), failure.way, faults=failure.faults).outcome

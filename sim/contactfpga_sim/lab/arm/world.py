@@ -282,7 +282,6 @@ class World:
             self._board.load(self._under.readings(forces_n))
 
     def _learn(self, now: float) -> None:
-        """Pass on what arrived by now; a pin is read at the controller's samples."""
         while self._changes and self._changes[0][0] <= now + 1e-9:
             at, self._level = self._changes.popleft()
             if self._level and self.detected_s is None:

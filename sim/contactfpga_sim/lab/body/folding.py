@@ -61,7 +61,7 @@ def learned(sweeps: int, rng: np.random.Generator, frames: int = 400) -> Folds:
 
 @dataclasses.dataclass(frozen=True)
 class Rates:
-    """Shares from 0 to 1."""
+    """Shares of zones and touches, from 0 to 1."""
 
     folds: float
     """Fold-only zones marked, as they should be."""

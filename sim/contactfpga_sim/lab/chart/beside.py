@@ -31,7 +31,7 @@ class RivalMethod:
     name: str
     family: str
     touch_us: Quantile
-    """Median from the foam's first touch."""
+    """Median time from the foam's first touch."""
     errors: dict[str, Interval]
 
 

@@ -194,7 +194,7 @@ def front(points: Iterable[tuple[float, float]]) -> list[int]:
 
 
 def reached_us(point: Point) -> float:
-    """Median from the foam's first touch to the zones at the host, labelling included."""
+    """Median time from the foam's first touch to the zones at the host, labelling included."""
     return point.times.touch_median_us.value + point.host_us
 
 

@@ -127,7 +127,7 @@ class Quantile:
     value: float
     low: float
     high: float
-    """Infinite if there are too few values."""
+    """Upper end of the interval; infinite if there are too few values."""
     count: int
 
 

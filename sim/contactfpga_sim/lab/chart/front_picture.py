@@ -32,10 +32,10 @@ class Row(NamedTuple):
     color: str
     mark: str
     methods: dict[str, str]
-    """By the words at their marks."""
+    """Methods by the words at their marks."""
     spot: Spot = (8, 0)
     others: dict[tuple[str, str], Spot | None] = {}  # noqa: RUF012 - it is not changed
-    """By words and error, away from the usual spot; None: no words."""
+    """Offsets by words and error in place of ``spot``; None: no words."""
 
 
 ROWS = {

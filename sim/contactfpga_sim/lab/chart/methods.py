@@ -30,7 +30,7 @@ class Method(NamedTuple):
 
     skin: Skin
     cover: Cover | None
-    """None: a bare sheet, whose switches close at any force if their middles are under a contact."""
+    """Cover; None is a bare sheet, whose switches close at any force if their middles are under a contact."""
 
 
 def sheet(pitch_mm: float, **settings: Any) -> Skin:
@@ -66,7 +66,6 @@ def _methods() -> dict[str, Method]:
 
 
 def _settings() -> dict[str, Method]:
-    """Ways to label, scan and send, under tiles at :data:`PITCH_MM`."""
     debounced: dict[str, Any] = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
     ways: list[tuple[str, str, dict[str, Any]]] = [
         ("run", "8-connected", {"connectivity": 8}),
@@ -83,7 +82,6 @@ def _settings() -> dict[str, Method]:
 
 
 def _reversal() -> dict[str, Method]:
-    """Line reversal, at 24 MHz and 12 Mbaud."""
     fast: dict[str, Any] = {
         "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
         "clock_hz": 24_000_000, "baud": 12_000_000,
@@ -97,4 +95,4 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
-"""By name, the plainest first."""
+"""Methods by name, the plainest first."""

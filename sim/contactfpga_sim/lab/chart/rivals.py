@@ -39,7 +39,7 @@ CROSSTALK = 0.01
 GAIN_SPREAD = 0.05
 """Relative standard deviation of calibrated gains."""
 THRESHOLD_N = 0.4
-"""The closing force of the studies' domes."""
+"""Force that touches an element, the closing force of the studies' domes."""
 HEAD_BYTES = 4
 """Header of an array's frame, which has a byte per element."""
 
@@ -65,9 +65,9 @@ class Pace:
     """Times in us; scans repeat, and the newest ready one is sent."""
 
     scan_us: float
-    """From first row to last, evenly spread."""
+    """Time from first row to last, evenly spread."""
     work_us: float
-    """From a scan's end until its frame is ready."""
+    """Time from a scan's end until its frame is ready."""
     loop_us: float
     wire_us: float
     slot_us: float = 0.0

@@ -62,7 +62,6 @@ def frames_per_second(skin: Skin, cells: np.ndarray, size: int) -> float:
 
 
 def _longest(skin: Skin, size: int) -> int:
-    """Most clocks of scan and wire for a frame."""
     derived = skin.derived
     return derived.frame_clocks + 10 * derived.bit_clocks * size
 
@@ -84,7 +83,7 @@ GOLDEN = 0.6180339887498949
 
 @dataclasses.dataclass(frozen=True)
 class Speed:
-    """Times in us."""
+    """Times of a method, in us."""
 
     median_us: float
     worst_us: float
@@ -92,7 +91,7 @@ class Speed:
     """Median bound of scans of touched rows alone: (A + 1) row times, and the frame's bits."""
     bytes: float
     frame_us: float
-    """Median from first row time to last byte, for a constant scene."""
+    """Median time from a frame's first row time to its last byte, for a constant scene."""
     frames_per_s: float
 
 

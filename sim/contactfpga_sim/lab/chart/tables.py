@@ -131,7 +131,6 @@ def host_table() -> str:
 
 
 def _later(skin: Skin, count: int) -> float:
-    """Microseconds by which the board's zones are later."""
     cells = _contacts(skin, count)
     return _frame(skin, cells)[0] - _frame(skin.replace(report="cells"), cells)[0] - host.label_us([cells], 8)
 

@@ -35,10 +35,10 @@ class Times:
     """Times of a method's touches, in us."""
 
     touch_median_us: Quantile
-    """From the foam's first touch; unreported touches count as infinite."""
+    """Time from the foam's first touch; unreported touches count as infinite."""
     touch_q95_us: Quantile
     electric_median_us: Quantile
-    """From the first closed switch, over touches that close one."""
+    """Time from the first closed switch, over touches that close one."""
     electric_q95_us: Quantile
     not_felt: Interval
     """Share of touches that close no switch."""

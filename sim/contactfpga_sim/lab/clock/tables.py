@@ -16,7 +16,7 @@ SECONDS, SEEDS = 60.0, 8
 WANDER_PPM, WANDER_S = 1.0, 60.0
 """Swing of a crystal's rate with temperature, and period."""
 SENT_S = 150e-6
-"""From the sample of the first row to the last byte, with WIRE_S for bytes."""
+"""Time from the sample of the first row to the last byte, with WIRE_S for bytes."""
 WIRE_S = 57e-6
 REQUEST_S, SCAN_S = 30e-6, 100e-6
 """Request on the wire, and longest wait for a scan."""
@@ -51,7 +51,7 @@ PATHS = {
 
 
 class Moment(NamedTuple):
-    """One frame."""
+    """One frame on its way."""
 
     time_us: int
     arrived_s: float
@@ -111,9 +111,9 @@ class Accuracy(NamedTuple):
 
     late_s: float
     error_s: float
-    """Median magnitude."""
+    """Median magnitude of the error."""
     worst_s: float
-    """99 % quantile."""
+    """99 % quantile of the error."""
     sigma_s: float
     within: float
     """Share of errors within two stated uncertainties."""

@@ -92,7 +92,7 @@ def _newtons(force: Force | NoSolution) -> str:
 THICKNESSES_MM, SIDES_MM = (2.0, 5.0), (4.0, 6.0, 8.0, 9.0)
 SOFT_N_MM = covers.DOME.force_n / (1e3 * covers.DOME.travel_m)
 PLACES_MM = ((45.0, 45.0), (40.0, 45.0), (40.0, 40.0), (42.0, 43.0))
-"""On a cap, between two, between four and aside, from the corner of 8x8 caps at 10 mm."""
+"""Places on a cap, between two, between four and aside, from the corner of 8x8 caps at 10 mm."""
 
 
 def elements_table() -> str:

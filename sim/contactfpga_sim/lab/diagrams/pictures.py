@@ -1,4 +1,4 @@
-"""All diagrams."""
+"""Draws the diagrams of the pages."""
 
 from __future__ import annotations
 

@@ -84,7 +84,6 @@ def _connectors(
     leads: dict[str, str],
     colors: dict[str, str],
 ) -> dict[str, list[tuple[float, float]]]:
-    """Draw pins in a column; return wire ends."""
     found: dict[str, list[tuple[float, float]]] = {}
     y = TOP
     for name, pins in connectors.items():

@@ -121,7 +121,6 @@ def bare(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list
 
 
 def _rectangle(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
-    """Corners that leave a row and column between 2x2 fingers."""
     (y, x), (v, u) = _crossed(rng, skin)
     return [(y, x), (y, u), (v, x), (v, u)]
 

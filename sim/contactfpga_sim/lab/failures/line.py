@@ -243,7 +243,6 @@ NOISE = Knob(
 
 
 def _clock(per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes with a fast crystal: short bits and short microseconds."""
     faster = 1 + per_cent / 100
     told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
     times = Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off")
@@ -276,7 +275,7 @@ TTY_BYTES = 4095
 
 
 class SlowHost:
-    """A virtual board behind an operating system's buffer, whose time passes while the host works."""
+    """A virtual board with an operating system's buffer, whose time passes while the host works."""
 
     live, threaded = True, False
     name = "the slow host"
@@ -349,7 +348,6 @@ MAX_AGE_S = 0.005
 
 @functools.cache
 def _silence(max_age_s: float | None, phase: float) -> tuple[str, float]:
-    """Error and delay at a reader of a board that stops at this phase."""
     transport = DyingBoard()
     with Driver(transport) as board:
         board.greet(1.0)

@@ -186,7 +186,6 @@ def debounced(method: str) -> Skin:
 
 
 def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
-    """Touches at the host when a switch closes, opens and closes again."""
     rest, touch = np.zeros((2, 1, skin.rows, skin.columns), bool)
     touch[0, 2, 1] = True
     clocks = skin.derived.clocks_per_us
@@ -201,7 +200,6 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of a switch that closes at any phase for 30 to 300 us, opens and closes again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)

@@ -28,7 +28,7 @@ from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
 TOUCHES = 100
 
 PHASE = 0.7548776662466927
-"""Its multiples sample a bridge period evenly."""
+"""Fraction whose multiples sample a bridge period evenly."""
 
 LEAD_US = 5_000
 """Time before a touch from which packets are written on time."""

@@ -20,7 +20,7 @@ PAPER_US = 6000.0
 """The paper's time from a touch to the decision to turn back."""
 
 ASSUMED_HOST_US = 1e6 * Usb().host_s
-"""From the host's USB controller to the decision, as in ``contactfpga study arm``."""
+"""Time from the host's USB controller to the decision, as in ``contactfpga study arm``."""
 
 
 class TooFast(ContactFPGAError, ValueError):
@@ -34,16 +34,16 @@ class Finger:
     board: Latency
     settings: BridgeSettings
     bridge_us: Spread
-    """From the last byte on the wire to the host's USB controller."""
+    """Time from the last byte on the wire to the host's USB controller."""
     usb_us: Spread
-    """From the touch to the host's USB controller."""
+    """Time from the touch to the host's USB controller."""
     host: HostShare | None
     user_code_us: Spread | None
-    """From the touch to user code: each exact time with each measured one."""
+    """Time from the touch to user code: each exact time with each measured one."""
 
     @property
     def decision_us(self) -> Spread:
-        """From the touch to the decision, with :data:`ASSUMED_HOST_US` for the host."""
+        """Time from the touch to the decision, with :data:`ASSUMED_HOST_US` for the host."""
         return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
 
     def as_json(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from contactfpga_sim.lab.fit.sources import Recorded, Source
 from contactfpga_sim.lab.fit.trial import FitTask
 
 Values = dict[str, list[float]]
-"""By metric, a value per scene or fingertip touch."""
+"""Value per scene or fingertip touch, by metric."""
 
 
 def errors_of(

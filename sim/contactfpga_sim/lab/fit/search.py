@@ -80,7 +80,6 @@ def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor:
 def _judged(
     task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, before: int
 ) -> list[Trial]:
-    """All candidates with missed limits; times only for small errors."""
     sheets: dict[Settings, dict[Settings, Candidate]] = {}
     for one in tried:
         sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one)
@@ -170,7 +169,6 @@ def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurem
 def _reported(
     task: FitTask, trials: Sequence[Trial], executor: Executor, step: Step, checked: int
 ) -> tuple[tuple[Measurement, ...], ...]:
-    """Measurements on the other scenes; the first Skin's touches are checked against the gateware."""
     jobs: dict[Hashable, tuple[Any, ...]] = {}
     for number, one in enumerate(trials):
         for source in task.sources:

@@ -111,7 +111,7 @@ class BuiltIn(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Shifted:
-    """A moved value."""
+    """A time-dependent value, moved."""
 
     value: Value
     by: float

@@ -22,7 +22,7 @@ class Measurement:
 
     errors: dict[str, Interval]
     speed: Speed | None = None
-    """None if errors are too large."""
+    """Speed; None if errors are too large."""
 
 
 DOUBT = ": too few scenes to tell"
@@ -42,7 +42,7 @@ class Goals:
     area: float | None = None
     """Mean error of a zone's area over the contact's."""
     latency_us: float | None = 1000.0
-    """From the touch to the last byte of its complete frame."""
+    """Time from the touch to the last byte of its complete frame."""
     unfelt: float | None = 0.01
     """Share of fingertip touches that close no switch, under covers with force."""
     felt_n: float = 2.0
@@ -158,7 +158,7 @@ class Trial:
     excess: float = math.inf
     margin: float = math.inf
     luts: int | None = None
-    """None if not computed."""
+    """LUT4; None if not computed."""
 
     @property
     def skin(self) -> Skin:
@@ -172,7 +172,7 @@ class Trial:
 
     @property
     def bytes(self) -> float:
-        """Median bytes of a frame, of the longest source."""
+        """Median bytes of a frame, of the source with the longest."""
         return max((one.speed.bytes for one in self.measured if one.speed), default=math.nan)
 
     @property

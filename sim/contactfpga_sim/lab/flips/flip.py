@@ -43,7 +43,7 @@ class FlipOutcome(NamedTuple):
     """The error, or the means that reports it."""
     frames: int
     seconds: float
-    """From the first silently wrong frame to the next right one."""
+    """Time from the first silently wrong frame to the next right one."""
     gone_s: float
     """Time of full recovery; infinite if later than the study."""
     fights: int = 0
@@ -159,7 +159,6 @@ def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[Deli
 
 
 def _since_restart(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """Frames with times as if without a restart."""
     begun: dict[int, float] = {0: 0.0}
     for one in heard:
         shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)

@@ -18,7 +18,7 @@ from contactfpga_sim.lab.flips import touches
 from contactfpga_sim.model.board.state import Checkpoint, StateBoard
 
 CLOCK_HZ, BAUD = 5_000_000, 1_250_000
-"""Five twelfths of the reference Skin's: as many frames in fewer clocks."""
+"""Five twelfths of the reference Skin's clock and line: as many frames in fewer clocks."""
 
 FIRST_S, LAST_S = 0.1, 0.6
 """Range of flip times; a hello follows each."""
@@ -38,7 +38,7 @@ class DeliveredFrame(NamedTuple):
 
 @dataclasses.dataclass
 class Listener:
-    """The host."""
+    """The host during a flip."""
 
     conversation: Conversation
     rest: bytes = b""

@@ -37,7 +37,7 @@ REACH_M = 0.0036
 """Distance at which 12 N close switches; half of it is a zone's uncertainty by axis."""
 
 SLOW = 480
-"""Most draws of slow methods, 10 ms each."""
+"""Most draws of methods that need 10 ms each."""
 
 TRIES = 50
 

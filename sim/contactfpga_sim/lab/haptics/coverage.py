@@ -72,12 +72,12 @@ class Coverage:
     rms_m: float
     barycenter_m: float
     covered: float
-    """Share within the stated radius."""
+    """Share of contacts within the stated radius."""
     radius_m: float
     theory_m: float
     """Median smallest radius that noise allows; NaN if unknown."""
     disagreed: float
-    """Share for which the method reported a contradiction."""
+    """Share of contacts that the method reported as contradictory."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,7 +110,7 @@ def locator(case: CoverageCase) -> Locator:
 
 
 def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
-    """Press ``count`` times."""
+    """Press ``count`` times and judge the estimates."""
     rng, finder = np.random.default_rng(seed), locator(case)
     find: Callable[[Pressed], tuple[Place, float]] = functools.partial(METHODS[case.method], case, finder, rng)
     errors, coarse, radii, theory, agrees = [], [], [], [], []

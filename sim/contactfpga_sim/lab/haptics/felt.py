@@ -95,7 +95,7 @@ class Touching:
         return min(MOST_N, max(0.0, float(self.closing_n.min()) + RATE_N_S * (seconds - LEAD_S)))
 
     def pressed(self, seconds: float) -> np.ndarray:
-        """(rows, columns) bool."""
+        """(rows, columns) bool closed switches."""
         found: np.ndarray = self.closing_n <= self.push(seconds)
         return found
 
@@ -167,7 +167,6 @@ def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> d
 def _places(
     finder: Locator, cells: LoadCells, watch: ClosingWatch, came: list[Zones], known: list[Zones]
 ) -> dict[str, tuple[float, float] | None]:
-    """Place in m, by method."""
     zone = came[-1][0] if came and len(came[-1]) else None
     coarse = None if zone is None or zone.x_mm is None else (1e-3 * zone.x_mm, 1e-3 * (zone.y_mm or 0.0))
     center = None

@@ -24,7 +24,7 @@ MEETINGS = 12
 NEAR_RAD, SPREAD_RAD = 0.4, 0.01
 """Start angle before the bar, and its range, for random phases of scan and step."""
 STEP_S, ENDS_S = 1e-3, 0.25
-"""MuJoCo's step, and a time at which all but one have touched and let go."""
+"""MuJoCo's step, and a time by which all arms touched the bar and all but one let go."""
 COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
 """Times of approach and slow motion."""
 COMING, TOUCHING, STANDING = 10, 28, 15
@@ -55,7 +55,7 @@ class Met:
     """Result of an arm's motion into the bar."""
 
     late_s: float
-    """From the touch to the reflex's command; nan: none."""
+    """Time from the touch to the reflex's command; nan: none."""
     peak_n: float
 
 

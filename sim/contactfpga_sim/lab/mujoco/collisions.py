@@ -105,7 +105,7 @@ class Heard:
     """Result of a collision."""
 
     late_s: float | None
-    """From MuJoCo's first contact to its detection; None: not within :data:`AFTER_S`."""
+    """Time from MuJoCo's first contact to its detection; None: not within :data:`AFTER_S`."""
     early: bool
     """Whether it was reported before any contact."""
     off_m: float | None
@@ -193,7 +193,7 @@ def collide(
 
 
 def by_sheet(arm: Arm, case: Collision) -> Heard:
-    """Detection by the first snapshot with a contact, through USB and driver."""
+    """Detection by the first snapshot with a contact."""
     data = arm.meets(case)
     with Sheets(arm.model, data, arm.robot, golden=True, radius_m=ROD_M, seed=case.seed) as sheets:
 
@@ -255,12 +255,12 @@ class Compared:
     gain: float
     limits_nm: np.ndarray
     alarms: int
-    """Those of :attr:`free_runs` outside tuning with a false alarm."""
+    """Runs among :attr:`free_runs`, not used in tuning, with a false alarm."""
     free_runs: int
     sheet: list[Heard]
     observer: list[Heard]
     none: list[Heard]
-    """Collisions without a reaction, which would bend the residuals."""
+    """Collisions of an arm without reaction, which would bend the residuals."""
 
 
 def compare(collisions: int = 200, free_runs: int = 100) -> Compared:

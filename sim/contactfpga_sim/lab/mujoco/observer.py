@@ -15,7 +15,7 @@ DAMPING = (0.4, 0.2)
 FRICTION_NM = (0.3, 0.15)
 """Coulomb friction, known to the observer like the damping."""
 ROTOR = (0.03, 0.015)
-"""Motors and gears about the joints, kg m2."""
+"""Inertia of motors and gears about the joints, in kg m2."""
 CONTROL_S = 1e-3
 SLOW = 0.02
 """Speed in rad/s below which Coulomb friction is proportional to it."""
@@ -28,7 +28,7 @@ class Wrong:
     masses: tuple[float, float]
     friction: tuple[float, float]
     torque_nm: float = 0.05
-    """RMS noise."""
+    """RMS noise of a torque sample."""
     speed_rad_s: float = 0.002
 
     @classmethod

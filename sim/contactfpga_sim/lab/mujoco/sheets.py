@@ -24,7 +24,7 @@ from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
 from contactfpga_sim.lab.usb import BridgeSettings
 
 LEAD_S = 0.01
-"""From the boards' power-up to MuJoCo's first step."""
+"""Time from the boards' power-up to MuJoCo's first step."""
 LOOK_S = 2.5e-4
 """Boards' step before MuJoCo's first."""
 

@@ -25,7 +25,7 @@ from contactfpga_sim.model.scenes.felt import LoadedUnits
 from contactfpga_sim.model.scenes.scene import around_m
 
 HOST_S = Usb().host_s
-"""From the USB controller to the program, as in ``contactfpga study arm``."""
+"""Time from the USB controller to the program, as in ``contactfpga study arm``."""
 
 POLL_S = 1e-6
 """Advance of the board, but not the robot, in a read without waiting."""
@@ -52,7 +52,7 @@ class WornSheet:
         self.forces_n: Floats = np.zeros((skin.rows, skin.columns))
         """(rows, columns) force in N on each switch."""
         self.closed = np.zeros((skin.rows, skin.columns), bool)
-        """(rows, columns) bool."""
+        """(rows, columns) bool closed switches."""
         self._units = LoadedUnits(plan.units, skin, seed) if plan.units is not None else None
         self._device = GoldenBoard(skin) if golden else CompiledBoard(skin, capture=("contact",))
         self._hz = skin.clock_hz

@@ -211,7 +211,6 @@ def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full
 
 
 def _beat(bare: Any, until_s: float) -> None:
-    """1,000 messages per second with their times."""
     while (now_s := time.monotonic()) < until_s:
         bare.put(np.float64(now_s).tobytes() + bytes(BARE_BYTES - 8))
         time.sleep(1 / RATE_HZ)

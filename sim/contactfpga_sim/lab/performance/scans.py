@@ -27,7 +27,7 @@ RECORDINGS = Path("../shared/data")
 RECORDED = 100
 
 HELD_SCANS = 4
-"""Scan periods that a frame is held; real sheets hold it longer."""
+"""Scan periods that a frame is held; a recorded sheet holds it longer."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -71,7 +71,7 @@ def dots_in_last_row(skin: Skin) -> np.ndarray:
 
 
 def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, EventTimes]:
-    """From switches of one row closing to the pin, and to the first and last byte of their frame. Default: one
+    """Times from switches of one row closing to the pin, and to the first and last byte of their frame. Default: one
     switch in the first row, the worst."""
     frame = skin.derived.frame_clocks
     touched = one_switch(skin, 0) if touched is None else touched
@@ -249,7 +249,6 @@ def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
 
 
 def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
-    """Row times of touched rows plus frame bits; and the worst touch's excess."""
     if not skin.reads_rows:
         return ""
     derived = skin.derived

@@ -32,7 +32,7 @@ class Found(NamedTuple):
     """Result of one stream."""
 
     us: np.ndarray
-    """From the last byte's write to user code, by returned call."""
+    """Delay from the last byte's write to user code, by returned call."""
     calls: float
 
 

@@ -62,7 +62,7 @@ class Cost:
     frames_per_s: float
     bytes_per_frame: float
     frames_per_cpu_s: float
-    """With all of the driver's work."""
+    """Frames per CPU second, with all of the driver's work."""
 
     @property
     def mb_an_hour(self) -> float:
@@ -108,7 +108,7 @@ class Loss:
     came: int
     lost: int
     lost_s: float
-    """From the last recovered byte to the last arrived one."""
+    """Time from the last recovered byte to the last arrived one."""
 
 
 def loss(source: Path, seconds: float, place: Path) -> Loss:

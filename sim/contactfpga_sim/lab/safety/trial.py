@@ -16,7 +16,7 @@ LONGEST_US = 5000
 """Time that makes a fault unreported."""
 STEP_US = 8
 QUIET_US = 2500
-"""Time without an edge of `alive` at which a watchdog acts: two and a half half periods."""
+"""Time without an edge of `alive` at which a watchdog acts: 2.5 of its half periods."""
 DEADLINE_US = 1000
 """The host's deadline: ten frames is a short one."""
 

@@ -167,7 +167,7 @@ def over_a_port(take: Callable[[contactfpga.Subscription], int]) -> float:
 
 
 def latencies_us() -> list[float]:
-    """From the last byte's write to ``latest``, after the first tenth."""
+    """Delays from the last byte's write to ``latest``, after the first tenth."""
     found, rounds = [], 6
     with stream(rounds, PACED) as (board, queue, feeder):
         queue.close()

@@ -189,7 +189,6 @@ SPEEDING, AT_ONCE = (
 
 
 def _pair(distance_mm: float, rng: Random) -> Made:
-    """Two fingers that start 60 mm apart, stay 0.1 s at this distance, and part, at 400 mm/s relative speed."""
     travel = (60 - distance_mm) / 400
     x_mm, y_mm = _moved(rng)
     now = _times(2 * travel + 0.19, rng, 250.0)
@@ -233,7 +232,6 @@ CROSS = Knob(
 
 
 def _open(open_ms: float, rng: Random) -> Made:
-    """A finger whose switches open once, at 2,000 frames per second."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.04, rng, 2000.0))
     lifted = (now >= 0.01) & (now < 0.01 + open_ms / 1000)
@@ -271,7 +269,6 @@ BOUNCE = Knob(
 
 
 def _stuck(count: float, rng: Random) -> Made:
-    """A finger at 300 mm/s along a row with stuck switches 40 mm apart, to 20 mm past the fourth."""
     x_mm, y_mm = _moved(rng)
     now = _times(0.69, rng, 125.0)
     cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)
@@ -297,7 +294,6 @@ STUCK = Knob(
 
 
 def _gap(ms: float, rng: Random) -> Made:
-    """A finger that slides for 0.1 s, without frames for this long, then for 0.1 s."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.2, rng, 500.0))
     half = len(now) // 2

@@ -120,7 +120,7 @@ def tapping(rng: Random) -> Played:
 
 def angles(rng: Random) -> Played:
     """Two fingers that swing through the middle on any lines, with peaks of 300 to 1500 mm/s; one is up to 20 mm
-    behind."""
+    later."""
     turn, between, speed = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(300, 1500)
     hertz, phase = speed / (2 * math.pi * 55), rng.uniform(0, 2 * math.pi)
     late = rng.uniform(-20, 20) / 55

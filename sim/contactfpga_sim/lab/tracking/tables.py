@@ -24,9 +24,9 @@ class FrameRates(NamedTuple):
     """Frames per second of processor time."""
 
     decoded: float
-    """From bytes to zones with places."""
+    """Rate from bytes to zones with places."""
     tracked: float
-    """From zones to tracks."""
+    """Rate from zones to tracks."""
 
     @property
     def ratio(self) -> float:

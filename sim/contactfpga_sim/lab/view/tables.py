@@ -40,9 +40,9 @@ class Click:
     touched: float
     """Finger on the virtual board."""
     gateware_s: float
-    """From touch to last byte of its first frame."""
+    """Time from touch to last byte of its first frame."""
     driver_s: float
-    """From bytes to zones."""
+    """Time from bytes to zones."""
     read: float
     queued: float
     """The zones leave for the browser."""
@@ -224,7 +224,7 @@ class Shot:
 
 
 def shot(share: float) -> Shot:
-    """A moment of the clip, 0 to 1: finger and camera go around once."""
+    """A moment of the clip, 0 to 1: the finger circles once while the camera swings once."""
     turn = 2 * math.pi * share
     place = 2.2 - 1.5 * math.cos(turn), 6.5 - 3.8 * math.sin(turn)
     return Shot(place, 0.3 < share < 0.75, SWING_RAD * math.sin(turn))
@@ -319,4 +319,3 @@ def draw(folder: Path) -> list[Path]:
 
 
 SIZE = 1120, 660
-"""Size of picture and clip, in pixels."""
