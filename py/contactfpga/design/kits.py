@@ -21,7 +21,7 @@ class KitError(ContactFPGAError, ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class KitPart:
-    """An article to buy that is not on the sheet's own board."""
+    """An article to buy that is not on the sheet's board."""
 
     count: int
     what: str
@@ -57,7 +57,7 @@ class Kit:
 
 
 def names() -> list[str]:
-    """The names of all kits, sorted."""
+    """Names of all kits, sorted."""
     return sorted(path.parent.name for path in (examples() / "kits").glob("*/kit.toml"))
 
 

@@ -16,11 +16,10 @@ Layer = Literal["F", "B"]
 """Copper layer: top side or back."""
 
 TRACK_MM = 0.2
-"""Width of a track."""
 POWER_MM = 0.5
-"""Width of the long tracks of 3.3 V and ground."""
+"""Width of long power tracks."""
 CLEARANCE_MM = 0.2
-"""Clearance between copper of two nets."""
+"""Clearance between two nets."""
 VIA_MM = 0.6
 VIA_DRILL_MM = 0.3
 EDGE_MM = 0.3
@@ -28,18 +27,18 @@ EDGE_MM = 0.3
 PRINT_MM = 0.12
 """Width of a printed line."""
 MASK_MM = 0.05
-"""Excess of a solder mask opening over its pad, on each side."""
+"""Growth of a solder mask opening over its pad, on each side."""
 
 BOARDS = {"plane": (1.6, 1.53, 4.4), "cylinder": (0.2, 0.1, 3.4)}
-"""By the Skin's surface: thickness of the board and distance of its copper layers in mm, and permittivity. A plane is
-FR-4, a cylinder a polyimide flex."""
+"""Board thickness and distance of copper layers in mm, and permittivity: FR-4 for a plane, polyimide flex for a
+cylinder."""
 
 GND = "GND"
 SUPPLY = "3V3"
 
 
 def rounded(value: float) -> float:
-    """Rounded to a nanometer, the unit of board files; never -0."""
+    """The value rounded to a nanometer, the unit of board files; never -0."""
     return round(value, 6) + 0.0
 
 
@@ -57,7 +56,7 @@ class PlacedPart:
     """Rotation in degrees counterclockwise, in quarters, after mirroring for the back."""
     back: bool
     nets: dict[str, str]
-    """Net of each connected pad by number."""
+    """Net of each connected pad, by number."""
 
     def spot(self, x: float, y: float) -> tuple[float, float]:
         """Board position of a point of the part's drawing."""
@@ -85,13 +84,13 @@ class CopperTrack:
 
     @property
     def length(self) -> float:
-        """From end to end in mm."""
+        """Length in mm."""
         return math.hypot(self.x2 - self.x1, self.y2 - self.y1)
 
 
 @dataclasses.dataclass(frozen=True)
 class Via:
-    """A plated hole that joins both sides; covered by the solder mask."""
+    """A plated hole that joins both sides, covered by the solder mask."""
 
     x: float
     y: float
@@ -119,7 +118,7 @@ class Hole:
 
 
 class Drawing:
-    """A board under construction. Its lists are in order of addition, so that the same calls give the same files."""
+    """A board under construction; its lists keep the order of addition, so the same calls give the same files."""
 
     def __init__(self) -> None:
         self.placed: list[PlacedPart] = []
@@ -150,7 +149,7 @@ class Drawing:
         return one
 
     def run(self, net: str, layer: Layer, *points: tuple[float, float], width: float = TRACK_MM) -> None:
-        """Add tracks between successive points, skipping repeated points."""
+        """Add tracks between successive points; repeated points add none."""
         spots = [(rounded(x), rounded(y)) for x, y in points]
         for a, b in itertools.pairwise(spots):
             if a != b:
@@ -165,7 +164,7 @@ class Drawing:
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
     def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
-        """Print a number on the top side, centered at (x, y), in seven-segment strokes; if not upright, it reads
+        """Print a number on the top side in seven-segment strokes, centered at (x, y); without ``upright`` it reads
         upward."""
         digits = str(value)
         step, tall = 0.8 * height, height / 2
@@ -180,7 +179,7 @@ class Drawing:
                 self.stroke(x + u1, y + v1, x + u2, y + v2)
 
     def nets(self) -> list[str]:
-        """Names of all nets in alphabetical order."""
+        """Names of all nets, sorted."""
         found = {net for one in self.placed for net in one.nets.values()}
         return sorted(found | {track.net for track in self.tracks} | {via.net for via in self.vias})
 
@@ -193,4 +192,4 @@ _SEGMENTS = {
         strict=True,
     )
 }
-"""Ends of the lit segments of each digit: corners 0 and 1 are at the top, 2 and 3 in the middle, 4 and 5 below."""
+"""Ends of the lit segments of each digit; corners 0 and 1 are at the top, 2 and 3 in the middle, 4 and 5 below."""

@@ -14,13 +14,12 @@ from contactfpga.inputs.values import shown
 
 
 class SheetError(ContactFPGAError, ValueError):
-    """An unmakable sheet; the message names the value and the limit."""
+    """A sheet that cannot be made; the message names the value and the limit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pad:
-    """A pad of a part. If ``round``, ``width`` is its diameter; a ``drill`` above 0 is the diameter of a plated
-    hole."""
+    """A pad of a part; ``width`` is the diameter of a ``round`` pad, ``drill`` the diameter of a plated hole or 0."""
 
     number: str
     x: float
@@ -36,17 +35,17 @@ class Part:
     """A part on the sheet."""
 
     name: str
-    """Name of its footprint, such as ``R_0603``."""
+    """Footprint, such as ``R_0603``."""
     order: str
-    """The article to order, for the parts list."""
+    """Article to order."""
     pads: tuple[Pad, ...]
     width: float
     """Width of the area without other parts."""
     height: float
     pasted: bool = True
-    """Whether its pads get solder paste; not for holes and the contacts of a dome."""
+    """Whether the pads get solder paste; not for holes and a dome's contacts."""
     marks: tuple[tuple[float, float, float, float], ...] = ()
-    """Printed lines (x, y, x, y) that mark the first pin, or a cathode."""
+    """Printed lines (x, y, x, y) that mark the first pin or a cathode."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,7 +63,7 @@ class SwitchPart:
     height_mm: float
     """Height of the free switch above the board."""
     closed_by: float
-    """Side or diameter of its plunger."""
+    """Side or diameter of the plunger."""
     column: tuple[tuple[float, float, float, float], ...]
     """Tracks (x, y, x, y) from one end of the column to the other, with common ends."""
     diode: tuple[tuple[float, float, float, float], ...]
@@ -73,16 +72,16 @@ class SwitchPart:
     """Number of final column tracks that only lead to the next cell."""
     reach: float
     half_width: float
-    """Extent of the cell's copper to the left and right of its middle."""
+    """Extent of the cell's copper to either side of its middle."""
     open_pf: float
-    """Capacitance of its open contacts."""
+    """Capacitance of the open contacts."""
 
 
 DIODE_VIA = 0.0, -0.6
 """Position in a cell of the via from the diode's track to the back."""
 
 _LEG = 1.66
-"""Legs of a dome with 5 mm span are on a circle of 2.35 mm radius."""
+"""A dome of 5 mm span has its legs on a circle of 2.35 mm radius."""
 _SIDES = [(-_LEG, -_LEG), (0.0, -_LEG), (_LEG, -_LEG), (_LEG, _LEG), (0.0, _LEG), (-_LEG, _LEG), (-_LEG, -_LEG)]
 
 DOME = SwitchPart(
@@ -138,7 +137,7 @@ SWITCHES = {"dome": DOME, "tact": TACT}
 
 
 def find_switch(name: str) -> SwitchPart:
-    """The switch of this name. Raises :class:`SheetError` for an unregistered name."""
+    """The switch of this name. Raises :class:`SheetError` for an unknown name."""
     if name not in SWITCHES:
         raise SheetError(f"part is {shown(name)}; it must be one of {', '.join(SWITCHES)}")
     return SWITCHES[name]
@@ -175,7 +174,7 @@ HEADER_PINS = 10, 14, 16, 20, 26, 34, 40
 
 
 def header(pins: int) -> Part:
-    """A shrouded header of two rows, 2.54 mm apart, for a ribbon cable: odd pins below, even pins above, from the
+    """A shrouded header of two rows, 2.54 mm apart, for a ribbon cable; odd pins are below, even pins above, from the
     left."""
     first = -(pins // 2 - 1) * 1.27
     places = [(first + k // 2 * 2.54, 1.27 - k % 2 * 2.54) for k in range(pins)]

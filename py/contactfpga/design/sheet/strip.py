@@ -1,7 +1,7 @@
-"""The strip that leads a sheet's lines to the board: series resistors and pulls, shift registers, connectors.
+"""The strip that leads a sheet's lines to the board: series resistors, pulls, shift registers, connectors.
 
-From the matrix up: a place of :data:`PLACE_MM` for each line with its two resistors, a channel of tracks, with shift
-registers these and a second channel, and the connectors. All parts are on the back.
+From the matrix up: a place of :data:`PLACE_MM` for each line with its two resistors, a channel of tracks, any shift
+registers with a second channel, and the connectors. All parts are on the back.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ class Line:
 
     net: str
     pin: str
-    """Net beyond its series resistor, named as the gateware's port."""
+    """Net beyond the series resistor, named as the gateware's port."""
     x: float
     kind: str
     """``row`` or ``column``."""
     pull: str
     """``up``, ``down`` or empty."""
     used: bool = True
-    """Whether it has copper, hence items, in the matrix."""
+    """Whether the line has copper, hence items, in the matrix."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +56,6 @@ class _Unit:
     nets: dict[str, str]
 
     def place(self, drawing: Drawing, y: float) -> list[Pin]:
-        """Add it to the drawing; returns its pins."""
         one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn)
         return [
             Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets
@@ -64,7 +63,7 @@ class _Unit:
 
 
 def port(name: str, bit: int, bits: int) -> str:
-    """Name of a wire as in the wiring table: with its bit if the port has several."""
+    """Name of a wire as in the wiring table, with its bit if the port has several."""
     return name if bits == 1 else f"{name}[{bit}]"
 
 
@@ -90,7 +89,6 @@ def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], 
 
 
 def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Grid) -> Iterator[Pin]:
-    """Draw a line's resistors, and their tracks up to the channel."""
     x, middle = line.x, base - 1.9
     if line.used:
         drawing.via(line.net, x, base)
@@ -115,7 +113,6 @@ def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
 
 
 def _tried(units: Sequence[_Unit]) -> list[Pin]:
-    """Pins of units of unknown height."""
     scratch = Drawing()
     return [pin for unit in units for pin in (_plug if unit.letter == "J" else _placed)(scratch, unit, 0.0)]
 
@@ -135,8 +132,8 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
 
 
 def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    """One or more connectors for rows and columns. ``below``: two channels, so parts above the upper are on the lower
-    one's grid."""
+    """Connectors for rows and columns. With two channels (``below``), parts above the upper are on the lower one's
+    grid."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -171,7 +168,7 @@ CHIP_STEPS = 15
 
 
 def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
-    """The shift registers with capacitors and enable resistor; none for a Skin without."""
+    """Shift registers with capacitors and enable resistor; an empty list for a Skin without."""
     nets = list(_chip_nets(skin))
     if not nets:
         return []
@@ -216,8 +213,8 @@ def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
 def _registers(
     drawing: Drawing, chips: Sequence[_Unit], plugs: Sequence[_Unit], below: list[Pin], bottom: float
 ) -> tuple[list[Pin], float, list[float]]:
-    """Draw the lower channel, the chips, and passing tracks. Returns the upper channel's bottom pins and beginning, and
-    the drawing's ends."""
+    """Draw the lower channel, the chips and passing tracks. Returns the upper channel's bottom pins and bottom, and the
+    x range of the passing tracks."""
     tried = _tried(chips)
     lower = [pin for pin in tried if pin.y > 0]
     upper = [pin for pin in tried if pin.y < 0]
