@@ -23,7 +23,7 @@ OFF = float("nan")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CircuitState:
-    """Volts of the lines, columns before rows, and across the junctions of the pressed switches."""
+    """Volts of the lines, columns before rows, and across the junctions of pressed switches."""
 
     lines: np.ndarray
     junctions: np.ndarray
@@ -31,7 +31,7 @@ class CircuitState:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """Drives of the lines, columns before rows: (lines,) volts, :data:`OFF` where a pin does not drive."""
+    """Volts of the pins, columns before rows; :data:`OFF` where a pin does not drive."""
 
     volts: np.ndarray
 
@@ -43,11 +43,7 @@ class Drive:
 
 
 class Network:
-    """A sheet with pressed switches.
-
-    ``pressed``: (rows, columns) bool. ``bare``: (rows, columns) bool, switches without a diode, which conduct both
-    ways.
-    """
+    """A sheet with ``pressed`` switches, (rows, columns) bool; ``bare`` ones have no diode and conduct both ways."""
 
     def __init__(self, circuit: Circuit, pressed: np.ndarray, bare: np.ndarray | None = None):
         self.circuit = circuit
@@ -73,11 +69,11 @@ class Network:
         return found
 
     def drive_s(self, drive: Drive) -> np.ndarray:
-        """(lines,) siemens between each line and its pin's level; 0 where it does not drive."""
+        """(lines,) siemens between each line and its pin's level; 0 for a pin that does not drive."""
         return np.where(np.isnan(drive.volts), 0.0, 1 / self.circuit.drive_ohm)
 
     def pin_amperes(self, lines: np.ndarray, drive: Drive) -> np.ndarray:
-        """(..., lines) current out of each driving pin, for volts of the same shape."""
+        """(..., lines) amperes out of each driving pin, for volts of the same shape."""
         return np.asarray(self.drive_s(drive) * (np.nan_to_num(drive.volts) - lines))
 
     def unpressed(self) -> CircuitState:
@@ -115,7 +111,7 @@ def current(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held_back(diode: Diode, volts: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """A limited Newton guess for one that is ``wanted`` far up the exponential: the junction voltage of its current."""
+    """A Newton guess limited to the junction voltage of its current, if it is ``wanted`` far up the exponential."""
     step, knee = diode.emission * THERMAL_V, knee_v(diode)
     far = (wanted > knee) & (np.abs(wanted - volts) > 2 * step)
     if not far.any():

@@ -24,7 +24,7 @@ class Time:
     """Duration of a phase with its slowest pattern."""
 
     seconds: float
-    """Duration; infinite if it never ends."""
+    """Infinite if the phase never ends."""
     pattern: str
 
     def us(self, margin: float) -> float | None:
@@ -64,7 +64,7 @@ class Needs:
 
 @functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
-    """Compute times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
+    """Times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
@@ -73,7 +73,7 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
     release, released = sheet.worst(patterns.RELEASE, phases.row_release)
 
     def precharged(network: Network) -> Phase:
-        """The precharge after the gap; a row that is never released counts once it is at rest."""
+        """Precharge after the gap; a row that is never released counts from its rest."""
         return phases.precharge(network, min(release.seconds, phases.longest_s(network)))
 
     precharge, charged = sheet.worst(patterns.RELEASE, precharged)
@@ -99,7 +99,7 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
 
 
 def needed_by(skin: Skin, circuit: Circuit) -> Needs:
-    """Compute the needs of a Skin's sheet, including guard lines."""
+    """Needs of a Skin's sheet with its guard lines."""
     return needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
 
 
@@ -116,8 +116,7 @@ def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str
 
 
 def check_times(circuit: Circuit, skin: Skin) -> None:
-    """Raise :class:`CircuitError` if a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`; 64x64
-    needs some 3 s."""
+    """Raise :class:`CircuitError` if a time of the Skin is shorter than its circuit needs with :data:`MARGIN`."""
     wanted = recommended_us(skin, needed_by(skin, circuit))
     short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
     if not short:
@@ -141,7 +140,6 @@ class _Sheet:
 
 
 def _lowest(passed: PhaseResult) -> float:
-    """Volts of the unpressed column that is pulled farthest."""
     network, least = passed.phase.network, passed.phase.least[: passed.phase.network.columns]
     unpressed = passed.trace.volts[:, : network.columns][:, least > -math.inf]
     return float(unpressed.min(initial=network.circuit.supply_v))

@@ -22,7 +22,7 @@ FILES = ("skin", "units", "folds", "surface")
 
 
 def pack(path: str | Path) -> dict[str, str]:
-    """The texts, by name, of a file that :meth:`Body.load` has read. Raises OSError."""
+    """Texts by name, of a file that :meth:`Body.load` has read. Raises OSError."""
     path = Path(path)
     text = path.read_text(encoding="utf-8")
     found = {TOML: text}
@@ -33,7 +33,7 @@ def pack(path: str | Path) -> dict[str, str]:
 
 
 def unpack(texts: Mapping[str, str], folder: Path) -> Body:
-    """The body from its texts, with files in this folder, which must stay while the robot's meshes are needed. Raises
+    """The body from its texts, with files in this folder, which must stay while meshes are needed. Raises
     :class:`BodyError` if a text is missing, or not from :func:`pack`."""
     try:
         values = tomlfile.parse(texts[TOML].encode(), "robot.toml", BodyError)

@@ -1,4 +1,4 @@
-"""One link's board, opened, read, and reopened after a loss; and the knowledge of the link."""
+"""One link's board: opened, read, and reopened after a loss."""
 
 from __future__ import annotations
 
@@ -58,7 +58,6 @@ class _PortLock:
 
     @contextlib.contextmanager
     def exclusive(self) -> Iterator[None]:
-        """Hold the lock for a search."""
         with self._changed:
             self._waiting += 1
             self._changed.wait_for(lambda: not self._alone and not self._shared)
@@ -82,7 +81,7 @@ LAG_S = 0.02
 
 
 class SharedClock:
-    """Distributes simulated time to boards: at the rate of real time, and in step. Thread-safe."""
+    """Gives boards simulated time at the rate of real time, and in step. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float]):
         self._clock = clock
@@ -136,10 +135,10 @@ class LinkMemory:
     down: str = "lost"
     """Status while no board is open."""
     reason: str = "it was not tried yet"
-    """Reason why none is open."""
+    """Reason why no board is open."""
 
     def state(self, plan: Plan, now: float, board_s: float | None) -> LinkState:
-        """The state at a moment; ``board_s``: the moment on a virtual board's clock, None for others."""
+        """State at a moment; ``board_s`` is the moment on a virtual board's clock, None for others."""
         age_s = None if self.frame_s == -math.inf else now - self.frame_s
         if not self.opened:
             return LinkState(None, age_s, self.down, self.reason)
@@ -156,7 +155,7 @@ class LinkMemory:
 
 
 Observation = tuple[LinkMemory, float | None]
-"""The knowledge, and a virtual board's clock at that time."""
+"""Memory of a link, and a virtual board's clock at that time."""
 
 
 class States(Mapping[str, LinkState]):
@@ -196,7 +195,7 @@ class OpenBoard(Protocol):
 
     @property
     def name(self) -> str:
-        """Name in the Skin that it was built from; "" if unnamed."""
+        """Name in its Skin; "" if unnamed."""
 
     @property
     def stats(self) -> Stats:
@@ -207,7 +206,7 @@ class OpenBoard(Protocol):
 
 
 class LinkReader:
-    """The knowledge of one link. One thread calls :meth:`step`, any thread :meth:`state`."""
+    """Reads one link. One thread calls :meth:`step`, any thread :meth:`state`."""
 
     def __init__(
         self,
@@ -220,9 +219,9 @@ class LinkReader:
         self.plan = plan
         self._shared_clock = shared_clock if plan.virtual else None
         self.tried = False
-        """Whether opening was attempted, with or without success."""
+        """Whether opening was attempted."""
         self.answered = 0
-        """The last call of :meth:`ask` since which a frame was scanned."""
+        """The last :meth:`ask` since which a frame was scanned."""
         self._opened, self._clock = opened, clock
         self._lock = threading.Lock()
         self._asked = 0
@@ -330,7 +329,7 @@ class LinkReader:
             self._retry_at = self._clock() + RETRY_S
 
     def close(self) -> None:
-        """Release the port; the thread that calls :meth:`step` has ended."""
+        """Release the port, after the thread that calls :meth:`step` has ended."""
         self._drop("lost", BoardClosed("the body was closed"))
 
     def observe(self) -> Observation:

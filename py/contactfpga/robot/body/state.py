@@ -35,19 +35,18 @@ class LinkState:
     """The knowledge of a link at one moment."""
 
     zones: Zones | None
-    """Its newest frame; None unless it is ok or late, because older frames are not current."""
+    """The link's newest frame; None unless the link is ok or late, because older frames are not current."""
     age_s: float | None
-    """Time since its newest frame ever was scanned, on the body's clock; None without one."""
+    """Time since the link's newest frame ever was scanned, on the body's clock; None without one."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
-    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
-    there."""
+    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version."""
     reason: str = ""
-    """Reason why it is not ok."""
+    """Reason why the link is not ok."""
     frame_s: float | None = None
     """Scan time of the frame, on the body's clock."""
     tracks: Tracks | None = None
-    """Its contacts over the frames read, as :class:`~contactfpga.Tracker` follows them."""
+    """Contacts over the frames read, as :class:`~contactfpga.Tracker` follows them."""
 
     def __str__(self) -> str:
         age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"

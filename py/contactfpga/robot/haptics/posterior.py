@@ -1,8 +1,7 @@
 """Uncertainty of a place.
 
-A contact's place, given the observations, is a probability on a grid that is refined where it is not 0. Barycenter
-errors without other knowledge, and the gain of the set of consistent places, follow from all places of a cell, at which
-a contact closes the switches within its reach.
+A contact's place is a probability on a grid that is refined where it is not 0. Barycenter errors, and the gain of the
+set of consistent places, follow from all places of a cell, at which a contact closes the switches within its reach.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ SIDE = 36
 
 LEVELS = 12
 NEGLIGIBLE = 12.0
-"""Distance of the logarithm of probability below its maximum that counts as 0."""
+"""Drop of the logarithm of probability that counts as 0."""
 
 Likelihood = Callable[[Floats, Floats, float], tuple[Floats, Floats]]
 """From points x, y and their grid distance: logarithm of probability, and misfit of the point in squares of noise."""
@@ -45,7 +44,7 @@ class Posterior:
 
 
 def of(evidence: Likelihood, box: Box) -> Posterior:
-    """Mean and spread of the place, from the evidence on grids over the box, at most 12."""
+    """Mean and spread of the place, from the evidence on at most 12 grids."""
     for level in range(LEVELS):
         x, y, steps = _grid(box)
         chance, misfit = evidence(x, y, max(steps))
@@ -77,7 +76,6 @@ def _grid(box: Box) -> tuple[Floats, Floats, tuple[float, float]]:
 
 
 def _around(x: Floats, y: Floats, steps: tuple[float, float], box: Box) -> Box:
-    """The box of the likely points and a step around it, within the old one."""
     return (
         max(box[0], float(x.min()) - 1.5 * steps[0]),
         min(box[1], float(x.max()) + 1.5 * steps[0]),
@@ -91,7 +89,7 @@ def _area(box: Box) -> float:
 
 
 def radius_95(covariance: Floats) -> float:
-    """The radius in m within which 95 % of a normal distribution lie."""
+    """Radius within which 95 % of a normal distribution lie."""
     second, first = (math.sqrt(max(0.0, value)) for value in np.linalg.eigvalsh(covariance))
     if first == 0:
         return 0.0

@@ -26,7 +26,7 @@ STEP = 1.25
 
 
 class Pressed:
-    """Barycenters under one cover. Raises :class:`~contactfpga.cover.CoverError` for a cover that knows no force, or
+    """Barycenters under one cover. Raises :class:`~contactfpga.cover.CoverError` for a cover that knows no force or
     does not fit the pitch."""
 
     def __init__(self, cover: Cover, pitch_x_m: float, pitch_y_m: float):
@@ -38,8 +38,8 @@ class Pressed:
         self._tables: dict[int, dict[int, float]] = {}
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:
-        """Standard deviation of each coordinate of the place, over all places where a ball with about this push closes
-        this many switches; None if there is none."""
+        """Standard deviation of each coordinate, over all places where a ball with about this push closes this many
+        switches; None if there is none."""
         if not force_n > 0:
             return None
         step = round(math.log(force_n) / math.log(STEP))
@@ -48,7 +48,6 @@ class Pressed:
         return self._tables[step].get(cells)
 
     def _table(self, force_n: float) -> dict[int, float]:
-        """Standard deviation by the number of closed switches."""
         squares: dict[int, list[float]] = {}
         for ball in self._balls:
             radius = ball.patch_m(force_n)

@@ -34,9 +34,9 @@ def key_of(name: str, fingerprint: bytes) -> str:
 def own_endpoint() -> str:
     """The default endpoint of publishers and ports.
 
-    It is a Unix socket in a folder for this user alone: in ``XDG_RUNTIME_DIR``, else in the folder for temporary files.
-    On Windows it is :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` if another user could open or
-    replace the folder.
+    It is a Unix socket in a folder for this user alone, in ``XDG_RUNTIME_DIR`` or the folder for temporary files; on
+    Windows :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` if another user could open or replace the
+    folder.
     """
     if sys.platform == "win32":
         return LOOPBACK
@@ -89,7 +89,7 @@ FILES = (
 
 
 def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
-    """A session that others connect to, and that forwards between them: a router."""
+    """A router: a session that others connect to, and that forwards between them."""
     return _open({"mode": "router"}, endpoint, config, "listen")
 
 
@@ -175,7 +175,6 @@ def _step(what: str, reason: str, places: Any) -> str:
 
 
 def _answers(place: str) -> bool:
-    """Whether a TCP endpoint accepts connections."""
     found = re.fullmatch(r"(?:tcp|tls)/\[?(.+?)\]?:(\d+)(?:[?#].*)?", place)
     if found is None:
         return False
