@@ -27,7 +27,7 @@ class KitPart:
     what: str
     maker: str
     number: str
-    """The maker's number; "" if any part that fits the description will do."""
+    """The maker's number; "" if any part of this description will do."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Predictions of a kit that a builder can prove wrong: numbers with intervals, each with its command.
 
-They are in the kit's ``predictions.toml``. A changed prediction is a new entry below the old one, which stays.
+They are in the kit's ``predictions.toml``; a changed prediction is a new entry below the old one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Prediction:
     """Command that computes the value."""
     date: datetime.date
     commit: str
-    """Abbreviated hash of the commit whose code computed the value."""
+    """Abbreviated hash of the commit that computed the value."""
 
 
 def load(kit: Kit) -> dict[str, Prediction]:

@@ -1,9 +1,8 @@
 """Values of a sheet's circuit from the times in which its cells read pressed (`contactfpga wire --settle`).
 
-A cell's time is the model's for as many pressed switches in its row, times a factor of its row and one of its column,
-which scatter with a median of 1. One number of pressed switches determines the capacitance of the lines; two also
-determine the resistance of a closed switch. VIL and the resistors of pins and lines, which form one product with the
-capacitance, are those of the given circuit.
+A cell's time is the model's, times a factor of its row and one of its column, which scatter with a median of 1. One
+number of pressed switches in a row determines the capacitance of the lines, two also the resistance of a closed switch.
+VIL and the resistors of pins and lines are those of the given circuit.
 """
 
 from __future__ import annotations
@@ -20,16 +19,15 @@ from contactfpga.design.circuit.phases import Levels
 from contactfpga.design.circuit.values import LIMITS, Circuit, CircuitError
 
 NAMES = ("line_pf", "switch_ohm")
-"""Fields of :class:`Circuit` that are fitted, one per informative reading."""
+"""Fitted fields of :class:`Circuit`, one per informative reading."""
 PROBABILITY = 0.95
 """Default probability that all intervals hold."""
 LEAST_LINES = 3
 """Least number of fully measured rows and columns."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
-"""Newton's method: most rounds, relative change at its end, and relative step of the derivative, as the model's times
-jump by some 1e-4."""
+"""Newton's method: most rounds, relative change at its end, and relative step of the derivative."""
 NEARLY = 0.02
-"""Accepted relative change without convergence; intervals are several times wider."""
+"""Accepted relative change without convergence."""
 DRAWS = 20_000
 HARMONICS = 6
 SCATTER = 2.0
@@ -44,14 +42,14 @@ class SettleReading:
     pressed: int
     """Pressed switches in each row that pull their column, a guard column included."""
     clocks: np.ndarray
-    """(rows, columns) least clocks at which a cell reads pressed; 0 if unknown."""
+    """(rows, columns) least clocks at which a cell reads pressed; 0: unknown."""
     first: int
     """Earliest sampling clock of the board; a cell with this value may be faster."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FittedValue:
-    """A field of :class:`Circuit` with its interval; all intervals of a fit hold together with its probability."""
+    """A field of :class:`Circuit`; all intervals of a fit hold together with its probability."""
 
     name: str
     value: float
@@ -60,7 +58,7 @@ class FittedValue:
 
     @property
     def told(self) -> bool:
-        """Whether the readings determine the value: its interval is within the limits of a circuit."""
+        """Whether the interval is within the limits of a circuit, so that the readings determine the value."""
         least, most, _ = LIMITS[self.name]
         return least < self.low and self.high < most
 
@@ -73,9 +71,7 @@ class FittedCircuit:
     """The given circuit with the fitted values."""
     values: tuple[FittedValue, ...]
     rows: int
-    """Number of measured rows."""
     columns: int
-    """Number of measured columns."""
 
 
 def settle_s(circuit: Circuit, rows: int, columns: int, diodes: str, pressed: int) -> float:
@@ -97,8 +93,8 @@ def fit_circuit(
 ) -> FittedCircuit:
     """The circuit of a sheet from one or two readings; ``rows`` and ``columns`` include guard lines.
 
-    All intervals together cover the truth with this ``probability``. Raises :class:`CircuitError` for fewer than three
-    fully measured rows or columns, for cells faster than the board's first sample, or if no values fit.
+    All intervals together cover the truth with ``probability``. Raises :class:`CircuitError` for fewer than three fully
+    measured rows or columns, for cells faster than the board's first sample, or if no values fit.
     """
     readings = sorted(readings, key=lambda one: one.pressed)[: len(NAMES)]
     names = NAMES[: len({one.pressed for one in readings})]
@@ -137,7 +133,7 @@ def fit_circuit(
 
 
 def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
-    """Rows and columns with complete cells, after removing the lines with the most gaps."""
+    """Rows and columns with complete cells, without the lines with the most gaps."""
     rows, columns = ([*range(count)] for count in known.shape)
     while rows and columns and not known[np.ix_(rows, columns)].all():
         gaps = ~known[np.ix_(rows, columns)]
@@ -157,7 +153,6 @@ def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
 def _solved(
     times: Callable[[np.ndarray], np.ndarray], start: np.ndarray, goal: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The values with the logarithms of times in ``goal``, and their derivatives."""
     values = start.astype(float)
     low, high = (np.array([LIMITS[name][end] for name in names], float) for end in (0, 1))
     for number in range(ROUNDS):
@@ -184,7 +179,6 @@ def _solved(
 
 
 def _rounding_variance(clocks: np.ndarray) -> float:
-    """Variance of the logarithm of the mean by rounding to clocks."""
     variance = max(0.0, float(clocks.var()) - 1 / 12)
     harmonics = np.arange(1, HARMONICS + 1)
     off = float(np.sum(np.exp(-4 * np.pi**2 * harmonics**2 * variance) / (2 * np.pi**2 * harmonics**2)))
@@ -228,7 +222,6 @@ def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _factor(covariance: np.ndarray, degrees: np.ndarray, probability: float) -> float:
-    """Standard deviations that no value exceeds with this probability."""
     rng = np.random.default_rng(0)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)

@@ -1,7 +1,7 @@
 """A sheet's circuit as equations: charge and current of every line and of every pressed switch's diode.
 
 Volts are those of a sheet whose selected row is low (``diodes = "col2row"``). The other direction is its mirror image:
-high and low are exchanged, and levels count from the supply.
+levels count from the supply.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ PF = 1e-12
 LEAK_S = 1e-12
 """Leakage of each line, which gives undriven lines a level."""
 FORWARD = 0.5
-"""Share of the junction voltage above which its capacitance continues linearly, as in SPICE."""
+"""Share of the junction voltage above which its capacitance is linear, as in SPICE."""
 OFF = float("nan")
 """Value for a pin that does not drive."""
 

@@ -13,7 +13,7 @@ from contactfpga.design.circuit.patterns import middle
 from contactfpga.design.circuit.values import Circuit
 
 FULL = 0.95
-"""Share of the supply at which a line counts as charged, and a row as released."""
+"""Share of the supply at which a line is charged and a row released."""
 NEAR_V = 0.05
 """Distance from its rest below which a line no longer pulls others."""
 

@@ -129,7 +129,6 @@ def _problems(
 
 
 def _helps(circuit: Circuit, pull: str, worst: Callable[[Circuit], Worst]) -> str:
-    """The least sufficient pull, or the remaining obstacle."""
     ohms = getattr(circuit, pull)
     while (ohms := _rounded(ohms * 1.2)) <= LARGEST_OHM:
         one = worst(circuit.replace(**{pull: ohms}))
@@ -156,8 +155,8 @@ def check(circuit: Circuit, skin: Skin) -> None:
 
 
 def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
-    """The circuit in a Skin's file; None without a table. Raises CircuitError if pins of this Skin's board would carry
-    too much, or levels are too near to VIL or VIH."""
+    """The circuit in a Skin's file; None without a table. Raises CircuitError if pins would carry too much, or levels
+    are too near to VIL or VIH."""
     circuit = load_circuit(path)
     if circuit is not None:
         try:

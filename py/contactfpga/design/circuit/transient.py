@@ -12,16 +12,16 @@ from contactfpga.design.circuit.network import CircuitState, Drive, Network, cha
 from contactfpga.design.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
-"""Share of the first half in a step, which gives both halves the same equations."""
+"""Share of the first half in a step; both halves have the same equations."""
 SHARE_1, SHARE_0 = 1 / (GAMMA * (2 - GAMMA)), (1 - GAMMA) ** 2 / (GAMMA * (2 - GAMMA))
 ERROR = (-3 * GAMMA**2 + 4 * GAMMA - 2) / (12 * (2 - GAMMA))
 FIRST_S = 1e-12
 ERROR_V = 1e-3
 """Allowed error of a step."""
 CLOSE_V = 1e-5
-"""Newton's method ends when no voltage moves by more; the remaining error is far less."""
+"""Newton's method ends when no voltage moves by more."""
 DIVERGED_V = 1e3
-"""Move of a line that shows that Newton's method diverges."""
+"""Move of a line from which Newton's method diverges."""
 ROUNDS, STEPS = 60, 20_000
 FOREVER_S = 1e6
 
@@ -71,7 +71,6 @@ class _DriveEquations:
         return _Rates(net.farads @ state.lines, cell_c, line_a, junction_a - cell_a, cell_f, cell_s)
 
     def _gathered(self, cells: np.ndarray) -> np.ndarray:
-        """Cell currents summed out of columns and into rows."""
         out = np.bincount(self.network.column_of, cells, self.count)
         return np.asarray(out - np.bincount(self.network.row_of, cells, self.count))
 

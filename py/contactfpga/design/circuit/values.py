@@ -29,8 +29,7 @@ def _check_limits(where: str, values: Diode | Circuit) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Diode:
-    """A Shockley junction with series resistance and depletion charge: SPICE's IS, N, RS, CJO, VJ and M, without
-    breakdown or diffusion charge."""
+    """A Shockley junction with series resistance and depletion charge: SPICE's IS, N, RS, CJO, VJ and M."""
 
     saturation_a: float = field(metadata={"limits": (1e-18, 1e-3), "spice": "IS"})
     emission: float = field(metadata={"limits": (0.5, 5.0), "spice": "N"})
@@ -45,9 +44,9 @@ class Diode:
 
 
 SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 11.0, 0.3, 0.5)
-"""A small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
+"""Small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
 SILICON = Diode(2.5e-9, 1.75, 0.6, 2.0, 0.75, 0.4)
-"""A small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
+"""Small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
 DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
 
 
@@ -55,13 +54,13 @@ DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
 class Circuit:
     """A sheet with its wires and the board's pins. Raises :class:`CircuitError` for impossible values.
 
-    Each line is one capacitance; its resistance is between it and its pin, as if all switches were at the far end.
+    A line's resistance is between its capacitance and its pin, as if all switches were at the far end.
     """
 
     line_pf: float = field(default=30.0, metadata={"limits": (0.1, 100_000.0, "pF")})
     """Capacitance of a line to ground, with its pin."""
     crossing_pf: float = field(default=2.0, metadata={"limits": (0.0, 1000.0, "pF")})
-    """Capacitance of a row to a column at their crossing, with an open switch."""
+    """Capacitance of a row to a column at a crossing with an open switch."""
     neighbor_pf: float = field(default=3.0, metadata={"limits": (0.0, 10_000.0, "pF")})
     """Capacitance of a line to each neighbor."""
     pin_ohm: float = field(default=40.0, metadata={"limits": (1.0, 10_000.0, "ohm")})
@@ -75,9 +74,9 @@ class Circuit:
     diode: Diode = SCHOTTKY
     """Diode in series with each switch; in a file also ``"schottky"`` or ``"silicon"``."""
     column_pull_ohm: float = field(default=100_000.0, metadata={"limits": (100.0, 1e8, "ohm")})
-    """Resistor that pulls or keeps a column at its released level."""
+    """Resistor that keeps a column at its released level."""
     row_pull_ohm: float = field(default=10_000.0, metadata={"limits": (100.0, 1e8, "ohm")})
-    """Resistor that pulls a row to its untouched level; used by projections alone."""
+    """Resistor that pulls a row to its untouched level, for projections alone."""
     supply_v: float = field(default=3.3, metadata={"limits": (1.0, 5.5, "V")})
     """Supply of the board's pins."""
     low_v: float = field(default=0.8, metadata={"limits": (0.1, 5.0, "V")})
@@ -86,7 +85,7 @@ class Circuit:
     """VIH: the lowest level that surely reads high."""
     pin_ma: float = field(default=8.0, metadata={"limits": (0.1, 100.0, "mA")})
     """Largest permanent pin current: 8 mA is specified for an iCE40's pin at 3.3 V, and for an ECP5's with its usual
-    drive strength. Charging pulses may be higher."""
+    drive strength."""
 
     def __post_init__(self) -> None:
         _check_limits("circuit", self)
@@ -129,7 +128,6 @@ def load_circuit(path: str | Path) -> Circuit | None:
 
 
 def _read(values: Any) -> Circuit:
-    """The circuit of a TOML table with the fields of :class:`Circuit`; ``diode`` is a name or a table."""
     given = dict(tomlfile.fields_of(Circuit, "circuit", values, CircuitError))
     if isinstance(diode := given.get("diode"), str):
         if diode not in DIODES:

@@ -1,8 +1,7 @@
 """The soft cover between a contact and the switches: which of them close.
 
 Units are SI; stress is positive in compression. The paper is Battaglia et al., "Combining Haptic Sensing with Safe
-Interaction"; modules cite its equations by number, with misprints corrected, and K. L. Johnson, "Contact mechanics"
-(1985), by name.
+Interaction", cited by equation number with misprints corrected; Johnson is K. L. Johnson, "Contact mechanics" (1985).
 """
 
 from contactfpga.design.cover.answer import CoverError, NoSolution

@@ -17,11 +17,11 @@ MAX_LENGTH_M = 1.0
 
 
 SMALLEST, LARGEST = 1e-12, 1e12
-"""Limits of nonzero SI values in a file; their powers are finite."""
+"""Limits of nonzero SI values in a file, whose powers are finite."""
 
 
 TINIEST, HUGEST = 1e-25, 1e25
-"""Limits of any nonzero SI number; its products here are finite."""
+"""Limits of any nonzero SI number, whose products are finite."""
 
 
 class CoverError(ContactFPGAError, ValueError):

@@ -1,16 +1,16 @@
 """An arm that runs into an obstacle, and the energy balance by which the foam slows it.
 
 One joint has constant motor torque u and optional gravity; the foam is a Hertz spring F = K_s delta^1.5. With theta -
-theta0 = delta/d, delta(0) = 0 and +v0 at the touch, (3) as corrected is
+theta0 = delta/d, delta(0) = 0 and +v0 at the touch (the paper prints -v0 and drops cos theta0), (3) is
 
     J/(2 d^2) (v^2 - v0^2) = u delta/d - M g l [cos theta0 - cos(theta0 + delta/d)] - 2/5 K_s delta^(5/2).
 
-The paper prints -v0 and drops cos theta0. The reference for :mod:`contactfpga.design.cover.impact` is (2) as corrected,
+The reference for :mod:`contactfpga.design.cover.impact` is (2) as corrected,
 
     J/d^2 d^2 delta/dt^2 = (u - M g l sin(theta0 + delta/d))/d - K_s delta^(3/2),
 
-by Dormand and Prince's method of order 5 with step control. The step in which v becomes negative is repeated with v as
-the independent variable (Henon), which ends at v = 0 exactly.
+by Dormand and Prince's method of order 5. The step in which v becomes negative is repeated with v as the independent
+variable (Henon), which ends at v = 0 exactly.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Arm:
         gravity: bool = False,
         angle_rad: float = 0.0,
     ) -> Arm:
-        """An arm that is a cylinder, with its center of mass ``com_m`` from the joint.
+        """A cylinder with its center of mass ``com_m`` from the joint.
 
         J = m/12 (3 R^2 + L^2) + m l^2, for a thin tube 6 R^2; L defaults to the lever, as printed.
         """
@@ -214,7 +214,7 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
 
 
 def course(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, count: int = 64) -> Course:
-    """The whole contact in 2 ``count`` + 1 moments by quadrature; its compression ends at ``depth_m``.
+    """The whole contact in 2 ``count`` + 1 moments by quadrature; compression ends at ``depth_m``.
 
     The model is lossless, so the way out mirrors the way in.
     """
@@ -262,7 +262,6 @@ def _walk(
 
 
 def _one(slope: Slope, x: float, y: State, step: float) -> tuple[State, State]:
-    """One step: its result, and its difference from order 4."""
     slopes: list[State] = []
     at = y
     for row, share in zip(_A, _C):

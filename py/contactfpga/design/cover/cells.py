@@ -1,16 +1,15 @@
 """The force on each switch of a sheet, and the closed ones: faces and caps under foam.
 
-Foam presses the sheet with the normal stress that spreads through it (:mod:`contactfpga.design.cover.medium`). A switch
-takes the part on its face or on its *cap*, a rigid square plate. The surroundings of *flush* caps carry their own
-share. *Proud* caps carry all foam, and each takes the part on its *tile*, one pitch wide. Foam that is *cut* between
-the caps does not spread stress from tile to tile.
+A switch takes the part of the stress in the foam (:mod:`contactfpga.design.cover.medium`) on its face or on its *cap*,
+a rigid square plate. The surroundings of *flush* caps carry their own share. *Proud* caps carry all foam, and each
+takes its *tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from tile to tile.
 
-A proud cap yields by the switch's travel and takes the foam along, which loads the neighbors. The foam between two caps
-is a strip that shears and bends (Timoshenko). Forces Q on the caps follow from those on rigid caps, T, by (1 + L/k) Q =
-T: k is the switch's stiffness, L the strips' stiffness as a discrete Laplacian.
+A proud cap yields by the switch's travel, and the foam, strips that shear and bend (Timoshenko), loads the neighbors.
+Forces Q on the caps follow from those on rigid caps, T, by (1 + L/k) Q = T: k is the switch's stiffness, L the strips'
+stiffness as a discrete Laplacian.
 
 Simplifications: the pressure on top is independent of the yield; caps do not tilt; foam that sags between proud caps is
-unsupported. The page on the cover has the error, by boundary elements.
+unsupported.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.press import Cover, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
-"""Limits of grid steps per pitch; between them, two steps per foam thickness and six per face."""
+"""Limits of grid steps per pitch; between them, two per foam thickness and six per face."""
 
 MOST_PITCHES = 20
 """Largest foam thickness in pitches; forces are equal on all switches long before."""
@@ -39,8 +38,8 @@ BEYOND = 4.0
 class Cells:
     """The switches of a sheet of ``rows`` by ``columns`` under a cover, the first one at (0, 0) m.
 
-    ``seed`` draws the closing forces if the cover's switch has a ``spread``. Raises CoverError for the model ``patch``,
-    which has no force, for caps wider than the pitch, and for foam of more than :data:`MOST_PITCHES`.
+    ``seed`` draws closing forces with a ``spread``. Raises CoverError for the model ``patch``, which has no force, for
+    caps wider than the pitch, and for foam of more than :data:`MOST_PITCHES`.
     """
 
     def __init__(self, cover: Cover, rows: int, columns: int, pitch_x_m: float, pitch_y_m: float, seed: int = 0):
@@ -96,7 +95,7 @@ class Cells:
 
     def false_presses(self, acceleration_m_s2: float = 0.0, foam_kg_m3: float = 0.0) -> float:
         """Expected number of switches that close without a touch, by preload and by the inertia of cap and foam when
-        the link accelerates toward the sheet's outside; closing forces are normally distributed."""
+        the link accelerates toward the sheet's outside."""
         finite("acceleration_m_s2", acceleration_m_s2)
         not_negative("foam_kg_m3", foam_kg_m3, "kg/m3")
         cap = self.cover.cap
@@ -137,7 +136,7 @@ class Cells:
         return found
 
     def _spread(self, pressure: Floats) -> Floats:
-        """Force on each grid part below the foam; periodic far beyond the edge."""
+        """Force on each grid part below the foam, periodic far beyond the edge."""
         if self.cover.cut:
             return pressure
         return np.fft.irfft2(np.fft.rfft2(pressure) * self._transfer, s=pressure.shape)

@@ -1,7 +1,7 @@
 """The algorithm of the paper's Fig. 3: material, thickness, force and pitch under limits, and the binding limit.
 
-Each foam, and the modulus with exactly the required compression time, passes impact, yield check, thickness, detected
-force and pitch. Candidates that break a limit are part of the answer.
+Candidates are each foam and the modulus with exactly the required compression time; those that break a limit are part
+of the answer.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from contactfpga.design.cover.task import Foam, Task
 from contactfpga.skin.latency import latency_s
 
 FREE = "free modulus"
-"""Name of the candidate whose modulus follows from the time."""
+"""Candidate whose modulus follows from the time."""
 
 STEPS = 6
-"""Number of latencies for :func:`thinning`, logarithmically spaced."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +66,7 @@ class FoamDesign:
     sure: Sense | None = None
     """Force that is felt everywhere at this pitch."""
     regions: tuple[RegionLimits, ...] = ()
-    """Speed and reaction time for each of the task's body regions."""
+    """Speed and reaction time for the task's body regions."""
     checks: tuple[Check, ...] = ()
     no_solution: str | None = None
     notes: tuple[str, ...] = ()
@@ -97,7 +96,7 @@ class Thin:
     pressed_m: float | None
     """Indentation of the chosen foam after ``latency_s``."""
     stopped_m: float | None
-    """Final indentation if the motor then brakes with the task's torque; the foam must be thicker."""
+    """Final indentation if the motor then brakes; the foam must be thicker."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -270,7 +269,6 @@ def _thin(task: Task, foam: Foam | None, t0: float) -> Thin:
 
 
 def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
-    """Indentation this long after the touch, at most delta_c."""
     if seconds >= hit.time_s:
         return hit.compression_m
     course = arm.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)

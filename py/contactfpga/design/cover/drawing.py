@@ -104,7 +104,6 @@ def design_map(task: Task) -> Figure:
 
 
 def _top(thickness: Floats, pitch: Floats, inside: np.ndarray) -> tuple[float, float]:
-    """Place of a contour's name: its highest point, or where it leaves the picture."""
     high = np.where(inside.any(axis=0), pitch[len(pitch) - 1 - inside[::-1].argmax(axis=0)], 0.0)
     column = int(np.argmax(np.minimum(high, 0.85 * pitch[-1])))
     return float(thickness[column]), float(high[column])
@@ -125,7 +124,7 @@ def deformation(force_n: Floats, deformation_m: Floats) -> Figure:
 
 
 def _closing(switch: Switch, offset_m: Floats, thickness_m: Floats, within: str) -> Floats:
-    """Point force in N that closes a switch; NaN, which is not drawn, if none does."""
+    """Point force in N that closes a switch; NaN if none does."""
     ratio = offset_m / thickness_m
     spread = medium.spread(within, ratio)
     limit = medium.first_zero(within)

@@ -13,8 +13,8 @@ CYLINDER_ON_PLANE = 1.5
 """nu_Y: mean contact pressure over yield strength at the foam's first yield (paper, III.B)."""
 
 _OF_WORK: float = (8 / 15) ** 0.4
-"""W/delta over (E_k^3 E*^2 R*)^(1/5), 0.7777, by W = 8/15 E* sqrt(R*) delta^(5/2). The paper takes it for the force;
-the peak force dW/d delta is 5/2 of it, 1.9442."""
+"""W/delta over (E_k^3 E*^2 R*)^(1/5), 0.7777, by W = 8/15 E* sqrt(R*) delta^(5/2). The paper takes it for the force,
+which is 5/2 of it, 1.9442, at its peak."""
 
 _SHARE: float = 2**0.6 * 16 * math.pi
 """E_k^(3/5) to (m v0^2)^(3/5), and a volume of 16 contact areas."""
@@ -26,7 +26,7 @@ THICKNESS_RULES = {
     "hertz": _SHARE * 0.75 ** (2 / 3) * (2.5 * _OF_WORK) ** (2 / 3),
 }
 """The constant in (8): as printed; unrounded (83.7589); with the peak force for the paper's W/delta (154.285); also
-with the area of Hertz's circle on R*, 0.8255 pi (F R*/E*)^(2/3), for 1.3 pi (97.969)."""
+with Hertz's area on R*, 0.8255 pi (F R*/E*)^(2/3), for 1.3 pi (97.969)."""
 
 
 def effective_modulus_pa(modulus_pa: float, poisson: float, other_pa: float = math.inf, other: float = 0.0) -> float:

@@ -1,7 +1,7 @@
 """Whether a light finger is felt: the force that closes a first switch, over places anywhere on a sheet.
 
-Switch forces are proportional to the finger's, so a touch is felt from the least ratio of closing force to force share
-on. The finger is an ellipse of fixed size with Hertz's pressure.
+A touch is felt from the least ratio of closing force to force share on. The finger is an ellipse of fixed size with
+Hertz's pressure.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ LENGTH_M, WIDTH_M = 12e-3, 10e-3
 
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
-"""Sheets with drawn closing forces, if these have a spread; another sheet lies within their range with a probability of
-39/41 (95 %)."""
+"""Drawn sheets, if closing forces have a spread; another sheet lies within their range with a probability of 39/41 (95
+%)."""
 
 LEAST_SHARE = 1e-4
-"""Force share below which a switch counts as unpressed; a layer's linear solution has ripples far away."""
+"""Force share that counts as unpressed; a layer's linear solution has ripples far away."""
 
 NEIGHBORS = 2
 """Computed switches beyond finger and foam, as yielding caps pass force on."""
@@ -61,7 +61,7 @@ class Force:
     low_n: float
     """Minimum over drawn sheets."""
     high_n: float
-    """Maximum over drawn sheets; 95 % of all sheets are between minimum and maximum."""
+    """Maximum over drawn sheets; 95 % of all sheets lie between."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Felt:
     """Sensitivity of a sheet to light touches."""
 
     places: int
-    """Places of the finger's middle, evenly spread, each with its own angle."""
+    """Places of the finger's middle, evenly spread, each with an angle."""
     sheets: int
     """Sheets with drawn closing forces; 1 without a spread."""
     half: Force | NoSolution
@@ -79,7 +79,7 @@ class Felt:
     worst: Force | NoSolution
     """Force from which a touch at the worst place is felt."""
     worst_m: tuple[float, float]
-    """The worst place, x and y from the first switch."""
+    """x and y of the worst place from the first switch."""
     least_share: float
     """Force share of the most pressed switch at the worst place."""
     median_share: float
@@ -100,7 +100,7 @@ def feel(
 ) -> Felt:
     """Sensitivity of a sheet to an elliptic finger, ``length_m`` long and ``width_m`` wide.
 
-    ``seed`` is the first of :data:`SHEETS` for closing forces with a spread. Acceleration and density are those of
+    ``seed`` is the first of :data:`SHEETS`; acceleration and density are for
     :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the model ``patch``.
     """
     half = positive("length_m", length_m, "m") / 2, positive("width_m", width_m, "m") / 2
@@ -144,7 +144,7 @@ def _cells(cover: Cover, sheet: Sheet, seed: int) -> Cells:
 
 
 def _closing(cover: Cover, sheet: Sheet, first: Cells, seed: int) -> Floats:
-    """(sheets, rows, columns) closing forces in N; inf for a switch that is absent or closed without a touch."""
+    """(sheets, rows, columns) closing forces; inf for a switch that is absent or closed without a touch."""
     drawn = [first.thresholds_n]
     if cover.switch.spread:
         drawn += [_cells(cover, sheet, seed + number).thresholds_n for number in range(1, SHEETS)]
@@ -166,7 +166,7 @@ def _touches(part: float) -> str:
 
 
 class _Window:
-    """The part of a sheet around a finger; switches beyond take no force."""
+    """The part of a sheet around a finger, beyond which switches take no force."""
 
     def __init__(self, cover: Cover, sheet: Sheet, reach_m: float):
         self.sheet = sheet
@@ -178,7 +178,6 @@ class _Window:
         self.cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
 
     def taken(self, finger: Ellipse) -> tuple[Floats, tuple[np.ndarray, np.ndarray]]:
-        """Force share of each switch of the window, with their rows and columns."""
         sheet, (high, wide) = self.sheet, self.cells.shape
         top = self._start(finger.y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
         left = self._start(finger.x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)

@@ -28,8 +28,7 @@ def fit_force(force_n: float, pairs: Sequence[tuple[float, float]], probability:
     """The switch force that fits predicted to measured closing forces.
 
     ``force_n`` is the switch force of the predictions; ``pairs`` are predicted and measured forces in N, which scatter
-    by a factor. All closing forces are proportional to the switch force, so one factor is fitted. Raises
-    :class:`CoverError` for fewer than three pairs and for forces not above 0.
+    by a factor. Raises :class:`CoverError` for fewer than three pairs and for forces not above 0.
     """
     if len(pairs) < LEAST:
         raise CoverError(f"{len(pairs)} closing forces were measured; {LEAST} are needed, each of another switch")

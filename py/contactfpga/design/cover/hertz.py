@@ -16,9 +16,9 @@ class Ball:
     """Hertz contact of a ball (or of crossed equal cylinders) with the cover (Johnson 4.2)."""
 
     radius_m: float
-    """Effective radius R*; 1/R* is the sum of both bodies' curvatures."""
+    """R*; 1/R* is the sum of both bodies' curvatures."""
     modulus_pa: float
-    """Effective modulus E*; 1/E* is the sum of (1 - nu^2)/E of both bodies."""
+    """E*; 1/E* is the sum of (1 - nu^2)/E of both bodies."""
 
     def __post_init__(self) -> None:
         positive("radius_m", self.radius_m, "m")
@@ -33,8 +33,7 @@ class Ball:
         return self.patch_m(force_n) ** 2 / self.radius_m
 
     def closing_n(self, switch: Switch, depth_m: float) -> float:
-        """Force that closes a switch right below, ``depth_m`` deep in a half-space; the stress there is unbounded in
-        F."""
+        """Force that closes a switch right below, ``depth_m`` deep in a half-space."""
         positive("depth_m", depth_m, "m")
         low = 2 * math.pi / 3 * switch.closing_pa * depth_m**2  # that of a point force: the stress below it is highest
         high = 2 * low
@@ -58,8 +57,8 @@ def on_axis_pa(force_n: float, patch_m: float, depth_m: float) -> float:
 def stress_pa(force_n: float, patch_m: float, offset_m: np.ndarray | float, depth_m: float) -> np.ndarray:
     """Normal stress in a half-space under the pressure p0 sqrt(1 - r^2/a^2) on a disc of radius ``patch_m``.
 
-    Huber's closed form, for any Poisson ratio: p0 (z/sqrt u)^3 a^2 u / (u^2 + a^2 z^2), 2 u = w + sqrt(w^2 + 4 a^2
-    z^2), w = r^2 + z^2 - a^2, with ``offset_m`` r from the axis and ``depth_m`` z.
+    Huber's closed form for any Poisson ratio, at ``offset_m`` r and ``depth_m`` z: p0 (z/sqrt u)^3 a^2 u / (u^2 + a^2
+    z^2), 2 u = w + sqrt(w^2 + 4 a^2 z^2), w = r^2 + z^2 - a^2.
     """
     positive("patch_m", patch_m, "m")
     positive("depth_m", depth_m, "m")

@@ -32,7 +32,7 @@ TRIED = 96
 def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: float, within: str) -> float:
     """Normal stress at ``offset_m`` from the axis of a Hertz patch of radius ``patch_m``, under ``thickness_m``.
 
-    ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`. Accurate to 1e-8 of F/h^2 up to 8 thicknesses away
+    ``within`` is in :data:`contactfpga.design.cover.medium.MEDIA`. Accurate to 1e-8 of F/h^2 up to 8 thicknesses away
     and for patches up to :data:`WIDEST` thicknesses.
     """
     if within == "halfspace":
@@ -113,7 +113,6 @@ def _weighted(within: str) -> tuple[Floats, Floats]:
 
 @functools.cache
 def _nodes() -> tuple[Floats, Floats]:
-    """Sixteen nodes on each unit of t."""
     nodes, weights = legendre(16)
     t = np.add.outer(np.arange(medium.HIGHEST_T), (nodes + 1) / 2)
     return t.ravel(), np.tile(weights / 2, len(t))

@@ -55,8 +55,8 @@ def strike(
 ) -> Impact | NoSolution:
     """The compression after a touch at ``speed_m_s`` by a contact of ``stiffness`` K_s in N/m^1.5.
 
-    There is no solution if the foam is pressed flat or yields (at the indentation ``yield_m``), if nothing presses, or
-    if the arm would turn further than its lever.
+    There is no solution if the foam is pressed flat or yields (at ``yield_m``), if nothing presses, or if the arm would
+    turn further than its lever.
     """
     _checked(speed_m_s, stiffness)
     if method not in METHODS:
@@ -85,11 +85,10 @@ def strike(
 def stiffness_for(
     arm: Arm, speed_m_s: float, seconds: float, *, thickness_m: float | None = None
 ) -> Impact | NoSolution:
-    """The compression with the stiffness at which it takes ``seconds``, the inverse of :func:`strike`.
+    """The compression that takes ``seconds``, the inverse of :func:`strike`.
 
     A deeper compression is longer, so the search is over delta_c, for which (5) gives K_s. There is no solution if
-    torque and gravity stop the arm sooner whatever the foam, or if the foam would yield by more than the lever or
-    ``thickness_m``.
+    torque and gravity stop the arm sooner, or if the foam would yield by more than the lever or ``thickness_m``.
     """
     positive("speed_m_s", speed_m_s, "m/s")
     if positive("seconds", seconds, "s") < SMALLEST:
@@ -118,8 +117,8 @@ def stiffness_for(
 def compression_m(arm: Arm, speed_m_s: float, stiffness: float) -> float:
     """delta_c, (5): the first indentation at which v is 0.
 
-    Without gravity the balance is concave with one root. With gravity each step goes to the root of a concave lower
-    bound, so no root is skipped.
+    Without gravity the balance is concave. With gravity each step goes to the root of a concave lower bound, so no root
+    is skipped.
     """
     _checked(speed_m_s, stiffness)
     if arm.free:
@@ -163,8 +162,8 @@ def _checked(speed_m_s: float, stiffness: float) -> None:
 def time_s(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float) -> float | None:
     """t_c, (4), to about 1e-13; None if not finite.
 
-    With delta = delta_c sin^2(phi) both ends are smooth. In the upper half v^2 is its difference from 0 at delta_c,
-    with cos^2(phi) divided out analytically, so an error of delta_c enters linearly, not as its square root.
+    With delta = delta_c sin^2(phi) both ends are smooth. In the upper half cos^2(phi) is divided out of v^2
+    analytically, so an error of delta_c enters linearly.
     """
     not_negative("speed_m_s", speed_m_s, "m/s")
     not_negative("stiffness", stiffness, "N/m^1.5")
@@ -218,7 +217,6 @@ def _time_to(arm: Arm, speed_m_s: float, depth: float) -> float | None:
 
 
 def _deepest(arm: Arm, speed_m_s: float, thickness_m: float | None) -> tuple[float, str]:
-    """The deepest final compression, and why none is longer."""
     limit = arm.lever_m if thickness_m is None else positive("thickness_m", thickness_m, "m")
     energy = arm.mass_kg * speed_m_s**2 / 2
     grid = np.linspace(0, limit, 257)

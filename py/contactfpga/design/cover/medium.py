@@ -1,15 +1,15 @@
 """Spread of stress from the cover's face to the switches, by medium.
 
-A point force F on the otherwise free face gives the normal stress F/h^2 g(rho/h) at the depth h and the distance rho
-from its line, positive in compression. With the Hankel transform in the plane, k the wave number and t = k h,
+A point force F on the otherwise free face gives the normal stress F/h^2 g(rho/h) at depth h and distance rho, positive
+in compression. With k the wave number in the plane and t = k h,
 
     g(s) = 1/(2 pi) int_0^inf t G(t) J0(t s) dt.
 
 ``halfspace``: the cover continues below the switches (paper (9), Johnson 3.2): G = (1 + t) exp(-t), g = 3/(2 pi) (1 +
 s^2)^(-5/2).
 
-``bonded``: an incompressible cover of thickness h glued to a rigid base. The stream function obeys (D^2 - 1)^2 W = 0
-over the depth, without shear on the face or displacement at the base: G = (cosh t + t sinh t) / (cosh^2 t + t^2).
+``bonded``: an incompressible cover glued to a rigid base. The stream function obeys (D^2 - 1)^2 W = 0 over the depth,
+without shear on the face or displacement at the base: G = (cosh t + t sinh t) / (cosh^2 t + t^2).
 
 ``frictionless``: a cover that slides on a rigid base, for any Poisson ratio: G = (sinh t + t cosh t) / (sinh t cosh t +
 t).
@@ -32,13 +32,13 @@ HIGHEST_T = 30.0
 """Wave number times thickness beyond which nothing passes: 2 t^2 exp(-t) is 2e-10 there."""
 
 FARTHEST = 16.0
-"""Distance over thickness beyond which a layer's stress counts as 0; it is below 1e-7 of the axis value there."""
+"""Distance over thickness beyond which a layer's stress, below 1e-7 of the axis value, counts as 0."""
 
 STEP = 0.025
 """Distance over thickness between two integrals of a layer's table."""
 
 FINER = 32
-"""Linear pieces per step of the table; their error is below 1e-6 of the stress on the axis."""
+"""Linear pieces per step of the table, to 1e-6 of the stress on the axis."""
 
 
 def transfer(name: str, t: Floats) -> Floats:
@@ -93,7 +93,7 @@ def first_zero(name: str) -> float | None:
 def _table(name: str) -> tuple[Floats, Floats]:
     """g every STEP / FINER and its increment to the next; from FARTHEST on both are 0.
 
-    The slow integral is computed every STEP and interpolated by the cubic through values and slopes.
+    The slow integral is interpolated between steps by the cubic through values and slopes.
     """
     transfer(name, np.zeros(1))
     values, slopes = _integral(name, np.arange(0, FARTHEST + STEP / 2, STEP))
@@ -114,7 +114,7 @@ def _nodes() -> tuple[Floats, Floats]:
 def _integral(name: str, s: Floats) -> tuple[Floats, Floats]:
     """(g, dg/ds) at each of (n,) distances.
 
-    J0, which numpy lacks, is the mean of cos(x sin a) over the angle; the midpoint rule converges exponentially.
+    J0, which numpy lacks, is the mean of cos(x sin a) by the midpoint rule, which converges exponentially.
     """
     t, weights = _nodes()
     weighted = weights * t * transfer(name, t) / (2 * np.pi)

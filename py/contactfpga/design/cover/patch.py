@@ -82,15 +82,10 @@ def _gauss(count: int) -> tuple[Floats, Floats]:
 @dataclasses.dataclass(frozen=True)
 class _Shape:
     half_x_m: float
-    """Half the extent along the part's own x axis."""
     half_y_m: float
-    """Half the extent along the part's own y axis."""
     x_m: float = 0.0
-    """Middle along the columns."""
     y_m: float = 0.0
-    """Middle along the rows."""
     angle_rad: float = 0.0
-    """Rotation of the part's own x axis."""
 
     def __post_init__(self) -> None:
         for name in ("half_x_m", "half_y_m"):
@@ -114,7 +109,7 @@ class _Shape:
         return (cosine * x + sine * y) / self.half_x_m, (cosine * y - sine * x) / self.half_y_m
 
     def _sheet(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Points in the sheet's frame; inverse of :meth:`_own`."""
+        """Inverse of :meth:`_own`."""
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
         x, y = u * self.half_x_m, v * self.half_y_m
         return self.x_m + cosine * x - sine * y, self.y_m + sine * x + cosine * y

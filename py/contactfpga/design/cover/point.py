@@ -20,7 +20,7 @@ class Switch:
     area_m2: float = 12.6e-6
     """Area of the face."""
     travel_m: float = 0.0
-    """Travel until the switch closes, linear in the force; 0 is rigid."""
+    """Travel until the switch closes, linear in the force."""
     spread: float = 0.0
     """Relative standard deviation of the closing force, drawn within three of them."""
     hysteresis: float = 0.0
@@ -54,7 +54,7 @@ def stress_pa(
     """Normal stress at the switches, at horizontal distances ``offset_m`` from a point force.
 
     sigma = F/h^2 g(rho/h) (:mod:`contactfpga.design.cover.medium`); over a half-space, (9): 3 F z^3 / (2 pi (rho^2 +
-    z^2)^(5/2)). ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`.
+    z^2)^(5/2)). ``within`` is in :data:`contactfpga.design.cover.medium.MEDIA`.
     """
     finite("force_n", force_n)
     positive("thickness_m", thickness_m, "m")
@@ -66,8 +66,8 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
     """Point force that closes a switch at the horizontal distance ``offset_m``, (9) solved for F; (10) has pitch /
     sqrt(2).
 
-    In a layer there is none beyond :func:`contactfpga.design.cover.medium.first_zero`: the cover is pulled off the
-    switch there, or presses with less than 0.3 % of the stress on the axis.
+    In a layer there is none beyond :func:`contactfpga.design.cover.medium.first_zero`, where the cover is pulled off
+    the switch or presses with less than 0.3 % of the stress on the axis.
     """
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")
@@ -104,8 +104,7 @@ def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "hal
 
 
 def best_thickness_m(offset_m: float) -> float:
-    """Thickness with the least point force for a switch at this distance, over a half-space: z = sqrt(1.5) rho, from
-    d/dz of (9)."""
+    """Thickness with the least point force for a switch at this distance over a half-space: z = sqrt(1.5) rho."""
     return math.sqrt(1.5) * positive("offset_m", offset_m, "m")
 
 

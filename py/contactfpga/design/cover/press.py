@@ -20,21 +20,21 @@ from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
 """``patch``: a switch closes under the contact's shape, whatever the force. ``point``: each part's force acts at its
-middle on a half-space, paper (9). ``hertz``: each part's pressure acts on a half-space; ``bonded``, ``frictionless``:
-on a layer on a rigid base, glued or sliding."""
+middle on a half-space, paper (9). Each part's pressure acts with ``hertz`` on a half-space, with ``bonded`` or
+``frictionless`` on a layer glued to a rigid base or sliding on it."""
 
 SHEAR = 6 / 5
 """Shear deflection of a strip over that by its mean shear stress (Timoshenko)."""
 
 GIVES = 0.75
-"""Foam thicknesses by which a strip between two caps is longer than the gap, as the foam on the caps yields too; fitted
-to boundary elements for caps of 0.6 to 0.9 of the pitch under 2 and 5 mm."""
+"""Foam thicknesses by which a strip between two caps is longer than the gap: fitted to boundary elements for caps of
+0.6 to 0.9 of the pitch under 2 and 5 mm."""
 
 GRID = 16
 """Sampling points per side of a switch's face for :attr:`Cover.share`."""
 
 BLOCK = 1 << 15
-"""Stresses summed at once, few enough for the cache."""
+"""Stresses summed at once; these fit the cache."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Cap:
     side_m: float
     """Side, at most the pitch."""
     proud: bool = True
-    """Whether the cap stands above its surroundings, so that the foam rests on caps alone; False: flush."""
+    """Whether the foam rests on caps alone, above their surroundings; False: flush."""
     mass_kg: float = 0.0
     """Mass of one cap."""
 
@@ -201,7 +201,6 @@ def _under(parts: Sequence[Part], x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _superposed(
     part: Part, force_n: float, thickness_m: float, within: str, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """A part's pressure as point forces spread through the medium."""
     at_x, at_y, shares = part.pressure(thickness_m)
     places_x, places_y = x.ravel(), y.ravel()
     stress = np.empty(places_x.shape)
@@ -224,7 +223,7 @@ def load_cover(path: str | Path) -> Cover | None:
 
 
 def read_cover(values: Any) -> Cover:
-    """The cover of a TOML table whose keys are the fields of :class:`Cover`, with tables ``switch`` and ``cap``."""
+    """The cover of a TOML table with the fields of :class:`Cover`, and tables ``switch`` and ``cap``."""
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap)):
         if name in given:

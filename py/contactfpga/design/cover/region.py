@@ -1,17 +1,16 @@
 """A body region that the arm runs into: speed and reaction time that keep its limits.
 
-The user fills in a table of regions from the standard; none of the numbers is ours. The quantities are those of ISO/TS
-15066:2016, annex A, and ISO 10218-2:2025: effective mass and spring constant, and largest force and pressure in a
-transient contact, from which the region can recoil, and in a quasi-static one, where it is clamped.
+The user fills in a table of regions; none of the numbers is ours. The quantities are those of ISO/TS 15066:2016, annex
+A, and ISO 10218-2:2025: effective mass and spring constant, and largest force and pressure in a transient contact, from
+which the region can recoil, and in a quasi-static one, where it is clamped.
 
 The foam, F = K_s delta^1.5 (Hertz), is in series with the region's spring, F = k y. Both are pressed by x(F) =
 (F/K_s)^(2/3) + F/k, and store W(F) = 2/5 F (F/K_s)^(2/3) + F^2/(2 k).
 
-*Transient*, as in the standard: two free masses, mu = 1/(1/m_arm + 1/m_region), no drive: mu v^2/2 = W(F).
+*Transient*: two free masses without drive, mu = 1/(1/m_arm + 1/m_region): mu v^2/2 = W(F).
 
 *Quasi-static*: the region is clamped on its far side; the arm presses on with u until it reacts, at x_r, then brakes
-with b: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), solved for x_r at the limit's F. The time to x_r follows by
-quadrature.
+with b: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), solved for x_r at the limit's F.
 
 Pressure is the largest under a Hertz patch, 3/2 of its mean: p^3 = 6 F E*^2/(pi^3 R*^2).
 """
@@ -120,8 +119,8 @@ class RegionLimits:
     quasistatic_n: float
     """Largest force on the clamped region: by force, pressure and foam."""
     reaction_s: float
-    """Longest time from the touch to the reaction, at the requested speed; infinite if the arm stops without one, 0 if
-    even the earliest is too late."""
+    """Longest time from the touch to the reaction at the requested speed; infinite if the arm stops without one, 0 if
+    none is soon enough."""
     clamped_m_s: float | NoSolution
     """Largest speed for the clamped region with the requested reaction time."""
 
@@ -155,7 +154,6 @@ def limits_of(pressing: Pressing, region: Region, speed_m_s: float, reaction_s: 
 
 
 def _speed(pair: _Pair, force_n: float, reaction_s: float) -> float | NoSolution:
-    """The largest speed at which ``reaction_s`` is soon enough."""
     fastest = pair.fastest_m_s(force_n)
     if reaction_s == 0:
         return fastest
@@ -174,8 +172,6 @@ def _speed(pair: _Pair, force_n: float, reaction_s: float) -> float | NoSolution
 
 @dataclasses.dataclass(frozen=True)
 class _Pair:
-    """Foam and region in series, under an arm."""
-
     pressing: Pressing
     region: Region
 
@@ -194,7 +190,6 @@ class _Pair:
         return math.sqrt(2 * braked / self.pressing.mass_kg)
 
     def reaction_s(self, force_n: float, speed_m_s: float) -> float:
-        """The longest time to the reaction that never exceeds the force."""
         arm, depth = self.pressing, self.pressed_m(force_n)
         left = self.stored_j(force_n) - arm.mass_kg * speed_m_s**2 / 2
         if left >= arm.push_n * depth:

@@ -1,8 +1,8 @@
 """The smallest force that a sheet under a cover detects, and the pitch it needs, by the simplest adequate model.
 
 A model is a medium (:mod:`contactfpga.design.cover.medium`) and a contact, ``point`` or ``patch`` (a ball's Hertz
-pressure). The paper's (9) and (10) are the half-space under a point force. The reference is the bonded layer: foam
-glued on a rigid bumper, under the patch of a round object or the point force of an unknown one.
+pressure). The reference is the bonded layer, foam glued on a rigid bumper, under the patch of a round object or the
+point force of an unknown one.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class PaddedSheet:
     thickness_m: float
     """Thickness of the foam."""
     ball: Ball | None = None
-    """The touching object; None: unknown, a point force is assumed."""
+    """The touching object; None: unknown, a point force."""
 
     def __post_init__(self) -> None:
         positive("thickness_m", self.thickness_m, "m")
@@ -105,8 +105,8 @@ class PaddedSheet:
     def detects(self, offset_m: float, model: Model | None = None, tolerance: float | None = None) -> Sense:
         """:meth:`force_n` by a named model, or by the simplest within ``tolerance`` of the reference.
 
-        By default the tolerance is :data:`TOLERANCE`, and a named model answers with a note of its error. With
-        ``tolerance`` a named model that is off by more is refused.
+        The default tolerance is :data:`TOLERANCE`. A named model that is off by more is refused only with
+        ``tolerance``, else it answers with a note of its error.
         """
         found = self._judge(lambda one: self.force_n(one, offset_m), model, tolerance)
         force = found.reference if isinstance(found.value, NoSolution) else found.value
@@ -175,7 +175,7 @@ class PaddedSheet:
 
 
 def worst_offset_m(pitch_x_m: float, pitch_y_m: float | None = None) -> float:
-    """The largest distance of a point from a switch: half the diagonal of a cell, p/sqrt(2) if square."""
+    """The largest distance of a point from a switch: half the diagonal of a cell."""
     wide = positive("pitch_x_m", pitch_x_m, "m")
     return math.hypot(wide, wide if pitch_y_m is None else positive("pitch_y_m", pitch_y_m, "m")) / 2
 
@@ -187,7 +187,7 @@ def pitch_m(reach_m: float) -> float:
 
 @functools.cache
 def best_ratio(within: str = "halfspace") -> float:
-    """Offset over thickness of the least closing force at a given offset: sqrt(2/3) in a half-space. F = sigma
+    """Offset over thickness with the least closing force at a given offset: sqrt(2/3) in a half-space. F = sigma
     rho^2/(s^2 g(s)), s = rho/h."""
     if within == "halfspace":
         return math.sqrt(2 / 3)

@@ -1,8 +1,8 @@
 """The task of a cover, from a TOML file: the arm, the impact, the switch, foams and limits.
 
-Each foam's values have their source; missing ones are None. Data sheets give the stress at 25 % compression: the
-modulus is that stress over 0.25, a secant below the initial slope. A soft foam's Poisson ratio falls under compression:
-0.5 at 5 %, about 0 at 66 % (doi 10.1016/j.ijengsci.2007.09.002).
+Unknown values of a foam are None. Data sheets give the stress at 25 % compression: the modulus is that stress over
+0.25, a secant below the initial slope. A soft foam's Poisson ratio falls under compression: 0.5 at 5 %, about 0 at 66 %
+(doi 10.1016/j.ijengsci.2007.09.002).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Foam:
     yield_pa: float | None = None
     """Yield strength Y; None excludes (7) and (8)."""
     strain: float = 1.0
-    """Largest relative compression for which the source gives a stress, else 1."""
+    """Largest relative compression with a stress in the source, else 1."""
 
     def __post_init__(self) -> None:
         positive("modulus_pa", self.modulus_pa, "Pa")
@@ -118,7 +118,7 @@ def find(name: str, foams: tuple[Foam, ...] = FOAMS) -> Foam:
 _NEEDED = object()
 
 LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
-"""Lengths of cover and link; values that look like mm are refused."""
+"""Lengths of cover and link, refused above 1 m."""
 
 _KEYS: dict[str, dict[str, Any]] = {
     "arm": {
@@ -183,7 +183,7 @@ class Task:
     peak_n: float | None = None
     """Largest peak force of the impact."""
     mass_kg_m2: float | None = None
-    """Largest mass of the cover per area; not checked for a foam of unknown density."""
+    """Largest mass of the cover per area; not checked for unknown density."""
     regions: tuple[Region, ...] = ()
     """Body regions whose limits of force and pressure must be kept."""
     foams: tuple[Foam, ...] = FOAMS
@@ -196,7 +196,7 @@ class Task:
     strain: float | None = None
     """Relative compression allowed for every foam; None: each foam's own."""
     model: Model | None = None
-    """Model of the sheet's sensitivity; None: the simplest within ``tolerance``."""
+    """Model of sensitivity; None: the simplest within ``tolerance``."""
     contact: str = "point"
     """``patch``: the sheet must feel the impact's own contact; ``point``: anything."""
     tolerance: float = TOLERANCE
@@ -346,6 +346,6 @@ FIRST_DESIGN = Task(
     foams=(find("paper"),),
     brake_nm=3.0,
 )
-"""The first design of the paper's Section IV, on the foam that was found."""
+"""The first design of the paper's Section IV."""
 WORST_M = 5e-3 * math.sqrt(2)
 """The farthest place from a switch on the paper's sheet."""

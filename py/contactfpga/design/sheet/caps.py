@@ -1,7 +1,6 @@
 """The cap layer of a sheet: a printed cap on each switch, as one STL file.
 
-A cap is a square plate with a square plunger, which stands on the switch. Foam glued to the plates carries the separate
-caps onto the switches together.
+A cap is a square plate with a square plunger on the switch. Foam glued to the plates holds the separate caps together.
 """
 
 from __future__ import annotations
@@ -14,13 +13,12 @@ from contactfpga.design.sheet.parts import SheetError, SwitchPart
 from contactfpga.skin import Skin
 
 PLATE_MM = 1.2
-"""Thickness of a cap's plate."""
 GAP_MM = 0.6
 """Default gap between caps."""
 LEAST_GAP_MM = 0.3
-"""Least gap between caps for a printer with lines of 0.4 mm."""
+"""Least gap for a printer with lines of 0.4 mm."""
 BELOW_MM = 0.3
-"""Gap below the plate at a fully pressed switch, the allowance for tilt."""
+"""Gap below the plate at a fully pressed switch, for tilt."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,15 +29,14 @@ class Caps:
     """(caps, 2): x and y of each cap, y down."""
     side_mm: float
     plunger_mm: float
-    """Side of the plunger."""
     plunger_height_mm: float
     gap_mm: float
     """The smaller gap between neighbors."""
     below_mm: float = BELOW_MM
 
     def triangles(self) -> np.ndarray:
-        """(triangles, 3 corners, 3) in mm: x, y up, and z from the plungers' feet. Each cap is a closed body with
-        outward normals."""
+        """(triangles, 3 corners, 3) in mm: x, y up, and z from the plungers' feet; caps are closed bodies with outward
+        normals."""
         one = _cap(self.side_mm / 2, self.plunger_mm / 2, self.plunger_height_mm)
         moved = np.column_stack([self.centers[:, 0], -self.centers[:, 1], np.zeros(len(self.centers))])
         return np.asarray(one[None] + moved[:, None, None]).reshape(-1, 3, 3)
@@ -56,8 +53,8 @@ class Caps:
 
 
 def caps(skin: Skin, switch: SwitchPart, side_mm: float | None = None) -> Caps:
-    """The caps of a Skin; a ``side_mm`` of None leaves :data:`GAP_MM` between them. Raises :class:`SheetError` if caps
-    would touch or are smaller than their plungers."""
+    """The caps of a Skin, :data:`GAP_MM` apart for a ``side_mm`` of None. Raises :class:`SheetError` if caps would
+    touch or are smaller than their plungers."""
     pitch = min(skin.pitch_x_mm, skin.pitch_y_mm)
     side = pitch - GAP_MM if side_mm is None else side_mm
     gap = pitch - side
@@ -101,7 +98,6 @@ def _ends(square: np.ndarray) -> list[list[np.ndarray]]:
 
 
 def _band(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """Triangles between two squares, facing outward or down."""
     found = []
     for k in range(4):
         a, b, c, d = low[k], low[(k + 1) % 4], high[(k + 1) % 4], high[k]

@@ -1,8 +1,8 @@
 """Channel routing: joins pins above a strip of the board with pins below it.
 
-Each net has a level across the strip by the left-edge rule (Hashimoto and Stevens, 1971). Levels are on the top side; a
-track on the back leads from each pin to its level. Pins below are on whole steps of a :class:`Grid` and pins above half
-a step aside, so no two of these tracks meet.
+Each net has a level on the top side by the left-edge rule (Hashimoto and Stevens, 1971); a track on the back leads from
+each pin to its level. Pins below are on whole steps of a :class:`Grid` and pins above half a step aside, so no two of
+these tracks meet.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Grid:
 
 
 def levels(pins: Iterable[Pin]) -> dict[str, int]:
-    """The level of each net with two or more pins, 0 at the bottom; nets on one level do not overlap."""
+    """Level of each net with two or more pins, 0 at the bottom; nets on one level do not overlap."""
     ends: dict[str, tuple[float, float, int]] = {}
     for pin in pins:
         low, high, count = ends.get(pin.net, (math.inf, -math.inf, 0))

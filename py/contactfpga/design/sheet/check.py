@@ -32,8 +32,8 @@ def there() -> bool:
 
 
 def findings(board: Path) -> list[str]:
-    """KiCad's findings for a .kicad_pcb file: broken rules and unconnected pads. Raises :class:`MissingTool` without
-    KiCad and :class:`SheetError` for an unreadable file."""
+    """KiCad's findings for a .kicad_pcb file. Raises :class:`MissingTool` without KiCad and :class:`SheetError` for an
+    unreadable file."""
     if not there():
         raise MissingTool("--kicad", "KiCad 6 (its module pcbnew)", "apt install --no-install-recommends kicad")
     with tempfile.TemporaryDirectory() as folder:

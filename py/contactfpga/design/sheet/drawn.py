@@ -1,6 +1,6 @@
 """The items of a board, for any file format: parts, tracks, vias, holes, print.
 
-Lengths are in mm seen from the top side, x to the right and y down; cell (row 0, column 0) is at (0, 0).
+Lengths are in mm seen from the top side, y down; cell (row 0, column 0) is at (0, 0).
 """
 
 from __future__ import annotations
@@ -13,25 +13,20 @@ from typing import Literal
 from contactfpga.design.sheet.parts import Pad, Part
 
 Layer = Literal["F", "B"]
-"""Copper layer: top side or back."""
 
 TRACK_MM = 0.2
 POWER_MM = 0.5
-"""Width of long power tracks."""
 CLEARANCE_MM = 0.2
-"""Clearance between two nets."""
 VIA_MM = 0.6
 VIA_DRILL_MM = 0.3
 EDGE_MM = 0.3
 """Clearance between copper and the board's edge."""
 PRINT_MM = 0.12
-"""Width of a printed line."""
 MASK_MM = 0.05
-"""Growth of a solder mask opening over its pad, on each side."""
+"""Growth of a solder mask opening over its pad on each side."""
 
 BOARDS = {"plane": (1.6, 1.53, 4.4), "cylinder": (0.2, 0.1, 3.4)}
-"""Board thickness and distance of copper layers in mm, and permittivity: FR-4 for a plane, polyimide flex for a
-cylinder."""
+"""Board thickness and distance of copper layers in mm, and permittivity: of FR-4, or of a polyimide flex."""
 
 GND = "GND"
 SUPPLY = "3V3"
@@ -53,7 +48,7 @@ class PlacedPart:
     x: float
     y: float
     turn: int
-    """Rotation in degrees counterclockwise, in quarters, after mirroring for the back."""
+    """Rotation in degrees counterclockwise after mirroring for the back, in quarters."""
     back: bool
     nets: dict[str, str]
     """Net of each connected pad, by number."""
@@ -164,7 +159,7 @@ class Drawing:
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
     def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
-        """Print a number on the top side in seven-segment strokes, centered at (x, y); without ``upright`` it reads
+        """Print a number in seven-segment strokes on the top side, centered at (x, y); without ``upright`` it reads
         upward."""
         digits = str(value)
         step, tall = 0.8 * height, height / 2
@@ -192,4 +187,4 @@ _SEGMENTS = {
         strict=True,
     )
 }
-"""Ends of the lit segments of each digit; corners 0 and 1 are at the top, 2 and 3 in the middle, 4 and 5 below."""
+"""Ends of the lit segments of each digit: corners 0 and 1 at the top, 2 and 3 in the middle, 4 and 5 below."""

@@ -1,16 +1,15 @@
 """The circuit of a layout's lines: resistance from their copper, capacitance from neighbors and crossings.
 
-Each formula is for copper of no thickness on or in one dielectric, so capacitances are good to some ten percent:
+Formulas are for copper of no thickness on or in one dielectric, good to some ten percent:
 
 - a track that crosses another at right angles: eps w1' w2' / h, with w' the width of the plate that has a track's
   capacitance per length over a plane (Hammerstad and Jensen, Accurate models for microstrip computer-aided design,
   IEEE MTT-S 1980, pp. 407-409);
 - two adjacent tracks: 2 eps0 e K(k')/K(k), k^2 = s (s + w1 + w2) / ((s + w1)(s + w2)), with K the complete elliptic
   integral and e the mean of board and air (Wadell, Transmission Line Design Handbook, 1991, section 3.4);
-- resistance: sheet resistance of copper times length over width; a line's branches are solved as a network.
+- resistance: that of copper; a line's branches are solved as a network.
 
-The circuit model adds diode charge at each pressed switch. An open switch has its contacts' capacitance in series with
-its diode's.
+The circuit model adds diode charge. An open switch has its contacts' capacitance in series with its diode's.
 """
 
 from __future__ import annotations
@@ -28,9 +27,8 @@ from contactfpga.skin import Skin
 
 EPS0_PF_MM = 8.8541878e-3
 SHEET_OHM = 4.9e-4
-"""Sheet resistance of 35 um copper at 20 degrees Celsius: 1.72e-8 ohm m over 35 um."""
+"""Sheet resistance of 35 um copper at 20 degrees Celsius."""
 VIA_SIEMENS = 1e3
-"""Conductance of a via of 1 mohm."""
 PIN_PF = 10.0
 """Capacitance of a pin of an FPGA, a 74HC595 or a 74HC165 with its pads."""
 CABLE_PF_M = 50.0
@@ -49,7 +47,7 @@ class Extracted:
     crossing_pf: tuple[float, float]
     """Lowest and highest capacitance of a row to a column; the circuit has the mean."""
     row_neighbor_pf: float
-    """Capacitance of a row to the next; the circuit has the larger of this and the columns'."""
+    """Capacitance of a row to the next; the circuit has the larger of rows' and columns'."""
     column_neighbor_pf: float
 
 
@@ -136,8 +134,7 @@ def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
 
 
 def _past_pf(skin: Skin, switch: SwitchPart, track: float | None, eps: float) -> float:
-    """Capacitance in pF per cell height of a column to ``track`` midway between columns, or to the next column. Beside
-    switches a column has their width."""
+    """Capacitance in pF per cell height of a column to ``track`` midway between columns, or to the next column."""
     found, wide = 0.0, 2 * switch.half_width
     for width, length in ((wide, min(wide, skin.pitch_y_mm)), (TRACK_MM, max(0.0, skin.pitch_y_mm - wide))):
         gap = skin.pitch_x_mm - width if track is None else (skin.pitch_x_mm - width - track) / 2
@@ -150,7 +147,6 @@ def _fanned_mm(drawing: Drawing, net: str) -> float:
 
 
 def _line_ohms(layout: Layout, kind: str) -> list[float]:
-    """Resistance of each line of a kind from where it leaves the matrix to its most resistive point."""
     return [_ohms(layout.drawing, line.net, line.x) for line in layout.lines if line.kind == kind and line.used]
 
 

@@ -19,7 +19,6 @@ from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
 
 NAME = "sheet"
-"""Base name of the files."""
 
 
 def write(folder: Path, layout: Layout, caps: Caps, skin_file: str) -> list[str]:
@@ -59,8 +58,8 @@ def parts_list(layout: Layout) -> str:
 
 
 def placement_list(layout: Layout) -> str:
-    """The placement list as CSV: x to the right and y up in mm from cell (row 0, column 0), and rotation
-    counterclockwise, both seen from the top side."""
+    """The placement list as CSV: x and y up in mm from cell (row 0, column 0), and rotation counterclockwise, seen from
+    the top side."""
     rows = [
         (
             one.reference,
@@ -94,8 +93,7 @@ def circuit_table(circuit: Circuit) -> str:
 
 
 def completed(text: str, circuit: Circuit) -> str:
-    """A Skin's file with this circuit in place of its own. Raises :class:`SheetError` if ``circuit`` is no table with a
-    header."""
+    """A Skin's file with its circuit replaced. Raises :class:`SheetError` if ``circuit`` is no table with a header."""
     kept, inside = [], False
     for line in text.splitlines():
         if re.match(r"\s*\[", line):

@@ -1,7 +1,7 @@
 """A layout for a board house: Gerber layers, drill files, and the netlist for its electrical test.
 
-The formats are Gerber X2 (Ucamco, The Gerber Layer Format Specification, 2021), Excellon in millimeters, and
-IPC-D-356A; y points up, and (0, 0) is cell (row 0, column 0).
+The formats are Gerber X2 (Ucamco, 2021), Excellon in millimeters, and IPC-D-356A; y points up, and (0, 0) is cell (row
+0, column 0).
 """
 
 from __future__ import annotations
@@ -49,8 +49,6 @@ def on_layer(pad: Pad, one: PlacedPart, layer: Layer) -> bool:
 
 
 class _Plot:
-    """One Gerber file: its apertures and their drawings."""
-
     def __init__(self, function: str, negative: bool = False):
         self.head = [
             "%TF.GenerationSoftware,contactfpga,sheet*%",
@@ -122,7 +120,6 @@ def _at(x: float, y: float, code: int) -> str:
 
 
 def _plated(drawing: Drawing) -> list[tuple[float, float, float]]:
-    """Diameter and place of each plated hole."""
     holes = [(VIA_DRILL_MM, via.x, via.y) for via in drawing.vias]
     for one in drawing.placed:
         holes += [(pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill]
@@ -141,7 +138,7 @@ def _drill(holes: list[tuple[float, float, float]], function: str) -> str:
 
 
 def _ipc(drawing: Drawing) -> Iterator[str]:
-    """IPC-D-356A records of 80 columns for each pad and via, in units of 1 um."""
+    """IPC-D-356A records of 80 columns, in units of 1 um."""
     yield "C  contactfpga"
     yield "P  JOB   contactfpga"
     yield "P  UNITS CUST 1"

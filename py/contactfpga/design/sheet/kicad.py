@@ -1,6 +1,6 @@
 """A layout as a board of KiCad 6, with its project and netlist.
 
-The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). Each item's UUID is a hash of its
+The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). Items' UUIDs are hashes of their
 content, so the same sheet gives the same files.
 """
 
@@ -27,7 +27,6 @@ from contactfpga.design.sheet.drawn import (
 SPACE = uuid.UUID("6f3b7d5e-8f0c-5b0e-9b2a-2f6f6a2d7c11")
 """Namespace of the items' UUIDs."""
 PAGE_MM = 30.0
-"""Offset of the board from the page's corner."""
 
 _LAYERS = (
     (0, "F.Cu", "signal"),

@@ -1,9 +1,8 @@
 """The layout of a sheet: the matrix of a Skin on two copper layers, with its strip and outline.
 
 Columns run along y on the top side through the switches; rows run along x on the back under the diodes. All lines leave
-at the edge above row 0, so a sheet around a closed cylinder needs nothing at its seam. A row descends between two
-columns on the top side, then runs on the back past its switches. The guard lines are at the far ends: at the last
-column for rows, at the last row for columns.
+above row 0, so a sheet around a closed cylinder needs nothing at its seam: a row descends between two columns on the
+top side. Guard lines are at the far ends, the last column and the last row.
 """
 
 from __future__ import annotations
@@ -23,9 +22,8 @@ FITTED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5_600.0
 """Resistors for a Skin's file without a circuit (docs/maker.md)."""
 
 MARGIN_MM = 7.0
-"""Board beyond the parts, with the mounting holes."""
+"""Board beyond the parts, for the mounting holes."""
 HOLE_MM = 3.2
-"""Diameter of a hole for M3."""
 
 _DIODE_AT = -0.2, 0.5
 """Middle of a cell's diode; its pads are 1.1 mm to the left and right."""
@@ -34,11 +32,8 @@ _FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
 """Offset of the track that brings a row to its first switch, with room for a via."""
 _ROW_START = -2.0
 _CELL_HEIGHT = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - DIODE_VIA[1] + VIA_MM / 2
-"""Height of a cell's parts on the back."""
 _GUARD_ROW_Y = 4.2
-"""Distance from the last row to the guard row."""
 _GUARD_DIODE_X = -0.35
-"""Distance from the guard column to its diodes."""
 _GUARD_EDGE = 0.7
 """Distance from the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
 
@@ -57,7 +52,7 @@ class Layout:
 
 
 def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
-    """Lay out the sheet of a Skin with the switch ``part`` and ``margin_mm`` of board beyond its parts. Raises
+    """Lay out the sheet of a Skin with the switch ``part`` and ``margin_mm`` beyond its parts. Raises
     :class:`SheetError` for cells finer than their parts and for lines without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
@@ -96,8 +91,6 @@ def _check(skin: Skin, switch: SwitchPart) -> None:
 
 
 class _Matrix:
-    """The cells and lines of a Skin, and where its rows descend."""
-
     def __init__(self, skin: Skin, switch: SwitchPart):
         self.skin, self.switch = skin, switch
         self.px, self.py = skin.pitch_x_mm, skin.pitch_y_mm
@@ -118,7 +111,7 @@ class _Matrix:
         return f"COL{column}" if column < self.skin.columns else "COL_GUARD"
 
     def _risers(self) -> list[float]:
-        """x of each descending row, from left to right: between columns, on a plane also left of them."""
+        """x of each descending row: between columns, on a plane also left of them."""
         skin, gaps = self.skin, self.skin.columns - 1
         width = self.px - 2 * self.switch.half_width - VIA_MM - 2 * CLEARANCE_MM
         most = min(math.floor(self.px / PLACE_MM + 1e-9) - 1, math.floor(width / PLACE_MM + 1e-9) + 1) if gaps else 0
@@ -149,7 +142,6 @@ class _Matrix:
         return sorted(found, key=lambda line: line.x)
 
     def _ends(self, row: int) -> list[float]:
-        """x of the items on a row, from its start on."""
         found = [column for column in range(self.skin.columns) if (row, column) not in self.masked]
         ends = [column * self.px + _DIODE_AT[0] + 1.1 for column in found]
         return [*ends, self.guard_x + _GUARD_DIODE_X] if self.skin.guard and row < self.skin.rows else ends
@@ -193,7 +185,6 @@ class _Matrix:
         self._to_row(drawing, x, y, node, self.row_net(row))
 
     def _to_row(self, drawing: Drawing, x: float, y: float, node: str, row: str) -> None:
-        """Draw from the via of a cell through its diode to its row."""
         via = x + DIODE_VIA[0], y + DIODE_VIA[1]
         right = x + _DIODE_AT[0] + 1.1
         drawing.via(node, *via)

@@ -1,6 +1,6 @@
 """The parts of a sheet and their copper: pads, body, and article.
 
-Lengths are in mm. A part is seen on its own side of the board, x to the right and y down.
+A part is seen on its own side of the board, in mm, x to the right and y down.
 """
 
 from __future__ import annotations
@@ -37,7 +37,6 @@ class Part:
     name: str
     """Footprint, such as ``R_0603``."""
     order: str
-    """Article to order."""
     pads: tuple[Pad, ...]
     width: float
     """Width of the area without other parts."""
@@ -52,8 +51,8 @@ class Part:
 class SwitchPart:
     """A switch of the matrix, with the top-side copper between its pads.
 
-    The column enters at (0, -reach) and leaves at (0, reach). Pads numbered 1 belong to the column, pads numbered 2 to
-    the diode, whose via is at :data:`DIODE_VIA`.
+    The column enters at (0, -reach) and leaves at (0, reach). Pads 1 belong to the column, pads 2 to the diode, whose
+    via is at :data:`DIODE_VIA`.
     """
 
     part: Part
@@ -65,7 +64,7 @@ class SwitchPart:
     closed_by: float
     """Side or diameter of the plunger."""
     column: tuple[tuple[float, float, float, float], ...]
-    """Tracks (x, y, x, y) from one end of the column to the other, with common ends."""
+    """Tracks (x, y, x, y) from one end of the column to the other."""
     diode: tuple[tuple[float, float, float, float], ...]
     """Tracks from pads numbered 2 to the via of the diode."""
     tail: int
@@ -74,7 +73,6 @@ class SwitchPart:
     half_width: float
     """Extent of the cell's copper to either side of its middle."""
     open_pf: float
-    """Capacitance of the open contacts."""
 
 
 DIODE_VIA = 0.0, -0.6
@@ -170,12 +168,10 @@ HC595 = _soic16("74HC595, SOIC-16")
 HC165 = _soic16("74HC165, SOIC-16")
 
 HEADER_PINS = 10, 14, 16, 20, 26, 34, 40
-"""Pin counts of available shrouded headers."""
 
 
 def header(pins: int) -> Part:
-    """A shrouded header of two rows, 2.54 mm apart, for a ribbon cable; odd pins are below, even pins above, from the
-    left."""
+    """A shrouded header of two rows, 2.54 mm apart; odd pins are below, even pins above, from the left."""
     first = -(pins // 2 - 1) * 1.27
     places = [(first + k // 2 * 2.54, 1.27 - k % 2 * 2.54) for k in range(pins)]
     pads = (Pad(str(k + 1), x, y, 1.7, 1.7, round=True, drill=1.0) for k, (x, y) in enumerate(places))

@@ -1,7 +1,7 @@
 """The strip that leads a sheet's lines to the board: series resistors, pulls, shift registers, connectors.
 
-From the matrix up: a place of :data:`PLACE_MM` for each line with its two resistors, a channel of tracks, any shift
-registers with a second channel, and the connectors. All parts are on the back.
+From the matrix up: a place of :data:`PLACE_MM` for each line, a channel of tracks, any shift registers with a second
+channel, and the connectors. All parts are on the back.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _PAD = RESISTOR.pads[0].height / 2
 LINES_A_GROUND = 4
 """Number of neighboring cable wires that share a ground."""
 ENABLE_OHM = 10_000
-"""Resistor that disables the outputs of the 74HC595 while the FPGA is configured (docs/boards.md)."""
+"""Resistor that disables the 74HC595 while the FPGA is configured (docs/boards.md)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,8 +132,7 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
 
 
 def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    """Connectors for rows and columns. With two channels (``below``), parts above the upper are on the lower one's
-    grid."""
+    """Connectors for rows and columns; ``below`` puts them on the grid of pins below."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -153,7 +152,7 @@ def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Uni
 
 
 def _with_grounds(ports: Sequence[str]) -> list[str]:
-    """Nets of a connector's pins: the ports in order, the last on the last pin, and grounds between them."""
+    """Nets of a connector's pins: the ports in order, with grounds between them."""
     nets = [*ports[:1]]
     for index, name in enumerate(ports[1:], 1):
         nets += [GND] * (index % LINES_A_GROUND == 0) + [name]
@@ -168,7 +167,6 @@ CHIP_STEPS = 15
 
 
 def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
-    """Shift registers with capacitors and enable resistor; an empty list for a Skin without."""
     nets = list(_chip_nets(skin))
     if not nets:
         return []
@@ -233,7 +231,6 @@ def _registers(
 
 
 def _slots(passing: set[str], pins: Sequence[Pin], chips: Sequence[_Unit]) -> dict[str, float]:
-    """Where each net passes the chips: the free place nearest to its pins below."""
     firsts = [unit.x - 3.5 * GRID_MM for unit in chips if unit.letter == "U"]
     free = [first + step * GRID_MM for first in firsts for step in SLOTS]
     beyond = itertools.count(round((max(firsts) - firsts[0]) / GRID_MM) + CHIP_STEPS + 1)

@@ -70,8 +70,8 @@ class Body:
         return cls(_by_name([plan.read(one, folder) for one in tables], kinematics), kinematics, urdf)
 
     def open(self, joints: Joints | None = None, *, timeout: float = 1.0, period_s: float = 0.002) -> OpenBody:
-        """Open every link's board, each in its own thread, and return when each was tried once. A board that does not
-        answer is retried.
+        """Open every link's board, each in its own thread, and return when each was tried once; boards that do not
+        answer are retried.
 
         Args:
          joints: a function from a time on the host's clock to the joint angles, such as a :class:`JointHistory`;
@@ -106,7 +106,7 @@ def _by_name(plans: list[Plan], kinematics: Kinematics | None) -> dict[str, Plan
 class OpenBody:
     """Every link's board, read until it is closed: a context manager that iterates snapshots.
 
-    No link's failure raises: it is in the link's state, the others go on, and the link is reopened as soon as possible.
+    A link's failure does not raise: it is in the link's state, and the link is reopened as soon as possible.
     """
 
     def __init__(
@@ -167,8 +167,7 @@ class OpenBody:
         return self._snapshot()
 
     def read(self, timeout: float = 1.0) -> Snapshot:
-        """All links, each with a frame scanned after this call; a link without one within ``timeout`` seconds shows so
-        in its state and age."""
+        """All links, each with a frame scanned after this call, or in its state after ``timeout`` seconds."""
         timeout = checked(timeout)
         self._changes.check_open()
         asked = {name: reader.ask() for name, reader in self._readers.items()}
@@ -184,7 +183,7 @@ class OpenBody:
 
     def next(self, timeout: float = 1.0) -> Snapshot:
         """The newest snapshot in which a link has a newer frame or another state than in the last one returned. Raises
-        :class:`ReadTimeout` if nothing changes for ``timeout`` seconds, for instance when every link is lost."""
+        :class:`ReadTimeout` if nothing changes for ``timeout`` seconds."""
         timeout = checked(timeout)
         with self._changes.condition:
             if not self._changes.wait_for(lambda: self._changes.count > self._given, timeout):
@@ -304,7 +303,7 @@ class SnapshotQueue:
 
 
 class _Changes:
-    """Changes of an open body, for waiting threads; after its end nothing waits."""
+    """Changes of an open body, for waiting threads."""
 
     def __init__(self) -> None:
         self.condition = threading.Condition()
@@ -314,7 +313,7 @@ class _Changes:
         self._inherited = False
 
     def announce(self, snapshot: Callable[[], Snapshot]) -> None:
-        """Count a change; the snapshot is made only if there is a queue for it."""
+        """Count a change; the snapshot is made only for a queue."""
         with self.condition:
             self.count += 1
             taken = snapshot() if self._queues else None
@@ -324,7 +323,7 @@ class _Changes:
             self.condition.notify_all()
 
     def wait_for(self, happened: Callable[[], object], timeout: float | None = None) -> bool:
-        """Wait until this has happened or the body is closed; False after ``timeout`` seconds."""
+        """Wait until this has happened or the body is closed; False after ``timeout``."""
         with self.condition:
             return bool(self.condition.wait_for(lambda: self.closed.is_set() or happened(), timeout))
 

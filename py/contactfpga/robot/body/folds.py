@@ -1,7 +1,6 @@
 """Cells that the folding cover presses at a joint: learned with nobody near, per joint angle, then marked.
 
-Folds are by cells, as a finger beside a crease makes one zone with it, whose area and barycenter differ little from the
-crease's.
+Folds are by cells, as a finger beside a crease makes one zone with it.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ STEP_RAD = 0.05
 """Resolution of angles."""
 MAX_BYTES = 20_000_000
 MAX_STEPS = 10_000
-"""Most steps of an angle, each with a sheet of cells; a full turn needs 126."""
+"""Most steps of an angle; a full turn needs 126."""
 
 Cells = NDArray[np.bool_]
 
@@ -49,8 +48,8 @@ class Folds:
         return math.floor(angle_rad / self.step_rad)
 
     def share(self, angle_rad: float, zone: Cells) -> float | None:
-        """Share of a zone's cells that the fold presses at this angle; None if nothing was learned there, or the zone
-        has no cells."""
+        """Share of a zone's cells that the fold presses at this angle; None if nothing was learned there, or without
+        cells."""
         # The steps beside it count nothing: with them twice as many fingers that touch a crease pass for it.
         step = self.step_of(angle_rad)
         if not self.frames.get(step) or not zone.any():

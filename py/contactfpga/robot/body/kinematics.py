@@ -116,7 +116,6 @@ class Kinematics:
         return joint.name, factor, offset
 
     def _from_root(self) -> list[Joint]:
-        """All joints, each after its parent's."""
         hanging: dict[str, list[Joint]] = {}
         for joint in self.robot.joints.values():
             hanging.setdefault(joint.parent, []).append(joint)
@@ -149,8 +148,8 @@ class Kinematics:
         return found
 
     def jacobian(self, link: str, point_m: Floats, angles: Mapping[str, float]) -> Floats:
-        """(6, n): motion of a point of the link with each of :attr:`joint_names`: velocity, then the link's angular
-        velocity. Point and motion are in the base frame."""
+        """(6, n): velocity, then the link's angular velocity, of a point of the link with each of :attr:`joint_names`,
+        all in the base frame."""
         found = np.zeros((6, len(self.joint_names)))
         columns = {name: number for number, name in enumerate(self.joint_names)}
         pose = Pose.of()

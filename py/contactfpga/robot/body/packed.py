@@ -16,9 +16,8 @@ from contactfpga.robot.body.state import BodyError
 ROBOT = "robot"
 """Name of the texts in a recording."""
 TOML = "toml"
-"""Name of the robot's table; other texts are named by the place of their file's name in it."""
+"""Name of the robot's table among the texts."""
 FILES = ("skin", "units", "folds", "surface")
-"""Keys of a link's files."""
 
 
 def pack(path: str | Path) -> dict[str, str]:
@@ -49,7 +48,6 @@ def unpack(texts: Mapping[str, str], folder: Path) -> Body:
 
 
 def _files(values: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str, str]]:
-    """Each table and key that names a file, and the name of its text."""
     if "urdf" in values:
         yield values, "urdf", "urdf"
     for number, link in enumerate(values.get("links", ())):

@@ -59,11 +59,10 @@ class Plan:
     silent_s: float
     """Time without a frame from which the link is silent."""
     folds: Folds | None = None
-    """Cells that the folding cover presses."""
     pressed: Pressed | None = None
     """Places under the Skin's cover; None if it knows no force."""
     trust: bool = False
-    """Whether Skin files of the port may name modules, as those of :meth:`contactfpga.robot.body.Body.load`."""
+    """Whether Skin files of the port may name modules."""
 
     @property
     def laid(self) -> Surface:

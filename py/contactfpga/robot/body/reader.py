@@ -36,7 +36,7 @@ def _lock(port: str | None) -> contextlib.AbstractContextManager[None]:
 
 
 class _PortLock:
-    """A lock for searches, which open every free port: meanwhile no other link can open its own, nor search."""
+    """A lock for searches, which open every free port: meanwhile no other link opens its own."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -45,7 +45,7 @@ class _PortLock:
 
     @contextlib.contextmanager
     def shared(self) -> Iterator[None]:
-        """Hold the lock for a link with a port. A waiting search goes first, lest it wait forever."""
+        """Hold the lock for a link with a port; a waiting search goes first."""
         with self._changed:
             self._changed.wait_for(lambda: not self._alone and not self._waiting)
             self._shared += 1
@@ -123,19 +123,17 @@ class LinkMemory:
     """State of a link between events."""
 
     opened: bool = False
-    """Whether a board is open."""
     open_s: float = -math.inf
-    """Time of opening."""
     zones: Zones | None = None
     tracks: Tracks = NO_TRACKS
     frame_s: float = -math.inf
-    """Scan time of the newest frame ever, on the body's clock."""
+    """Scan time of the newest frame ever on the body's clock."""
     came_s: float = -math.inf
-    """Scan time of the newest frame ever, on that board's own clock."""
+    """Scan time of the newest frame ever on its board's clock."""
     down: str = "lost"
-    """Status while no board is open."""
+    """Status without a board."""
     reason: str = "it was not tried yet"
-    """Reason why no board is open."""
+    """Reason for this status."""
 
     def state(self, plan: Plan, now: float, board_s: float | None) -> LinkState:
         """State at a moment; ``board_s`` is the moment on a virtual board's clock, None for others."""
@@ -267,7 +265,6 @@ class LinkReader:
         return 0.0
 
     def _let_pass(self, seconds: float) -> None:
-        """Let simulated time pass, and read all its frames."""
         assert self._board is not None
         until_s = self._board.clock() + seconds
         while (left_s := until_s - self._board.clock()) > 0 and self._asked == self.answered:

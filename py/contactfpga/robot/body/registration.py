@@ -53,7 +53,7 @@ class Registration:
     other_mm: float
     """RMS residual of the other way of mounting."""
     sigma_mm: float
-    """Standard deviation of the sheet's middle, by cell size and number of points."""
+    """Standard deviation of the sheet's middle."""
     sigma_rad: float
     """Standard deviation of the least certain angle."""
     turned_rad: float
@@ -101,7 +101,7 @@ def register(plan: Plan, presses: Sequence[Press]) -> Registration:
 
 
 def _fit(plan: Plan, presses: Sequence[Press], mirrored: bool) -> tuple[Pose, Floats, float]:
-    """Pose, residuals in mm with those of normals as lengths, and lever in mm of the least certain angle."""
+    """Pose, residuals in mm, and lever in mm of the least certain angle."""
     surface = dataclasses.replace(plan, mirrored=mirrored).laid
     places = [_placed(surface, press) for press in presses]
     ours = np.array([place[0] for place in places]) / 1000

@@ -41,13 +41,13 @@ class LinkContact:
     time_sigma_s: float | None
     """Standard deviation of ``host_time_s``; None if unknown."""
     point_m: Vector | None
-    """Place of the contact; None for a zone that goes all the way round a closed sheet, or that has no cells, only in a
-    frame flagged ``mismatch``."""
+    """Place of the contact; None for a zone that goes all the way round a closed sheet, or in a frame flagged
+    ``mismatch``."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
-    """(3, 3) covariance of the point, from the size of a cell along the surface, and in the base frame also from the
-    joints' motion within ``time_sigma_s``. None as ``point_m``, and for unknown angles around the frame's time."""
+    """(3, 3) covariance of the point, from the size of a cell and in the base frame also from the joints' motion within
+    ``time_sigma_s``. None as ``point_m``, and for unknown angles around the frame's time."""
     zone: Zone
     flags: frozenset[str]
     """Flags of the frame."""
@@ -59,14 +59,14 @@ class LinkContact:
     """Id that stays with the contact, unique on this link; None for a zone without a place, or in untracked frames."""
     fold: float | None = None
     """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody
-    touches. None if nothing was learned here, or the angle is unknown."""
+    touches. None if unknown."""
 
     _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
 
     @property
     def interval_n(self) -> tuple[float, float | None] | None:
         """Least and largest push, which contain the push in at least 95 of 100 cases; the second is None if unbounded.
-        None as ``force_n``. Three contacts or more may raise :class:`~contactfpga.MissingExtra` without ``haptics``."""
+        None as ``force_n``. Raises :class:`~contactfpga.MissingExtra` if three contacts or more need ``haptics``."""
         return None if self._felt is None else self._felt.interval_n
 
     def moved(self, pose: Pose, frame: str) -> LinkContact:
@@ -129,7 +129,7 @@ def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContac
 
 
 def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics.Contacts | None:
-    """Forces at the zones of a frame, in the link's frame; None without readings, or if a zone has no place."""
+    """Forces at the zones of a frame; None without readings, or if a zone has no place."""
     if plan.units is None or zones.units is None:
         return None
     touches = []
@@ -148,7 +148,6 @@ def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics
 
 
 def _sharper(pressed: Pressed, zone: Zone, found: haptics.Contact) -> haptics.Touch:
-    """The touch with a place refined by the zone's size and the push."""
     sigma_m = pressed.sigma_m(zone.area_cells, found.normal_n or 0.0)
     return found.touch if sigma_m is None else dataclasses.replace(found.touch, point_sigma_m=sigma_m)
 
@@ -219,8 +218,8 @@ class Snapshot:
         """The contacts on all links, or on these.
 
         Raises :class:`NoLinkData` if one of them is not ok, because no data is never no contact;
-        ``links=snapshot.answering`` takes only the others. In the base frame it raises :class:`NoJoints` if the angles
-        at a frame's time are unknown.
+        ``links=snapshot.answering`` takes only the others. In the base frame it raises :class:`NoJoints` for unknown
+        angles.
 
         Args:
             frame: ``base``, or ``link`` for each in the frame of its own link.
@@ -254,8 +253,8 @@ class Snapshot:
         return [one.less_certain(other, pose) for one in moved]
 
     def jacobian(self, one: LinkContact) -> Floats:
-        """(6, n): motion of the contact's point on its link with each of :attr:`joint_names`, in the base frame:
-        velocity, then the link's angular velocity. Raises :class:`NoJoints`."""
+        """(6, n): velocity, then angular velocity, of the contact's point with each of :attr:`joint_names`, in the base
+        frame. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
         if one.point_m is None:
             raise BodyError(f"a contact on link {shown(one.link)} has no place, so nothing says how it moves")
@@ -284,7 +283,6 @@ class Snapshot:
         return found
 
     def _repr_html_(self) -> str:
-        """Every link's sheet in a notebook, with its state."""
         rows = [[name, str(state)] for name, state in self.links.items()]
         drawn = [(name, state.zones.svg(LINK_PX)) for name, state in self.links.items() if state.zones is not None]
         return notebook.table(["link", "state"], rows, f"At {self.host_time_s:.3f} s") + notebook.beside(drawn)

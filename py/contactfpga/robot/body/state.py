@@ -1,4 +1,4 @@
-"""The state of a link: its newest frame, and whether it is current; and the errors of a body."""
+"""The state of a link: its newest frame, and whether it is current; and a body's errors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class BodyError(ContactFPGAError, ValueError):
 
 
 class NoJoints(ContactFPGAError):
-    """The joint angles at a frame's time are unknown, so its contacts have no place in the base frame."""
+    """Unknown joint angles at a frame's time, so that its contacts have no place in the base frame."""
 
 
 class NoLinkData(NoData):
@@ -35,9 +35,9 @@ class LinkState:
     """The knowledge of a link at one moment."""
 
     zones: Zones | None
-    """The link's newest frame; None unless the link is ok or late, because older frames are not current."""
+    """The link's newest frame; None unless the link is ok or late."""
     age_s: float | None
-    """Time since the link's newest frame ever was scanned, on the body's clock; None without one."""
+    """Time since the link's newest frame ever was scanned; None without one."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
     open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version."""

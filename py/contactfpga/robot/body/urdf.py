@@ -22,13 +22,12 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 20_000_000
 MAX_LINKS = 1000
-"""Most links, and most joints."""
 PACKAGE = "package://"
 
 
 def located(urdf: str, folder: Path) -> Path:
     """The file named in a robot's table: a path relative to ``folder``, or ``package://NAME/PATH`` in an installed
-    Python package. Raises :class:`BodyError`."""
+    package. Raises :class:`BodyError`."""
     if not urdf.startswith(PACKAGE):
         return folder / urdf
     name, _, inside = urdf.removeprefix(PACKAGE).partition("/")

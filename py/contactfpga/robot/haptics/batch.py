@@ -9,7 +9,7 @@ from contactfpga.surfaces.shapes import Floats
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:
-    """(m, 3) centers of pressure of (m, 6) wrenches in N and Nm; NaN for a wrench that does not push."""
+    """(m, 3) centers of pressure of (m, 6) wrenches in N and Nm; NaN without push."""
     fx, fy, fz, mx, my, mz = np.asarray(wrenches, float).T
     with np.errstate(invalid="ignore", divide="ignore"):
         if isinstance(surface, Plane):
@@ -46,7 +46,7 @@ def two(
     """(m, 2, 3) forces and (m, 2, 2) intervals of the pushes at two known points.
 
     ``points`` and outward unit ``normals`` are (m, 2, 3). Unbounded pushes are infinite; NaN stands where friction
-    allows no forces. :func:`contacts` gives details. Intervals exclude the units' noise.
+    allows no forces. Intervals exclude the units' noise.
     """
     wrenches, points, normals = (np.asarray(each, float) for each in (wrenches, points, normals))
     away = points[:, 0] - points[:, 1]

@@ -15,7 +15,7 @@ SEEN = 1e-6
 """Share of the largest load below which a direction counts as not loaded."""
 
 NOISE = 5.0
-"""Least variation of a combination of readings, in multiples of its noise, to count as loaded."""
+"""Variation of a combination of readings that counts as loaded, in multiples of its noise."""
 
 
 PER_UNIT = 10
@@ -27,7 +27,7 @@ class Calibration:
     """Result of known loads."""
 
     cells: LoadCells
-    """Units with the fitted matrix and zeros; with :data:`PER_UNIT` loads a unit, also the noise covariance."""
+    """Units with the fitted matrix and zeros, and from :data:`PER_UNIT` loads a unit on with the noise covariance."""
     rank: int
     """Independent loads; 6 are complete."""
     missing: tuple[str, ...]
@@ -49,7 +49,7 @@ def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
 def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     """The matrix and zeros with which (m, n) readings best give (m, 6) loads, by least squares.
 
-    In undetermined directions the matrix is that of places and axes. Raises :class:`HapticsError` for too few loads.
+    Undetermined directions are those of places and axes. Raises :class:`HapticsError` for too few loads.
     """
     read, known = np.atleast_2d(array("readings", readings)), np.atleast_2d(array("loads", loads))
     count = len(cells.units)
@@ -129,7 +129,7 @@ class DriftWatch:
 
     Args:
      limit_n: deviation that counts as drift; None: four times its noise.
-     over_s: time constant of the average; nothing is reported before it has passed without a touch.
+     over_s: time constant of the average, and time without a touch before any report.
     """
 
     def __init__(self, cells: LoadCells, limit_n: float | None = None, over_s: float = 10.0):

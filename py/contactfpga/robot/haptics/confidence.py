@@ -1,12 +1,12 @@
 """The range of each push under the units' noise.
 
-It covers all forces within friction's cones whose wrench fits the measured one nearly as well as the best: the misfit,
-in squares of noise with uncertain places, may exceed its minimum by 3.84, the 95 % quantile of chi-square with one
-degree of freedom (profile likelihood: Meeker and Escobar, The American Statistician 49, 1995).
+It covers all forces within friction's cones whose misfit, in squares of noise with uncertain places, exceeds its
+minimum by at most 3.84, the 95 % quantile of chi-square with one degree of freedom (profile likelihood: Meeker and
+Escobar, The American Statistician 49, 1995).
 
-If the wrench alone determines a push, and its ends are within the cones, the range is 1.96 standard deviations to
-either side. Else the ends of one or two contacts are found by Newton's method with a logarithmic barrier for each cone
-and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3), those of more by Clarabel
+A push that the wrench alone determines, with both ends within the cones, has 1.96 standard deviations to either side.
+Else Newton's method finds the ends of one or two contacts with a logarithmic barrier for each cone and for the misfit
+(Boyd and Vandenberghe, Convex Optimization, 11.3), and Clarabel those of more
 (:mod:`contactfpga.robot.haptics.system`).
 """
 
@@ -30,25 +30,24 @@ UNBOUNDED = 500.0
 """Push, in multiples of the measured force, that counts as unbounded."""
 
 GAP = 1e-4
-"""Accuracy of an interval's end as a share of the measured force; the end is moved outward by it."""
+"""Accuracy of an interval's end as a share of the measured force."""
 
 LEAST = 1e-4
 """Accuracy of the least misfit, in squares of noise."""
 
 STEEPER = 30.0
-"""Factor between successive barriers."""
 
 CENTERED = 1e-3
-"""Least gain of a step, as a share of the barrier's value, for another step."""
+"""Gain of a step, as a share of the barrier's value, that calls for another."""
 
 STEPS = 80
-"""Most Newton steps per barrier, and halvings of a step; about five are needed."""
+"""Most Newton steps per barrier, and halvings of a step."""
 
 ROUNDING = 1e-13
-"""Regularization of a matrix with unit diagonal against rounding."""
+"""Regularization of a matrix with unit diagonal."""
 
 KNOWN = 1e-9
-"""Share below which a singular value, or the null space's effect on a push, is 0."""
+"""Share below which a singular value, or an effect of the null space, is 0."""
 
 
 class Fit:
@@ -70,8 +69,8 @@ class Fit:
         self.square = self.matrix.T @ self.matrix
         """(n, n): half the second derivative of the misfit."""
         self._cones = np.zeros((len(self.firsts), matrix.shape[1]))
-        """Factors of the squares of x; their sum is above 0 inside a cone: push squared, less the rest squared over
-        friction squared."""
+        """Factors of the squares of x: push squared, less the rest squared over friction squared, is above 0 inside a
+        cone."""
         for cone, first, friction in zip(self._cones, self.firsts, frictions):
             cone[first] = 1.0
             if friction:
@@ -85,7 +84,7 @@ class Fit:
 
     def intervals(self, ends_of: Ends | None = None) -> list[Interval]:
         """Least and largest of each push; None if unbounded. ``ends_of`` finds those that the wrench alone does not
-        determine, by default :func:`ends_of_few`."""
+        determine."""
         found = {first: self._alone(first) for first in self.firsts}
         rest = [first for first, both in found.items() if both is None]
         ends = {first: both for first, both in found.items() if both is not None}
@@ -177,7 +176,7 @@ def ends_of_few(fit: Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float
 
 
 class _Goal:
-    """Objective inside the barrier: half the misfit, or each row of ``goals`` at a misfit below ``most``."""
+    """Half the misfit, or each row of ``goals`` at a misfit below ``most``, with barriers."""
 
     def __init__(self, fit: Fit, goals: Floats | None, most: float | None):
         self.fit, self._goals, self._most = fit, goals, most

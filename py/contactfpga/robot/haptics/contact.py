@@ -121,9 +121,9 @@ class Contact:
         """Least and largest push; the second is None if unbounded. None as ``force_n``.
 
         With the units' noise it contains the push in at least 95 of 100 cases
-        (:mod:`contactfpga.robot.haptics.confidence`), with uncertain places and the freedom of friction. Without noise
-        (:attr:`Wrench.noise` None) it is the range of all forces that friction allows and that exert exactly this
-        wrench. Raises :class:`~contactfpga.MissingExtra` without Clarabel, which three contacts or more may need.
+        (:mod:`contactfpga.robot.haptics.confidence`); without (:attr:`Wrench.noise` None) it is the range of all forces
+        that friction allows and that exert exactly this wrench. Raises :class:`~contactfpga.MissingExtra` without
+        Clarabel, which three contacts or more may need.
         """
         return None if self._intervals is None else self._intervals()[self._number]
 
@@ -158,8 +158,8 @@ class Solution:
     intervals: Callable[[], list[Interval]]
     rank: int
     null_space: list[list[float]]
-    """Changes of the forces that leave the wrench unchanged: x, y and z of each contact in turn, or one push each with
-    known directions."""
+    """Changes of the forces that leave the wrench unchanged: x, y and z of each contact, or one push each with known
+    directions."""
     chi2: float | None
     freedom: int
     """Degrees of freedom of ``chi2``: components of the wrench not used up by the forces."""
@@ -245,8 +245,8 @@ class Contacts(Sequence[Contact]):
 
     @property
     def unfelt(self) -> list[Contact]:
-        """Contacts that only the sheet sees: they may push without force (:attr:`Contact.interval_n`), as two fingers
-        that squeeze the link do."""
+        """Contacts that may push without force (:attr:`Contact.interval_n`), as two fingers that squeeze the link
+        do."""
         return [one for one, (least, _) in zip(self._contacts, self._kept_intervals) if least <= 1e-9]
 
     @overload
@@ -262,7 +262,6 @@ class Contacts(Sequence[Contact]):
         return len(self._contacts)
 
     def _repr_html_(self) -> str:
-        """A table in a notebook; an ambiguous push has its interval."""
         head = ["contact", "x, mm", "y, mm", "z, mm", "push, N", "between, N"]
         rows = [
             [_name(number, one), *(f"{1e3 * each:.2f}" for each in one.point_m), *_push(one)]
@@ -290,7 +289,7 @@ def _push(contact: Contact) -> list[str]:
 
 
 EARLIER_US = 20_000
-"""Device time by which a place must precede the next contact's zone; that contact presses the units before it closes a
+"""Device time by which a place must precede the next contact's zone, which presses the units before it closes a
 switch."""
 
 Key = tuple[int, tuple[float, float, float] | None]
@@ -307,9 +306,9 @@ class AloneWatch:
     """Reads every frame with its readings, and remembers the place of a contact that was alone, for
     :func:`~contactfpga.robot.haptics.felt`.
 
-    With two contacts the units do not show where each is along the line through both, and the barycenter of one to
-    three cells is off by a quarter of the pitch: the largest error of the forces. A single contact's center of pressure
-    is known to less than a millimeter; it remains its place while more contacts come and its zone keeps its cells.
+    With two contacts the units do not show where each is along the line through both, and a barycenter of one to three
+    cells is off by a quarter of the pitch. A single contact's center of pressure is known to less than a millimeter; it
+    remains its place while its zone keeps its cells.
     """
 
     def __init__(self, cells: LoadCells):
@@ -350,8 +349,8 @@ class AloneWatch:
             self._recent.popleft()
 
     def sharpened(self, zones: Zones, touches: Sequence[Touch]) -> list[Touch]:
-        """The touches of a frame's zones with places, in order, each at its single-contact place if that is better
-        known and on its zone."""
+        """The touches of a frame's zones with places, each at its single-contact place if that is better known and on
+        its zone."""
         placed = [zone for zone in zones if zone.point_mm is not None]
         return [self._sharper(zone, touch, zones.sheet.pitch_x_mm) for zone, touch in zip(placed, touches, strict=True)]
 

@@ -37,8 +37,8 @@ def felt(
     """The force at each zone of a frame, from the units' readings at its moment.
 
     None if the readings are not known (yet), or if a zone winds around the sheet (:attr:`Zone.winding
-    <contactfpga.Zone.winding>`), whose push has no known place. Raises :class:`HapticsError` if the cells have no
-    surface, or differ in number from the board's units.
+    <contactfpga.Zone.winding>`). Raises :class:`HapticsError` if the cells have no surface, or differ in number from
+    the board's units.
     """
     if cells.surface is None:
         raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
@@ -57,8 +57,8 @@ class FrameSource(Protocol):
 class WithReadings:
     """The frames of a board in order, each once its ``units`` are known: ``for zones in WithReadings(board)``.
 
-    Each frame is delayed by a sweep or two. A frame whose readings were lost comes without them ``wait_us`` of device
-    time later.
+    Each frame is delayed by a sweep or two; one whose readings were lost comes without them after ``wait_us`` of device
+    time.
     """
 
     def __init__(self, source: FrameSource, wait_us: int = WAIT_US):
@@ -100,9 +100,8 @@ class ClosingWatch:
     """Reads every frame with its readings, and knows the cells and closings of a single contact, for
     :meth:`~contactfpga.robot.haptics.Locator.locate`.
 
-    A switch closed between the scans of its row in two frames; the push at that moment is halfway between theirs. Exact
-    sums show one switch that opened or closed, and two or three that closed if one choice is the most compact; else
-    :attr:`complete` is False until the contact ends. ``report = "cells"`` shows all.
+    Exact sums show one switch that opened or closed, and two or three that closed if one choice is the most compact;
+    else :attr:`complete` is False until the contact ends. ``report = "cells"`` shows all.
     """
 
     def __init__(self, cells: LoadCells):
@@ -116,7 +115,7 @@ class ClosingWatch:
         """Push at the last frame; None without readings or push."""
         self._push_before: float | None = None
         self.complete = False
-        """Whether all of the contact's cells are known; also False before the first frame without a contact."""
+        """Whether all of the contact's cells are known; False before the first frame without a contact."""
 
     @property
     def cells(self) -> list[Cell]:

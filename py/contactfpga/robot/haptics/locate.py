@@ -1,6 +1,6 @@
 """Contact places finer than the pitch, from center of pressure, barycenter, cells and closings, with their uncertainty.
 
-Places are on the sheet laid flat, in m: column 0 at x = 0, row 0 at y = 0.
+Places are in m on the sheet laid flat: column 0 at x = 0, row 0 at y = 0.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from contactfpga.surfaces.shapes import Floats
 from contactfpga.zones.zone import Zones
 
 STEPS, PATCH_STEPS = 512, 240
-"""Table entries for a point, and for a patch, which takes longer."""
+"""Table entries for a point and for a patch, which takes longer."""
 
 LARGEST_N = 1e4
 
@@ -86,7 +86,7 @@ CERTAIN = 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Closing:
-    """A switch that closed, and the push at that instant: the contact is on the circle of that push's reach."""
+    """A switch that closed, and the push at that instant, whose reach is the contact's distance."""
 
     row: int
     column: int
@@ -106,7 +106,6 @@ class Observations:
     center: Place | None
     pitches_m: tuple[float, float]
     lines: tuple[int, int]
-    """Rows and columns of the sheet."""
     reach: Reach
     spread: float
     force_sigma_n: float
@@ -169,7 +168,7 @@ def _one_side(standing: Floats, chance: Floats, misfit: Floats) -> None:
 
 
 HELPS_FROM = 0.8
-"""Reach over pitch above which the set of consistent places is better than the barycenter."""
+"""Reach over pitch from which the set of consistent places is better than the barycenter."""
 
 DISAGREES = 25.0
 """Misfit of contradictory evidence, in squares of noise; chance exceeds it less than once in ten thousand."""
@@ -232,7 +231,7 @@ class Locator:
         return Place(x, center.sheet_m[1] - origin_m[1], posterior.radius_95(spread), spread, "center of pressure")
 
     def _inside(self, center: Center) -> tuple[float, Floats]:
-        """Arc length under the foam and covariance there, on the turn nearest to the sheet."""
+        """Arc length under the foam and its covariance, on the turn nearest to the sheet."""
         assert self._sheet.radius_mm is not None
         assert center.covariance_m2 is not None
         share = 1e-3 * self._sheet.radius_mm / math.hypot(center.point_m[0], center.point_m[1])
@@ -307,7 +306,6 @@ class Locator:
         return _place(found, bool(closings), center is not None)
 
     def _box(self, cells: Sequence[tuple[int, int]], force_n: float, center: Place | None) -> Box:
-        """A box around all places that can press these cells, with margins for uncertainty."""
         far = 1.2 * self._reach.reach_m(1.5 * force_n + 5 * self._sigma) + max(self._pitch_x, self._pitch_y)
         rows, columns = zip(*cells)
         left, right = self._pitch_x * max(columns) - far, self._pitch_x * min(columns) + far
@@ -334,10 +332,8 @@ def _cut(taken: set[int], columns: int) -> int:
 
 
 def closed(before: Zones, after: Zones) -> tuple[int, int] | None:
-    """(row, column) of the one switch that closed between two frames; None after other changes.
-
-    It follows from exact sums: a new cell adds its own area, column and row. Needs ``report = "moments"``.
-    """
+    """(row, column) of the one switch that closed between two frames, by exact sums; None after other changes. Needs
+    ``report = "moments"``."""
     if before.frame.barycenters is not None or after.frame.barycenters is not None:
         raise HapticsError('the board sends barycenters; only `report = "moments"` or "cells" has the exact sums')
     more, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))

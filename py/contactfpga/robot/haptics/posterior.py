@@ -1,7 +1,7 @@
 """Uncertainty of a place.
 
-A contact's place is a probability on a grid that is refined where it is not 0. Barycenter errors, and the gain of the
-set of consistent places, follow from all places of a cell, at which a contact closes the switches within its reach.
+A contact's place is a probability on a grid that is refined where it is not 0. Errors of barycenters and of sets of
+consistent places follow from all places of a cell.
 """
 
 from __future__ import annotations
@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from contactfpga.surfaces.shapes import Floats
 
 SIDE = 36
-"""Points of the grid along each axis."""
 
 LEVELS = 12
 NEGLIGIBLE = 12.0
 """Drop of the logarithm of probability that counts as 0."""
 
 Likelihood = Callable[[Floats, Floats, float], tuple[Floats, Floats]]
-"""From points x, y and their grid distance: logarithm of probability, and misfit of the point in squares of noise."""
+"""From points x, y and their grid distance: logarithm of probability, and misfit in squares of noise."""
 
 Box = tuple[float, float, float, float]
 """Least x, largest x, least y, largest y in m."""
@@ -105,7 +104,6 @@ def radius_95(covariance: Floats) -> float:
 
 
 FINENESS = 256
-"""Places along each side of a cell."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,7 +114,7 @@ class Static:
     barycenter_95: float
     """95 % quantile of the errors."""
     set_rms: float
-    """RMS error of the middle of the set of places that close exactly the same switches."""
+    """RMS error of the middle of the set of places that close the same switches."""
     missed: float
     """Share of contacts that close no switch."""
 
@@ -165,7 +163,7 @@ def _rms(errors: Floats) -> float:
 
 @functools.lru_cache(maxsize=64)
 def worst_95(pitch_x: float, pitch_y: float) -> float:
-    """A bound, in the unit of the pitches, on the 95 % quantile of barycenter errors at every reach."""
+    """A bound on the 95 % quantile of barycenter errors at every reach, in the unit of the pitches."""
     pitch = max(pitch_x, pitch_y)
     found = [static(pitch * share, pitch_x, pitch_y, 64).barycenter_95 for share in (0.5, 0.6, 0.7, 0.71, 0.8, 1.0)]
     return float(np.nanmax(found))

@@ -1,7 +1,7 @@
 """Distance of a zone's barycenter from the pressing body under a known cover, by the number of cells and the push.
 
-The same push closes one switch in the middle of a cell, and several between cells. So a zone's size restricts the place
-within a cell, depending on the push's reach under this cover.
+The same push closes one switch in the middle of a cell, and several between cells, so a zone's size restricts the place
+within a cell.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ RADII_M = (0.005, 0.01, 0.02)
 """R* of pressing balls, equally often: a pencil's end, a fingertip, a thumb."""
 
 SIDE = 6
-"""Places along each side of a quarter cell; the others are symmetric."""
+"""Places along each side of a quarter cell."""
 
 LINES = 9
 """Rows and columns of the computed sheet, pressed in its middle."""

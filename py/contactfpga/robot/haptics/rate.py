@@ -47,7 +47,7 @@ def hexapod(radius_m: float, tilt: float, z_m: float = 0.0) -> LoadCells:
 
 
 def two_rings(radius_m: float, tilt: float, low_m: float, high_m: float) -> LoadCells:
-    """Six units like :func:`hexapod`, those tilted to one side on a ring at ``low_m``, the others at ``high_m``."""
+    """The units of :func:`hexapod`, those tilted to one side on a ring at ``low_m``, the others at ``high_m``."""
     return LoadCells([_unit(radius_m, 60 * i, high_m if i % 2 else low_m, tilt, (-1) ** i) for i in range(6)])
 
 
@@ -98,7 +98,7 @@ class Requirements:
 
     surface: Surface
     size_m: tuple[float, float]
-    """Touched part: z range of a cylinder; width and depth of a plane about z's axis."""
+    """Touched part: z range of a cylinder; width and depth of a plane about z."""
     force_n: float = 30.0
     """Largest push, with friction, anywhere; units are chosen to bear it."""
     friction: float = 0.5
@@ -209,7 +209,6 @@ def rate(needs: Requirements, layout: UnitLayout) -> Rating | None:
 
 
 def _weight(needs: Requirements, sees_friction: bool) -> Floats:
-    """(6, 6): covariance of the bumper's weight."""
     carried = np.concatenate([np.eye(3), skew(needs.middle_m)])
     spread = (needs.mass_kg * needs.acceleration_sigma_m_s2) ** 2 * carried @ carried.T
     if not sees_friction:  # guides take what units along z do not
@@ -249,8 +248,7 @@ def _force_n(noise: Noise, places: list[tuple[Vector, Vector]], sees_friction: b
 
 
 def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
-    """Draw the best arrangement, its smallest detectable force, and all others, by matplotlib. The same input gives the
-    same file."""
+    """Draw the best arrangement, its smallest detectable force, and all others. The same input gives the same file."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):

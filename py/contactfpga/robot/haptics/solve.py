@@ -1,9 +1,8 @@
 """From a wrench and touched places to contacts, by the simplest sufficient model.
 
-One contact has a closed form, two the exact interval of each push: the range of squeezes within friction's cones. Both
-are plain Python, faster than numpy for a few numbers, and correct the wrench to the nearest that contacts at these
-places can exert: a force has no moment about its point, two have none about their line. The correction over its
-variance is chi-square.
+One contact has a closed form, two the range of squeezes within friction's cones. Both are plain Python, faster than
+numpy for a few numbers, and correct the wrench to the nearest that contacts at these places can exert: a force has no
+moment about its point, two have none about their line.
 """
 
 from __future__ import annotations
@@ -136,7 +135,6 @@ NONE: Vector = (0.0, 0.0, 0.0)
 
 
 def _one(wrench: Wrench, touch: Touch) -> Solution:
-    """Force at one contact by generalized least squares, without friction."""
     force, chi2 = _at_point(wrench, touch)
     push = -dot(touch.normal, force)
     sideways = math.sqrt(max(0.0, dot(force, force) - push * push))
@@ -147,10 +145,8 @@ def _one(wrench: Wrench, touch: Touch) -> Solution:
 
 
 def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
-    """Forces at two contacts, determined up to a squeeze along their line, which friction bounds.
-
-    The smallest forces along the surface count, else the smallest squeeze.
-    """
+    """Forces at two contacts, determined up to a squeeze along their line, which friction bounds; the smallest forces
+    along the surface count, else the smallest squeeze."""
     first, second = touches
     (ax, ay, az), (bx, by, bz) = first.point_m, second.point_m
     away = (ax - bx, ay - by, az - bz)
@@ -242,7 +238,7 @@ def _widen(spread: list[list[float]], sigma: float, force: Vector) -> None:
 
 
 def _best_alone(wrench: Wrench, touches: Sequence[Touch], along: Vector) -> Solution:
-    """If two contacts would have to pull: the one that alone fits the wrench better."""
+    """The contact that alone fits the wrench better, if two would have to pull."""
     alone = [_one(wrench, touch) for touch in touches]
     scores = [_misfit(each, touch) for each, touch in zip(alone, touches)]
     best = 0 if scores[0] <= scores[1] else 1

@@ -1,7 +1,7 @@
 """The linear system of one frame: forces at known places, and their wrench, weighted by its noise.
 
-It is solved for any number of contacts by non-negative least squares (scipy, from three on) or in friction's cones
-(Clarabel). Both solvers are loaded on demand.
+It is solved by non-negative least squares (scipy, from three contacts on) or in friction's cones (Clarabel). Both
+solvers are loaded on demand.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class System:
     """A wrench, its points, and the weight of its components.
 
     Without noise a newton counts as much as a newton times the contacts' mean distance from their barycenter, so the
-    answer does not depend on the frame or the unit of length.
+    answer does not depend on frame or unit.
     """
 
     def __init__(self, wrench: Wrench, touches: Sequence[Touch]):
@@ -131,7 +131,7 @@ EDGES = 12
 """Edges of the inscribed pyramid for friction's cone."""
 
 SMALL = 1e-6
-"""Share of the wrench that pushes alone may leave unexplained without known noise."""
+"""Share of the wrench that pushes alone may leave unexplained without noise."""
 
 
 def along_normals(system: System) -> Solution:
@@ -277,7 +277,7 @@ def _rank(system: System, matrix: Floats) -> int:
 
 
 DETERMINED = 1e-9
-"""Effect of the null space on a push, as a share of it, up to which the push counts as known."""
+"""Effect of the null space up to which a push counts as known, as a share of it."""
 
 SMALLEST = 1e-7
 """Weight of the forces' own size against the wrench."""
@@ -391,10 +391,9 @@ def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[i
 
 
 class _Solver:
-    """start + y in all cones, with fixed y = 0.
+    """start + y in all cones, with fixed y = 0; ``near`` is a matrix, its wanted product with y, and the tolerance.
 
-    The problem is so sparse that 64 contacts need no longer each than three; with the null space of ``fixed`` they need
-    50 times as long. ``near`` is a matrix, its wanted product with y, and the tolerance.
+    The problem is so sparse that 64 contacts need no longer each than three.
     """
 
     def __init__(

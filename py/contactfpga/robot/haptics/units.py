@@ -83,8 +83,7 @@ class LoadCells:
          matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
          surface: the bumper's outside.
          sheet_m: position of column 0 and row 0 of the sheet on the surface laid flat.
-         noise_n2: (n, n) covariance of the units' noise, in place of each ``sigma_n``, for units that share a supply
-         or a reference; None: independent.
+         noise_n2: (n, n) covariance of the units' noise, in place of each ``sigma_n``; None: independent.
         """
         if not units:
             raise HapticsError("there is no unit; give at least one")
@@ -117,7 +116,6 @@ class LoadCells:
         self._preload = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in self.units])
 
     def _spread(self) -> Floats:
-        """(6, 6): the units' noise as a covariance of the wrench."""
         per_newton = self.matrix / self._gains
         if self.noise_n2 is not None:
             return np.asarray(per_newton @ self.noise_n2 @ per_newton.T)
@@ -191,8 +189,7 @@ class LoadCells:
 
     @property
     def unseen(self) -> Floats:
-        """(6 - rank, 6): unseen components, by the inner product of each row with a wrench about the link's origin. No
-        unit resists a row as a motion."""
+        """(6 - rank, 6): unseen components, by the inner product of each row with a wrench about the link's origin."""
         vectors, rank, place, length = self._seen
         lost = np.array(vectors[:, rank:])
         lost[3:] /= length
@@ -225,8 +222,8 @@ class LoadCells:
     def rezeroed(self, readings: Floats, zones: int, gravity_m_s2: Vector | None = None) -> LoadCells:
         """A copy with new zeros, from (m, n) readings without touch.
 
-        Raises :class:`HapticsError` if something touches: ``zones`` on the sheet, or readings that vary by more than
-        three times their noise. ``gravity_m_s2`` is in the link's frame; None: as when the last zeros were read.
+        Raises :class:`HapticsError` if ``zones`` are pressed, or readings vary by more than three times their noise.
+        ``gravity_m_s2`` is in the link's frame; None: as when the last zeros were read.
         """
         if zones:
             raise HapticsError(f"{zones} zones are pressed; zeros are read while nothing touches")
@@ -245,8 +242,8 @@ class LoadCells:
     def changed(
         self, zeros: Floats, matrix: Floats | None, noise_n2: Floats | None, gravity_m_s2: Vector | None = None
     ) -> LoadCells:
-        """A copy with zeros (n,) in steps, matrix (6, n) in N and Nm per step or None (not calibrated), and noise
-        covariance (n, n) in N2 or None (independent)."""
+        """A copy with zeros (n,) in steps, matrix (6, n) in N and Nm per step or None, and noise covariance (n, n) in
+        N2 or None."""
         return LoadCells(
             [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, zeros)],
             frame=self.frame,

@@ -181,7 +181,7 @@ class Center:
     force_n: Vector
     """Force on the link."""
     sheet_m: tuple[float, float]
-    """The point on the surface laid flat: x and y of a plane, arc length and z of a cylinder."""
+    """The point on the surface laid flat; x is the arc length of a cylinder, y its z."""
     covariance_m2: Floats | None
     """(2, 2) covariance of ``sheet_m`` from the wrench's noise; None if unknown."""
 

@@ -13,13 +13,11 @@ _MAGIC = _NAME + VERSION
 HEAD_BYTES = _HEAD.size
 
 MOST_BYTES = 1 << 16
-"""Most bytes from a board in one message."""
 MOST_ASKED = 512
-"""Most bytes of one message to a board."""
 BREAK_S = 2.0
-"""Gap after which the number of wraps of frame times in it is unknown."""
+"""Gap after which the number of wraps of frame times is unknown."""
 BEAT_S = 0.25
-"""Longest interval of a publisher's messages, so that a loss is noticed without later data."""
+"""Longest interval of a publisher's messages, which shows losses without later data."""
 QUIET_S = 2 * BEAT_S
 """Time without an accepted message after which contradicting messages may be genuine."""
 
@@ -75,9 +73,8 @@ class Stream:
     """Reassembles the bytes of messages, with a delimiter in each gap, so that no packet mixes two.
 
     Anyone who may write under the key can forge messages. A message that continues the last one is accepted at once.
-    Any other, such as the first and one after a gap, is held until the next message follows it. If it contradicts the
-    last one, nothing may have been accepted for :data:`QUIET_S`, either. So a forged message blocks later ones for at
-    most :data:`QUIET_S` and two beats.
+    Any other is held until the next message follows it; if it contradicts the last one, nothing may have been accepted
+    for :data:`QUIET_S`, either. So a forged message blocks later ones for at most :data:`QUIET_S` and two beats.
     """
 
     def __init__(self, counters: NetCounters):
@@ -128,7 +125,6 @@ class Stream:
         return pieces
 
     def _may_come(self, message: Message, now_s: float) -> bool:
-        """Whether a message may follow the last one without continuing it."""
         last = self._last
         if last is None or message.follows(last) or now_s - self._taken_s >= QUIET_S:
             return True

@@ -24,7 +24,7 @@ FOUND_S = 3.0
 GONE_S = 1.0
 """Silence after which a publisher is gone, whatever its token, which anyone can declare."""
 LATE_S = 0.2
-"""Excess of a wait over its timeout from which this process stood still; that time is no silence of the publisher's."""
+"""Excess of a wait over its timeout from which this process stood still, which is no silence of the publisher's."""
 
 
 class ZenohPort:
@@ -145,7 +145,6 @@ class ZenohPort:
         self._waiting += len(self._pieces[0][0]) - len(following)
 
     def _note(self, sample: zenoh.Sample) -> None:
-        """Handle the beginning or end of a publisher."""
         import zenoh
 
         name = str(sample.key_expr).rpartition("/")[2]

@@ -41,7 +41,7 @@ class BoardPublisher:
     """One board under one key: ``KEY/bytes`` from it, ``KEY/ask`` to it, ``KEY/alive/...`` while this runs.
 
     Bytes are collected for ``batch_s``. On a slow network the publisher waits and lets the port overflow with
-    ``block``, else Zenoh drops messages; readers count both. ``commands`` passes commands as well as requests. Raises
+    ``block``, else Zenoh drops messages. ``commands`` passes commands as well as requests. Raises
     :class:`~contactfpga.ContactFPGAError` if the key is taken.
     """
 

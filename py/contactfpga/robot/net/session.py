@@ -32,11 +32,11 @@ def key_of(name: str, fingerprint: bytes) -> str:
 
 
 def own_endpoint() -> str:
-    """The default endpoint of publishers and ports.
+    """The default endpoint of publishers and ports: a Unix socket in a folder for this user alone, on Windows
+    :data:`LOOPBACK`.
 
-    It is a Unix socket in a folder for this user alone, in ``XDG_RUNTIME_DIR`` or the folder for temporary files; on
-    Windows :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` if another user could open or replace the
-    folder.
+    The folder is in ``XDG_RUNTIME_DIR`` or that for temporary files. Raises :class:`~contactfpga.ContactFPGAError` if
+    another user could open or replace it.
     """
     if sys.platform == "win32":
         return LOOPBACK
@@ -75,7 +75,7 @@ def is_loopback(endpoint: str) -> bool:
 LEASE_MS = 1000
 """Silence after which a peer counts as gone."""
 MOST_RECEIVED = 1 << 20
-"""Approximate largest message that a session accepts: more than any of ours, and little memory."""
+"""Approximate largest message that a session accepts, more than any of ours."""
 CONNECT_MS = 2000
 """Timeout of a connection."""
 
@@ -186,5 +186,4 @@ def _answers(place: str) -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """The message without places in Zenoh's sources."""
     return str(error).split(" at /")[0].strip("[] ") or type(error).__name__

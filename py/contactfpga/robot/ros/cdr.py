@@ -45,7 +45,6 @@ def _puts(name: str) -> tuple[_Put, ...]:
 
 
 def _leaves(name: str, path: _Path) -> list[tuple[_Path, MessageField | None]]:
-    """Fields in order, with those of nested messages in place."""
     found: list[tuple[_Path, MessageField | None]] = []
     for field in message_type(name).fields:
         where = (*path, field.name)

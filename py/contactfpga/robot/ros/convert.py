@@ -141,8 +141,8 @@ def wrench(found: Wrench, head: Message) -> Message:
 
 
 def transform(head: Message, child: str, place_m: Sequence[float], turn_rad: Sequence[float]) -> Message:
-    """A ``tf2_msgs/TFMessage``: pose of a frame in the header's; rotations are about the fixed x, y and z axes in turn,
-    as in a URDF."""
+    """A ``tf2_msgs/TFMessage``: pose of a frame in the header's, with rotations about the fixed x, y and z axes in
+    turn."""
     made = {"translation": vector(place_m), "rotation": quaternion(*turn_rad)}
     return {"transforms": [{"header": head, "child_frame_id": child, "transform": made}]}
 
@@ -217,7 +217,6 @@ NEWTON_M = 0.01
 ARROW_M = 0.03
 
 _EDGE = 16
-"""Segments of each edge of the outline."""
 _GRAY, _BLUE, _ORANGE = (0.5, 0.5, 0.5, 1.0), (0.0, 0.45, 0.7, 0.9), (0.85, 0.37, 0.0, 1.0)
 
 
@@ -241,7 +240,7 @@ def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
 
 def markers(rim: Sequence[Message], found: Sequence[Track], head: Message, forces: Contacts | None = None) -> Message:
     """A ``visualization_msgs/MarkerArray`` for RViz and Foxglove: the rim, and for each contact a ball as large as its
-    zone, its id, and an arrow of the force on the link, or of the inward normal if the force is unknown."""
+    zone, its id, and an arrow of the force on the link, or of the inward normal."""
     shown = [_marker(head, "", 0, ADD, action=DELETE_ALL)]
     shown.append(_marker(head, "sheet", 0, LINE_STRIP, scale=(0.001, 0.0, 0.0), color=_GRAY, points=rim))
     known = forces_of(forces)

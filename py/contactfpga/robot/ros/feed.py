@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from contactfpga.robot.haptics.live import FrameSource
 
 KEPT_S = 1.0
-"""Interval of measuring the difference of the clocks, which drift and may be set."""
+"""Interval of measuring the difference of the clocks, which drift."""
 _TRIES = 5
 
 
@@ -149,7 +149,7 @@ def _array(head: Message, name: str, level: int, text: str, hardware: str, value
 QUEUE = 4096
 """Frames that may wait while others are published."""
 BEHIND_S, BEHIND_HZ = 0.02, 10.0
-"""Waiting time of a frame, and the largest rate above it, so that later frames wait less."""
+"""Waiting time of a frame, and the largest rate above it."""
 EARLY = 0.1
 """Allowed earliness in periods: boards' frame rates are not exact."""
 POLL_S = 0.1
