@@ -15,8 +15,8 @@ _SLOW_US = 100.0
 
 
 def findings(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str, str]:
-    """Problems with pins, clock, baud rate, levels and times by subject, "" for none. Levels and times need a circuit;
-    size and speed are known only after place and route."""
+    """Problems with pins, clock, baud rate, levels and times by subject, "" for none. Levels and times need a
+    circuit."""
     asked: dict[str, Callable[[], None]] = {
         "pins": lambda: board.check_pins(skin),
         "clock": lambda: board.check_clock(skin),
@@ -37,8 +37,8 @@ def _said(ask: Callable[[], None]) -> str:
 
 
 def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str, Any]:
-    """Changes that make a Skin fit its circuit and the board. Raises SkinError if shift registers, the board's clock
-    and baud rate, and longer times do not suffice."""
+    """Changes that make a Skin fit its circuit and the board: shift registers, the board's clock and baud rate, longer
+    times. Raises SkinError if they do not suffice."""
     wrong = findings(board, skin, circuit)
     if wrong.get("levels"):
         raise SkinError(wrong["levels"])

@@ -16,7 +16,7 @@ from contactfpga.skin import Skin
 
 
 class KitError(ContactFPGAError, ValueError):
-    """A missing kit or wrong files; the message names the file and its allowed content."""
+    """A missing kit or wrong files."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Predictions of a kit that a builder can prove wrong: numbers with intervals, each with its command.
 
-They are in the kit's ``predictions.toml``; a changed prediction is a new entry below the old one.
+In ``predictions.toml`` a changed prediction is a new entry below the old one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Values of a sheet's circuit from the times in which its cells read pressed (`contactfpga wire --settle`).
 
-A cell's time is the model's, times a factor of its row and one of its column, which scatter with a median of 1. One
-number of pressed switches in a row determines the capacitance of the lines, two also the resistance of a closed switch.
-VIL and the resistors of pins and lines are those of the given circuit.
+A cell's time is the model's, times a factor of its row and one of its column with a median of 1. One number of pressed
+switches in a row determines the capacitance of the lines, two also the resistance of a closed switch.
 """
 
 from __future__ import annotations
@@ -31,20 +30,20 @@ NEARLY = 0.02
 DRAWS = 20_000
 HARMONICS = 6
 SCATTER = 2.0
-"""Lines count as scattering if their means vary by this many times what their cells explain."""
+"""Ratio of the lines' variance to that of their cells from which lines scatter."""
 MOST_FREEDOM = 1e6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SettleReading:
-    """Time of each cell of a sheet to read pressed, with the same number of pressed switches in all rows."""
+    """Time of each cell to read pressed, with the same number of pressed switches in all rows."""
 
     pressed: int
     """Pressed switches in each row that pull their column, a guard column included."""
     clocks: np.ndarray
     """(rows, columns) least clocks at which a cell reads pressed; 0: unknown."""
     first: int
-    """Earliest sampling clock of the board; a cell with this value may be faster."""
+    """Earliest sampling clock; a cell with this value may be faster."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +57,7 @@ class FittedValue:
 
     @property
     def told(self) -> bool:
-        """Whether the interval is within the limits of a circuit, so that the readings determine the value."""
+        """Whether the readings determine the value, by an interval within a circuit's limits."""
         least, most, _ = LIMITS[self.name]
         return least < self.low and self.high < most
 
@@ -75,8 +74,7 @@ class FittedCircuit:
 
 
 def settle_s(circuit: Circuit, rows: int, columns: int, diodes: str, pressed: int) -> float:
-    """Seconds from selecting a row with ``pressed`` switches until its slowest column reads pressed; infinite if
-    never."""
+    """Seconds from selecting a row until its slowest pressed column reads pressed; infinite if never."""
     network = Network(circuit, np.tile(np.arange(columns) < pressed, (rows, 1)))
     done = phases.passed(phases.settle(network, Levels.of(circuit, diodes)))
     return float(done.phase.arrived(done.trace.seconds, done.trace.volts)[:pressed].max())
@@ -133,7 +131,6 @@ def fit_circuit(
 
 
 def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
-    """Rows and columns with complete cells, without the lines with the most gaps."""
     rows, columns = ([*range(count)] for count in known.shape)
     while rows and columns and not known[np.ix_(rows, columns)].all():
         gaps = ~known[np.ix_(rows, columns)]
@@ -186,8 +183,7 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
-    """Variance of the mean of (rows, columns) cells and its degrees of freedom (Satterthwaite), by two-way analysis of
-    variance."""
+    """Variance of the mean of (rows, columns) cells and its degrees of freedom (Satterthwaite)."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean

@@ -1,7 +1,6 @@
 """A sheet's circuit as equations: charge and current of every line and of every pressed switch's diode.
 
-Volts are those of a sheet whose selected row is low (``diodes = "col2row"``). The other direction is its mirror image:
-levels count from the supply.
+Volts are those of a sheet whose selected row is low (``diodes = "col2row"``); the other direction is its mirror image.
 """
 
 from __future__ import annotations
@@ -111,7 +110,7 @@ def current(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held_back(diode: Diode, volts: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """A Newton guess limited to the junction voltage of its current, if it is ``wanted`` far up the exponential."""
+    """A Newton guess far up the exponential, limited to the junction voltage of its current."""
     step, knee = diode.emission * THERMAL_V, knee_v(diode)
     far = (wanted > knee) & (np.abs(wanted - volts) > 2 * step)
     if not far.any():

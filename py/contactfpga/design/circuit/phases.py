@@ -55,7 +55,7 @@ class Phase:
         return np.asarray((volts > self.most) | (volts < self.least))
 
     def arrived(self, seconds: np.ndarray, volts: np.ndarray) -> np.ndarray:
-        """(lines,) time from which each line is within its limits for good, 0 if always; infinite if not at the end."""
+        """(lines,) time from which each line stays within its limits, 0 if always, infinite if not at the end."""
         bad = self.bad(volts)
         found = np.zeros(volts.shape[1])
         found[bad[-1]] = math.inf
@@ -76,7 +76,7 @@ class PhaseResult:
 
     @property
     def seconds(self) -> float:
-        """Time from the last change of drive until all lines are within their limits; infinite if never."""
+        """Time from the last change of drive until all lines stay within their limits; infinite if never."""
         return float(self.phase.arrived(self.trace.seconds, self.trace.volts).max())
 
 
@@ -127,7 +127,7 @@ def _rows(network: Network, row: int | None = None) -> np.ndarray:
 
 
 def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
-    """A row is selected, with columns undriven and all lines released: pressed columns must be low, others high."""
+    """A row is selected with columns undriven: pressed columns must be low, others high."""
     row = middle(network.rows) if row is None else row
     supply, columns = network.circuit.supply_v, network.columns
     most, least = _any(network)
@@ -138,8 +138,7 @@ def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
 
 
 def pulled_release(network: Network, levels: Levels, dip_v: float = 0.0) -> Phase:
-    """A selected row is released, and resistors pull its columns back: they must be high, also when the next row lowers
-    them by ``dip_v``."""
+    """A selected row is released, and resistors pull its columns back: they must be high, also ``dip_v`` lower."""
     most, least = _any(network)
     least[: network.columns] = min(levels.high + dip_v, FULL * network.circuit.supply_v)
     selected = Drive.of(OFF, _rows(network, middle(network.rows)), network)
@@ -169,8 +168,7 @@ def precharge(network: Network, gap_s: float) -> Phase:
 def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phase:
     """Columns drive and rows are undriven: touched rows must be high, others low.
 
-    Rows start at the released level; with ``lifted`` all lines start at the other one, and rising columns lift the
-    rows.
+    Rows start at the released level; with ``lifted`` at the other one, and rising columns lift them.
     """
     supply, columns = network.circuit.supply_v, network.columns
     touched = network.pressed.any(axis=1)
@@ -183,7 +181,7 @@ def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phas
 
 
 def project_columns(network: Network, levels: Levels) -> Phase:
-    """Columns are undriven and all rows selected: touched columns must be low, others high."""
+    """All rows are selected with columns undriven: touched columns must be low, others high."""
     supply, columns = network.circuit.supply_v, network.columns
     touched = network.pressed.any(axis=0)
     most, least = _any(network)

@@ -44,7 +44,7 @@ class Worst:
 
 
 def scan(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Worst:
-    """A selected row with all of its columns pressed: its pin carries the current of all pulls."""
+    """A selected row with all columns pressed, whose pin carries the current of all pulls."""
     network = Network(circuit, patterns.named(rows, columns)["one row"])
     levels = Levels.of(circuit, diodes)
     phase = phases.settle(network, levels)
@@ -78,7 +78,7 @@ def shown_v(circuit: Circuit, diodes: str, volts: float) -> float:
 def problems(
     circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", projects: bool = False
 ) -> list[Problem]:
-    """Design errors of a sheet; with ``projects`` also in projections of all rows, as in ``scan = "reversal"``."""
+    """Design errors of a sheet; with ``projects`` also in projections, as in ``scan = "reversal"``."""
     found = _problems(circuit, "column_pull_ohm", lambda one: scan(one, rows, columns, diodes), _SCAN, columns, diodes)
     if projects:
         judge = _problems(
@@ -155,8 +155,7 @@ def check(circuit: Circuit, skin: Skin) -> None:
 
 
 def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
-    """The circuit in a Skin's file; None without a table. Raises CircuitError if pins would carry too much, or levels
-    are too near to VIL or VIH."""
+    """The circuit in a Skin's file; None without a table. Raises CircuitError as :func:`check` does."""
     circuit = load_circuit(path)
     if circuit is not None:
         try:

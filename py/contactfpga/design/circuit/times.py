@@ -41,19 +41,19 @@ class Needs:
     precharge: Time
     """From columns being driven until they are charged."""
     settle: Time
-    """From selecting a row until pressed columns read pressed and all others released."""
+    """From selecting a row until pressed columns read pressed and others released."""
     release: Time
     """From deselecting a row until columns may drive."""
     pulled_release: Time
-    """From deselecting a row until the pulls have lifted the columns, without precharge."""
+    """From deselecting a row until pulls have lifted the columns, without precharge."""
     project: Time
-    """From undriving the rows until touched ones read touched and all others untouched."""
+    """From undriving the rows until touched ones read touched and others untouched."""
     project_columns: Time
-    """From selecting all rows until touched columns read touched and all others untouched."""
+    """From selecting all rows until touched columns read touched and others untouched."""
     pressed: static.Worst
     """A pressed column, and the pin of its row."""
     touched: static.Worst
-    """A touched row in a projection, and the pin of the column that feeds it."""
+    """A touched row in a projection, and the pin of its column."""
     unpressed_v: float
     """Level to which neighbors pull an unpressed column after a precharge."""
     unpressed_margin_v: float
@@ -73,7 +73,6 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
     release, released = sheet.worst(patterns.RELEASE, phases.row_release)
 
     def precharged(network: Network) -> Phase:
-        """Precharge after the gap; a row that is never released counts from its rest."""
         return phases.precharge(network, min(release.seconds, phases.longest_s(network)))
 
     precharge, charged = sheet.worst(patterns.RELEASE, precharged)

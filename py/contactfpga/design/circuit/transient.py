@@ -1,4 +1,4 @@
-"""A network in time, by the implicit method TR-BDF2 with error-controlled steps, and its state at rest."""
+"""A network in time, by the implicit method TR-BDF2 with error control, and its state at rest."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class _Rates:
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
-    """Solution of a symmetric system in two halves, which avoids slow library threads beyond 100 lines."""
+    """Solution of a symmetric system in two halves, to avoid slow library threads beyond 100 lines."""
     side = matrix[:count, count:]
     both = np.linalg.solve(matrix[:count, :count], np.column_stack([side, right[:count]]))
     across, alone = both[:, :-1], both[:, -1]

@@ -14,7 +14,7 @@ from contactfpga.inputs.values import is_finite, shown
 
 
 class CircuitError(ContactFPGAError, ValueError):
-    """An impossible or unworkable circuit; the message names the value and the limit."""
+    """An impossible or unworkable circuit."""
 
 
 def _check_limits(where: str, values: Diode | Circuit) -> None:
@@ -54,7 +54,7 @@ DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
 class Circuit:
     """A sheet with its wires and the board's pins. Raises :class:`CircuitError` for impossible values.
 
-    A line's resistance is between its capacitance and its pin, as if all switches were at the far end.
+    A line's resistance is that to its pin, as if all switches were at the far end.
     """
 
     line_pf: float = field(default=30.0, metadata={"limits": (0.1, 100_000.0, "pF")})
@@ -84,7 +84,7 @@ class Circuit:
     high_v: float = field(default=2.0, metadata={"limits": (0.2, 5.5, "V")})
     """VIH: the lowest level that surely reads high."""
     pin_ma: float = field(default=8.0, metadata={"limits": (0.1, 100.0, "mA")})
-    """Largest permanent pin current: 8 mA is specified for an iCE40's pin at 3.3 V, and for an ECP5's with its usual
+    """Largest permanent pin current; 8 mA is specified for pins of an iCE40 at 3.3 V and of an ECP5 with its usual
     drive strength."""
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from contactfpga.inputs.values import is_finite, shown
 Floats = NDArray[np.float64]
 
 MAX_LENGTH_M = 1.0
-"""Upper limit of a cover's lengths on a robot; whoever writes 5 means mm."""
+"""Upper limit of a cover's lengths on a robot; larger ones are probably in mm."""
 
 
 SMALLEST, LARGEST = 1e-12, 1e12
@@ -25,7 +25,7 @@ TINIEST, HUGEST = 1e-25, 1e25
 
 
 class CoverError(ContactFPGAError, ValueError):
-    """An impossible value of a cover; the message names it and the limit."""
+    """An impossible value of a cover."""
 
 
 @dataclasses.dataclass(frozen=True)

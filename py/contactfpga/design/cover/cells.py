@@ -1,15 +1,13 @@
 """The force on each switch of a sheet, and the closed ones: faces and caps under foam.
 
-A switch takes the part of the stress in the foam (:mod:`contactfpga.design.cover.medium`) on its face or on its *cap*,
-a rigid square plate. The surroundings of *flush* caps carry their own share. *Proud* caps carry all foam, and each
-takes its *tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from tile to tile.
+A switch takes the stress in the foam (:mod:`contactfpga.design.cover.medium`) on its face or on its *cap*, a rigid
+square plate. The surroundings of *flush* caps carry their own share. *Proud* caps carry all foam, and each takes its
+*tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from tile to tile.
 
 A proud cap yields by the switch's travel, and the foam, strips that shear and bend (Timoshenko), loads the neighbors.
 Forces Q on the caps follow from those on rigid caps, T, by (1 + L/k) Q = T: k is the switch's stiffness, L the strips'
-stiffness as a discrete Laplacian.
-
-Simplifications: the pressure on top is independent of the yield; caps do not tilt; foam that sags between proud caps is
-unsupported.
+stiffness as a discrete Laplacian. The pressure on top is independent of the yield; caps do not tilt; foam that sags
+between proud caps is unsupported.
 """
 
 from __future__ import annotations
@@ -116,7 +114,6 @@ class Cells:
         return forces
 
     def _pressure(self, loads: Sequence[Load]) -> Floats:
-        """Force in N on each part of the grid."""
         down, across = self._axes
         found = np.zeros((len(down.places_m), len(across.places_m)))
         for part, force in (share for load in loads for share in load.shares()):
@@ -188,7 +185,6 @@ class _Axis:
         return np.linalg.eigh(np.diag(joined.sum(axis=0)) - joined)
 
     def _taken(self, width_m: float) -> Floats:
-        """(switches, places): the share of each place on a switch's width."""
         away = self.places_m - np.arange(self.count)[:, None] * self.pitch_m
         upper, lower = (np.clip(away + side * self.step_m / 2, -width_m / 2, width_m / 2) for side in (1, -1))
         return np.asarray((upper - lower) / self.step_m)

@@ -1,7 +1,6 @@
 """The algorithm of the paper's Fig. 3: material, thickness, force and pitch under limits, and the binding limit.
 
-Candidates are each foam and the modulus with exactly the required compression time; those that break a limit are part
-of the answer.
+Candidates are each foam and the modulus with exactly the required compression time, also those that break a limit.
 """
 
 from __future__ import annotations
@@ -238,7 +237,7 @@ def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> Fo
 
 
 def _by_energy(task: Task, foam: Foam, ball: Ball, hit: Impact, t0: float | None = None) -> dict[str, float]:
-    """Thickness (8) by each rule: as printed with the link's mass, else with the effective mass at the contact."""
+    """Thickness (8) by each rule, with the link's mass as printed, else with the effective mass at the contact."""
     assert foam.yield_pa is not None
     stored = elastic.resilience(foam.yield_pa, foam.modulus_pa)
     share = min(1.0, (task.latency_s if t0 is None else t0) / hit.time_s)
@@ -277,7 +276,6 @@ def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
 
 
 def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
-    """End of the compression if the torque changes at ``pressed_m``: a braking arm with corrected energy."""
     if pressed_m >= hit.compression_m:
         return hit.compression_m
     braking = dataclasses.replace(task.arm, torque_nm=-task.brake_nm)

@@ -25,8 +25,8 @@ THICKNESS_RULES = {
     "peak_force": _SHARE * 1.3 * (2.5 * _OF_WORK) ** (2 / 3),
     "hertz": _SHARE * 0.75 ** (2 / 3) * (2.5 * _OF_WORK) ** (2 / 3),
 }
-"""The constant in (8): as printed; unrounded (83.7589); with the peak force for the paper's W/delta (154.285); also
-with Hertz's area on R*, 0.8255 pi (F R*/E*)^(2/3), for 1.3 pi (97.969)."""
+"""The constant in (8): as printed; unrounded (83.7589); with the peak force (154.285); also with Hertz's area on R*,
+0.8255 pi (F R*/E*)^(2/3), for 1.3 pi (97.969)."""
 
 
 def effective_modulus_pa(modulus_pa: float, poisson: float, other_pa: float = math.inf, other: float = 0.0) -> float:

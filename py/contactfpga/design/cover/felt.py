@@ -1,7 +1,6 @@
-"""Whether a light finger is felt: the force that closes a first switch, over places anywhere on a sheet.
+"""Whether a light finger, an ellipse with Hertz's pressure, is felt anywhere on a sheet.
 
-A touch is felt from the least ratio of closing force to force share on. The finger is an ellipse of fixed size with
-Hertz's pressure.
+A touch is felt from the least ratio of closing force to force share on.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ LENGTH_M, WIDTH_M = 12e-3, 10e-3
 
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
-"""Drawn sheets, if closing forces have a spread; another sheet lies within their range with a probability of 39/41 (95
-%)."""
+"""Drawn sheets, if closing forces have a spread; another sheet lies within their range with 39/41 (95 %)
+probability."""
 
 LEAST_SHARE = 1e-4
 """Force share that counts as unpressed; a layer's linear solution has ripples far away."""
@@ -81,7 +80,7 @@ class Felt:
     worst_m: tuple[float, float]
     """x and y of the worst place from the first switch."""
     least_share: float
-    """Force share of the most pressed switch at the worst place."""
+    """Force share of the most pressed switch, at the worst place."""
     median_share: float
     """Median force share of the most pressed switch."""
     false_presses: float
@@ -166,8 +165,6 @@ def _touches(part: float) -> str:
 
 
 class _Window:
-    """The part of a sheet around a finger, beyond which switches take no force."""
-
     def __init__(self, cover: Cover, sheet: Sheet, reach_m: float):
         self.sheet = sheet
         beyond = 0.0 if cover.cut else BEYOND * cover.thickness_m

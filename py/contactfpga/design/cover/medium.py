@@ -91,10 +91,8 @@ def first_zero(name: str) -> float | None:
 
 @functools.cache
 def _table(name: str) -> tuple[Floats, Floats]:
-    """g every STEP / FINER and its increment to the next; from FARTHEST on both are 0.
-
-    The slow integral is interpolated between steps by the cubic through values and slopes.
-    """
+    """g every STEP / FINER and its increment to the next, by the cubic through values and slopes; from FARTHEST on both
+    are 0."""
     transfer(name, np.zeros(1))
     values, slopes = _integral(name, np.arange(0, FARTHEST + STEP / 2, STEP))
     part = np.arange(FINER) / FINER
@@ -112,10 +110,7 @@ def _nodes() -> tuple[Floats, Floats]:
 
 
 def _integral(name: str, s: Floats) -> tuple[Floats, Floats]:
-    """(g, dg/ds) at each of (n,) distances.
-
-    J0, which numpy lacks, is the mean of cos(x sin a) by the midpoint rule, which converges exponentially.
-    """
+    """(g, dg/ds) at (n,) distances; J0, which numpy lacks, is the mean of cos(x sin a) by the midpoint rule."""
     t, weights = _nodes()
     weighted = weights * t * transfer(name, t) / (2 * np.pi)
     values = np.array([_at(weighted, t, float(one)) for one in s])

@@ -17,10 +17,8 @@ DEEPEST = 60
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """The root of ``function`` between two places of different sign, to full precision.
-
-    Chandrupatla's method. Raises ValueError if the signs do not differ.
-    """
+    """The root of ``function`` between two places of different sign, to full precision, by Chandrupatla's method.
+    Raises ValueError for equal signs."""
     b, fb = low, function(low)
     a, fa = high, function(high)
     if fa == 0 or fb == 0:
@@ -52,10 +50,8 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def integral(function: Callable[[Floats], Floats], low: float, high: float, tolerance: float = 1e-13) -> float | None:
-    """The integral of a vectorized ``function`` to relative ``tolerance``; None if it diverges.
-
-    Gauss-Legendre with 16 nodes; intervals whose halves disagree are bisected.
-    """
+    """The integral of a vectorized ``function`` to relative ``tolerance``, by Gauss-Legendre and bisection; None if it
+    diverges."""
     whole = gauss(function, low, high)
     if not math.isfinite(whole):
         return None

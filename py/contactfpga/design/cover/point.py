@@ -66,8 +66,8 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
     """Point force that closes a switch at the horizontal distance ``offset_m``, (9) solved for F; (10) has pitch /
     sqrt(2).
 
-    In a layer there is none beyond :func:`contactfpga.design.cover.medium.first_zero`, where the cover is pulled off
-    the switch or presses with less than 0.3 % of the stress on the axis.
+    A layer has none beyond :func:`contactfpga.design.cover.medium.first_zero`, where the cover is pulled off the switch
+    or presses with less than 0.3 % of the stress on the axis.
     """
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")

@@ -39,7 +39,7 @@ BLOCK = 1 << 15
 
 @dataclasses.dataclass(frozen=True)
 class Load:
-    """One contact: its parts, and the force, shared in proportion to their areas."""
+    """One contact: its parts, and the force, shared by area."""
 
     parts: tuple[Part, ...]
     force_n: float
@@ -162,8 +162,7 @@ class Cover:
         return closed
 
     def stress_pa(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Normal stress at these places below the cover, positive in compression, summed over contacts. Raises
-        CoverError for the model ``patch``."""
+        """Normal stress at these places, summed over contacts. Raises CoverError for the model ``patch``."""
         if self.model == "patch":
             raise CoverError(f"the model 'patch' knows no stress; take one of {', '.join(MODELS[1:])}")
         x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))

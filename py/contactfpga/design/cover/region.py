@@ -9,8 +9,8 @@ The foam, F = K_s delta^1.5 (Hertz), is in series with the region's spring, F = 
 
 *Transient*: two free masses without drive, mu = 1/(1/m_arm + 1/m_region): mu v^2/2 = W(F).
 
-*Quasi-static*: the region is clamped on its far side; the arm presses on with u until it reacts, at x_r, then brakes
-with b: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), solved for x_r at the limit's F.
+*Quasi-static*: the arm presses on with u until it reacts, at x_r, then brakes with b: m_arm v^2/2 + u x_r - b (x - x_r)
+= W(F), solved for x_r at the limit's F.
 
 Pressure is the largest under a Hertz patch, 3/2 of its mean: p^3 = 6 F E*^2/(pi^3 R*^2).
 """
@@ -113,11 +113,11 @@ class RegionLimits:
 
     region: Region
     transient_n: float
-    """Largest force in a transient contact: by force, pressure and foam."""
+    """Largest force in a transient contact, by all limits."""
     transient_m_s: float
     """Speed with the transient force."""
     quasistatic_n: float
-    """Largest force on the clamped region: by force, pressure and foam."""
+    """Largest force on the clamped region, by all limits."""
     reaction_s: float
     """Longest time from the touch to the reaction at the requested speed; infinite if the arm stops without one, 0 if
     none is soon enough."""

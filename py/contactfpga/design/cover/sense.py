@@ -1,8 +1,7 @@
 """The smallest force that a sheet under a cover detects, and the pitch it needs, by the simplest adequate model.
 
 A model is a medium (:mod:`contactfpga.design.cover.medium`) and a contact, ``point`` or ``patch`` (a ball's Hertz
-pressure). The reference is the bonded layer, foam glued on a rigid bumper, under the patch of a round object or the
-point force of an unknown one.
+pressure). The reference is the bonded layer, under the patch of a round object or the point force of an unknown one.
 """
 
 from __future__ import annotations

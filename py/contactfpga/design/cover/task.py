@@ -1,8 +1,8 @@
 """The task of a cover, from a TOML file: the arm, the impact, the switch, foams and limits.
 
-Unknown values of a foam are None. Data sheets give the stress at 25 % compression: the modulus is that stress over
-0.25, a secant below the initial slope. A soft foam's Poisson ratio falls under compression: 0.5 at 5 %, about 0 at 66 %
-(doi 10.1016/j.ijengsci.2007.09.002).
+From data sheets with the stress at 25 % compression, the modulus is that stress over 0.25, a secant below the initial
+slope. A soft foam's Poisson ratio falls under compression: 0.5 at 5 %, about 0 at 66 % (doi
+10.1016/j.ijengsci.2007.09.002).
 """
 
 from __future__ import annotations

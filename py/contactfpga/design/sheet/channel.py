@@ -1,8 +1,7 @@
 """Channel routing: joins pins above a strip of the board with pins below it.
 
 Each net has a level on the top side by the left-edge rule (Hashimoto and Stevens, 1971); a track on the back leads from
-each pin to its level. Pins below are on whole steps of a :class:`Grid` and pins above half a step aside, so no two of
-these tracks meet.
+each pin to its level. Pins above are half a :class:`Grid` step aside, so no two of these tracks meet.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class Grid:
 
 
 def levels(pins: Iterable[Pin]) -> dict[str, int]:
-    """Level of each net with two or more pins, 0 at the bottom; nets on one level do not overlap."""
+    """Level of each net with two or more pins, 0 at the bottom."""
     ends: dict[str, tuple[float, float, int]] = {}
     for pin in pins:
         low, high, count = ends.get(pin.net, (math.inf, -math.inf, 0))

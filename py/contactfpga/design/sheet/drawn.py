@@ -113,7 +113,7 @@ class Hole:
 
 
 class Drawing:
-    """A board under construction; its lists keep the order of addition, so the same calls give the same files."""
+    """A board under construction; the same calls give the same files."""
 
     def __init__(self) -> None:
         self.placed: list[PlacedPart] = []
@@ -159,8 +159,7 @@ class Drawing:
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
     def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
-        """Print a number in seven-segment strokes on the top side, centered at (x, y); without ``upright`` it reads
-        upward."""
+        """Print a number on the top side, centered at (x, y); without ``upright`` it reads upward."""
         digits = str(value)
         step, tall = 0.8 * height, height / 2
         corners = {0: (0, -1), 1: (1, -1), 2: (0, 0), 3: (1, 0), 4: (0, 1), 5: (1, 1)}

@@ -114,8 +114,7 @@ def _mean(a: float, b: float) -> float:
 
 
 def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
-    """(rows, columns) in pF: the crossing (two where the row returns to its start), the open switch, and the row's
-    descent between two columns."""
+    """(rows, columns) in pF: crossings, the open switch, and the row's descent between two columns."""
     skin, switch = layout.skin, layout.switch
     wide = 2 * switch.half_width
     once = across_pf(TRACK_MM, wide, h, eps)

@@ -58,8 +58,8 @@ def parts_list(layout: Layout) -> str:
 
 
 def placement_list(layout: Layout) -> str:
-    """The placement list as CSV: x and y up in mm from cell (row 0, column 0), and rotation counterclockwise, seen from
-    the top side."""
+    """The placement list as CSV, in mm from cell (row 0, column 0), y up, and rotation counterclockwise from the top
+    side."""
     rows = [
         (
             one.reference,

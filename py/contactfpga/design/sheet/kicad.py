@@ -1,7 +1,7 @@
 """A layout as a board of KiCad 6, with its project and netlist.
 
-The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). Items' UUIDs are hashes of their
-content, so the same sheet gives the same files.
+The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). UUIDs are hashes, so the same sheet
+gives the same files.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Columns run along y on the top side through the switches; rows run along x on the back under the diodes. All lines leave
 above row 0, so a sheet around a closed cylinder needs nothing at its seam: a row descends between two columns on the
-top side. Guard lines are at the far ends, the last column and the last row.
+top side.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Layout:
 
 
 def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
-    """Lay out the sheet of a Skin with the switch ``part`` and ``margin_mm`` beyond its parts. Raises
-    :class:`SheetError` for cells finer than their parts and for lines without a place around a closed cylinder."""
+    """Lay out the sheet of a Skin with the switch ``part``. Raises :class:`SheetError` for cells finer than their parts
+    and for lines without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
     matrix = _Matrix(skin, switch)
@@ -111,7 +111,6 @@ class _Matrix:
         return f"COL{column}" if column < self.skin.columns else "COL_GUARD"
 
     def _risers(self) -> list[float]:
-        """x of each descending row: between columns, on a plane also left of them."""
         skin, gaps = self.skin, self.skin.columns - 1
         width = self.px - 2 * self.switch.half_width - VIA_MM - 2 * CLEARANCE_MM
         most = min(math.floor(self.px / PLACE_MM + 1e-9) - 1, math.floor(width / PLACE_MM + 1e-9) + 1) if gaps else 0
@@ -197,7 +196,6 @@ class _Matrix:
         drawing.run(row, "B", (right, middle[1]), (right, y + _ROW_Y))
 
     def _diode(self, drawing: Drawing, middle: tuple[float, float], node: str, row: str, turn: int) -> None:
-        """Draw a diode, with ``turn`` its cathode toward the row."""
         low = self.skin.diodes == "col2row"
         nets = {"1": row, "2": node} if low else {"1": node, "2": row}
         drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360)

@@ -14,7 +14,7 @@ from contactfpga.inputs.values import shown
 
 
 class SheetError(ContactFPGAError, ValueError):
-    """A sheet that cannot be made; the message names the value and the limit."""
+    """A sheet that cannot be made."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,8 +51,7 @@ class Part:
 class SwitchPart:
     """A switch of the matrix, with the top-side copper between its pads.
 
-    The column enters at (0, -reach) and leaves at (0, reach). Pads 1 belong to the column, pads 2 to the diode, whose
-    via is at :data:`DIODE_VIA`.
+    The column enters at (0, -reach) and leaves at (0, reach); it has pads 1. Pads 2 belong to the diode.
     """
 
     part: Part

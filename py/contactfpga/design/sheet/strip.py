@@ -1,7 +1,7 @@
 """The strip that leads a sheet's lines to the board: series resistors, pulls, shift registers, connectors.
 
-From the matrix up: a place of :data:`PLACE_MM` for each line, a channel of tracks, any shift registers with a second
-channel, and the connectors. All parts are on the back.
+From the matrix up: a place for each line, a channel of tracks, any shift registers with a second channel, and the
+connectors. All parts are on the back.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
 
 
 def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
-    """A pin of the channel, moved onto the grid, where no two share a place."""
+    """A pin of the channel, moved onto the grid."""
     step = grid.near(x, below=True)
     drawing.run(net, "B", (x, y), (x, y - 0.9), (step, y - 0.9))
     return Pin(net, step, y - 0.9)
@@ -152,7 +152,6 @@ def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Uni
 
 
 def _with_grounds(ports: Sequence[str]) -> list[str]:
-    """Nets of a connector's pins: the ports in order, with grounds between them."""
     nets = [*ports[:1]]
     for index, name in enumerate(ports[1:], 1):
         nets += [GND] * (index % LINES_A_GROUND == 0) + [name]
@@ -183,7 +182,7 @@ def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
 
 
 def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
-    """Each shift register with the net of each of its pins (docs/boards.md)."""
+    """Each shift register with the net of each pin (docs/boards.md)."""
     numbers: dict[str, int] = {}
     chips: dict[tuple[str, int, int], dict[str, str]] = {}
     for output in wiring.outputs(skin):

@@ -323,7 +323,6 @@ class _Changes:
             self.condition.notify_all()
 
     def wait_for(self, happened: Callable[[], object], timeout: float | None = None) -> bool:
-        """Wait until this has happened or the body is closed; False after ``timeout``."""
         with self.condition:
             return bool(self.condition.wait_for(lambda: self.closed.is_set() or happened(), timeout))
 

@@ -33,7 +33,7 @@ def pack(path: str | Path) -> dict[str, str]:
 
 def unpack(texts: Mapping[str, str], folder: Path) -> Body:
     """The body from its texts, with files in this folder, which must stay while meshes are needed. Raises
-    :class:`BodyError` if a text is missing, or not from :func:`pack`."""
+    :class:`BodyError` for texts that are not from :func:`pack`."""
     try:
         values = tomlfile.parse(texts[TOML].encode(), "robot.toml", BodyError)
         for number, (table, key, name) in enumerate(_files(values)):

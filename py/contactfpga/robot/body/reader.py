@@ -91,7 +91,7 @@ class SharedClock:
         self._now_s: dict[str, float] = {}  # on the common clock, of each board
 
     def join(self, link: str, board_s: float) -> None:
-        """Add a board with this reading of its own clock; it starts at the others' time."""
+        """Add a board whose own clock reads ``board_s``; it starts at the others' time."""
         with self._lock:
             now_s = min(self._now_s.values(), default=self._clock() - self._began_s)
             self._joined_s[link], self._now_s[link] = now_s - board_s, now_s
@@ -236,7 +236,7 @@ class LinkReader:
             return self._asked
 
     def step(self) -> float:
-        """Do what is due, for little more than :data:`WAIT_S`; returns the seconds until something is due."""
+        """Do what is due, for little more than :data:`WAIT_S`; returns the seconds until the next call."""
         if self._board is None:
             wait_s = self._retry_at - self._clock()
             if wait_s > 0:
@@ -330,7 +330,7 @@ class LinkReader:
         self._drop("lost", BoardClosed("the body was closed"))
 
     def observe(self) -> Observation:
-        """The current knowledge, from which :class:`States` are made."""
+        """The current memory, for :class:`States`."""
         if self._shared_clock is None:
             return self._known, None
         with self._lock:  # a board that is open stays so meanwhile

@@ -164,7 +164,7 @@ def _numbers(values: dict[str, Any], key: str, count: int, where: str) -> Any:
 
 
 def held(frames: Iterable[Zones], skin_pitch_mm: float) -> tuple[float, float]:
-    """Place in mm of a single zone that stayed for :data:`HELD_S`; consumes the frames until then."""
+    """Place in mm of a single zone that stayed for :data:`HELD_S`."""
     kept: list[tuple[int, float, float]] = []
     around_mm: float | None = None
     for zones in frames:

@@ -41,8 +41,7 @@ class LinkContact:
     time_sigma_s: float | None
     """Standard deviation of ``host_time_s``; None if unknown."""
     point_m: Vector | None
-    """Place of the contact; None for a zone that goes all the way round a closed sheet, or in a frame flagged
-    ``mismatch``."""
+    """Place of the contact; None for a zone all the way round a closed sheet, or in a frame flagged ``mismatch``."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
@@ -56,7 +55,7 @@ class LinkContact:
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
     track: int | None = None
-    """Id that stays with the contact, unique on this link; None for a zone without a place, or in untracked frames."""
+    """Id that stays with the contact, unique on this link; None without a place or tracking."""
     fold: float | None = None
     """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody
     touches. None if unknown."""

@@ -11,7 +11,7 @@ from contactfpga.zones.zone import Zones
 
 
 class BodyError(ContactFPGAError, ValueError):
-    """An impossible robot, link, joint or place; the message names the value and the limit."""
+    """An impossible robot, link, joint or place."""
 
 
 class NoJoints(ContactFPGAError):

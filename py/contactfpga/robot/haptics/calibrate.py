@@ -39,7 +39,7 @@ class Calibration:
 
 
 def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
-    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions orthogonal to all; moments are divided by ``length_m``."""
+    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions orthogonal to all; ``length_m`` divides moments."""
     scaled = np.atleast_2d(loads) / np.array([1, 1, 1, length_m, length_m, length_m])
     _, values, right = np.linalg.svd(scaled)
     rank = int((values > SEEN * values[0]).sum())

@@ -95,7 +95,6 @@ class Fit:
         return [(max(0.0, low), None if high > most else max(0.0, high)) for low, high in scaled]
 
     def _alone(self, first: int) -> tuple[float, float] | None:
-        """Interval if the wrench determines it and both ends are in the cones; else None."""
         if float(np.abs(self._null[first]).max(initial=0.0)) > KNOWN:
             return None
         row = self._root[first]
@@ -243,4 +242,4 @@ def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> F
 
 
 Ends = Callable[[Fit, Sequence[int]], dict[int, tuple[float, float]]]
-"""The least and largest of these pushes, over the size of the fit."""
+"""The least and largest of these pushes, in units of the fit."""

@@ -349,8 +349,7 @@ class AloneWatch:
             self._recent.popleft()
 
     def sharpened(self, zones: Zones, touches: Sequence[Touch]) -> list[Touch]:
-        """The touches of a frame's zones with places, each at its single-contact place if that is better known and on
-        its zone."""
+        """The touches of a frame's zones with places, each at its single-contact place if that is better known."""
         placed = [zone for zone in zones if zone.point_mm is not None]
         return [self._sharper(zone, touch, zones.sheet.pitch_x_mm) for zone, touch in zip(placed, touches, strict=True)]
 

@@ -191,7 +191,6 @@ class ClosingWatch:
         return sorted(inside - self._pushes.keys())
 
     def _at(self, before: Zones, after: Zones, row: int) -> float | None:
-        """Push when the row was scanned, interpolated between frames."""
         if self.push_n is None:
             return None
         if self._push_before is None:
@@ -206,5 +205,4 @@ def _around(sheet: Sheet) -> int | None:
 
 
 def _spread(cells: list[Cell], around: int | None) -> float:
-    """Sum of all squared distances, in pitches."""
     return sum((r - row) ** 2 + across(c - column, around) ** 2 for r, c in cells for row, column in cells)

@@ -133,7 +133,7 @@ class Observations:
         return chance, misfit
 
     def _needed(self, cell: tuple[int, int], x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
-        """Force that closes the switch from each place, and its standard deviation with that within a grid step."""
+        """Force that closes the switch from each place, and its standard deviation."""
         row, column = cell
         distance = np.hypot(x - column * self.pitches_m[0], y - row * self.pitches_m[1])
         needed = self.reach.closing_n(distance)
@@ -231,7 +231,6 @@ class Locator:
         return Place(x, center.sheet_m[1] - origin_m[1], posterior.radius_95(spread), spread, "center of pressure")
 
     def _inside(self, center: Center) -> tuple[float, Floats]:
-        """Arc length under the foam and its covariance, on the turn nearest to the sheet."""
         assert self._sheet.radius_mm is not None
         assert center.covariance_m2 is not None
         share = 1e-3 * self._sheet.radius_mm / math.hypot(center.point_m[0], center.point_m[1])

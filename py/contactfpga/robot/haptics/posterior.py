@@ -142,7 +142,7 @@ def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: i
 
 
 def _of_sets(closed: NDArray[np.bool_], all_x: Floats, all_y: Floats, x: Floats, y: Floats) -> Floats:
-    """Distance of each place from the middle of those with its pattern, relative to the pattern's first switch."""
+    """Distance of each place from the middle of those with its pattern."""
     first = closed.argmax(axis=0)
     x, y = x - all_x[first], y - all_y[first]
     # Rows of cells are as long everywhere, so a shifted pattern is the same bits from its first one on.

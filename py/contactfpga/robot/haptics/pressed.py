@@ -1,7 +1,6 @@
 """Distance of a zone's barycenter from the pressing body under a known cover, by the number of cells and the push.
 
-The same push closes one switch in the middle of a cell, and several between cells, so a zone's size restricts the place
-within a cell.
+The same push closes one switch in the middle of a cell, and several between cells.
 """
 
 from __future__ import annotations

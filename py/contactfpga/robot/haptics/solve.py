@@ -106,7 +106,7 @@ def _nothing(wrench: Wrench) -> Solution:
 def touched(
     zones: Zones, surface: Surface | None, friction: float = 0.5, sheet_m: tuple[float, float] = (0.0, 0.0)
 ) -> list[Touch]:
-    """The zones as places on the bumper's outside. A barycenter's error is a pitch over the root of 12;
+    """The zones as places on the bumper's outside, with a barycenter's error of a pitch over the root of 12;
     :class:`~contactfpga.robot.haptics.Locator` is more precise."""
     if surface is None:
         raise HapticsError("surface is missing; contacts() needs the bumper's outside to place zones on it")
@@ -367,7 +367,6 @@ class _Line:
 
 
 def _below(slope: float, level: float) -> Range | None:
-    """Range of t with slope t + level <= 0."""
     if abs(slope) <= ROUNDING:
         return (-math.inf, math.inf) if level <= ROUNDING else None
     end = -level / slope

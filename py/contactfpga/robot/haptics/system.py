@@ -1,7 +1,6 @@
 """The linear system of one frame: forces at known places, and their wrench, weighted by its noise.
 
-It is solved by non-negative least squares (scipy, from three contacts on) or in friction's cones (Clarabel). Both
-solvers are loaded on demand.
+Its solvers, non-negative least squares (scipy) and cones (Clarabel), are loaded on demand.
 """
 
 from __future__ import annotations
@@ -425,7 +424,6 @@ class _Solver:
         self._start = np.concatenate(starts)
 
     def least(self, at: int, factor: float) -> float | None:
-        """The minimum of ``factor`` times this component of y; None if unbounded."""
         count = self._sides.shape[1]
         slope = np.zeros(count)
         slope[at] = factor
@@ -438,7 +436,6 @@ class _Solver:
         return float(solution.obj_val)
 
     def solve(self, square: Floats, slope: Floats) -> Floats:
-        """The y that minimizes y square y / 2 + slope y."""
         solution = self._run(self._sparse.csc_matrix(np.triu(square)), slope)
         if "Solved" not in str(solution.status):
             raise HapticsError(f"no forces within friction's cones were found ({solution.status})")

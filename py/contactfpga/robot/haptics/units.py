@@ -172,7 +172,6 @@ class LoadCells:
 
     @functools.cached_property
     def _seen(self) -> tuple[Floats, int, Vector, float]:
-        """Left singular vectors about the units' barycenter, moments over their distance; rank; place; distance."""
         x, y, z = np.mean([unit.point_m for unit in self.units], axis=0).tolist()
         moved = np.array(self.matrix)
         moved[3:] -= skew((x, y, z)) @ moved[:3]
@@ -267,7 +266,7 @@ def covariance(name: str, values: Any, count: int) -> Floats:
 
 
 def reduced(rows: Floats) -> Floats:
-    """Rows with the same span, each with a leading 1 that the others lack, so that each involves few components."""
+    """Rows with the same span, reduced so that each involves few components."""
     found = np.array(rows)
     done = 0
     for column in range(found.shape[1]):

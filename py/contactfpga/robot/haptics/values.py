@@ -21,7 +21,7 @@ SMALLEST = 1e-9
 
 
 class HapticsError(ContactFPGAError, ValueError):
-    """An impossible value of a bumper, unit or contact; the message names it and the limit."""
+    """An impossible value of a bumper, unit or contact."""
 
 
 def number(name: str, value: Any, low: float = -LARGEST, high: float = LARGEST, unit: str = "") -> float:

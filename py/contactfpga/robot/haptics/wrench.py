@@ -21,7 +21,7 @@ Block = tuple[Vector, ...]
 
 
 class Noise:
-    """The covariance of a wrench, and derived quantities; one object serves all wrenches of the same units."""
+    """The covariance of a wrench; one object serves all wrenches of the same units."""
 
     def __init__(self, covariance: Floats):
         self.covariance = covariance
@@ -54,7 +54,7 @@ class Noise:
 
     @functools.cached_property
     def blocks(self) -> tuple[Block, Block, Block]:
-        """Covariances force by force, force by moment, moment by moment, in plain numbers."""
+        """Covariances of forces, of force and moment, and of moments, in plain numbers."""
         parts = (self.covariance[:3, :3], self.covariance[:3, 3:], self.covariance[3:, 3:])
         force, both, moment = (tuple(map(tuple, part.tolist())) for part in parts)
         return force, both, moment
@@ -167,7 +167,7 @@ class Bumper:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Center:
-    """The place where one contact alone would exert the wrench, by a force and a moment about the normal."""
+    """The place where one contact alone would exert the wrench."""
 
     point_m: Vector
     normal: Vector
@@ -225,7 +225,7 @@ class Plane:
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder:
-    """A cylinder about the link's z axis, whose radius includes the foam, as the force enters at the outside."""
+    """A cylinder about the link's z axis, whose radius includes the foam."""
 
     radius_m: float
 

@@ -19,7 +19,7 @@ BREAK_S = 2.0
 BEAT_S = 0.25
 """Longest interval of a publisher's messages, which shows losses without later data."""
 QUIET_S = 2 * BEAT_S
-"""Time without an accepted message after which contradicting messages may be genuine."""
+"""Time without an accepted message after which contradicting ones may be genuine."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Message:
         return cls(publisher, sequence, offset, read_us, denied, payload[HEAD_BYTES:])
 
     def follows(self, other: Message) -> bool:
-        """Whether the publisher can have sent this after the other, with any number of messages between."""
+        """Whether the publisher can have sent this after the other, with any messages between."""
         after = self.sequence > other.sequence and self.offset >= other.offset + len(other.data)
         return self.publisher == other.publisher and after
 

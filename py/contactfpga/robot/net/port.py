@@ -24,7 +24,7 @@ FOUND_S = 3.0
 GONE_S = 1.0
 """Silence after which a publisher is gone, whatever its token, which anyone can declare."""
 LATE_S = 0.2
-"""Excess of a wait over its timeout from which this process stood still, which is no silence of the publisher's."""
+"""Excess of a wait over its timeout from which this process, not the publisher, stood still."""
 
 
 class ZenohPort:
@@ -134,7 +134,6 @@ class ZenohPort:
                 self._changed.notify_all()
 
     def _leave_out(self) -> None:
-        """Drop the oldest unread bytes; the rest follows a break."""
         oldest, oldest_broken = self._pieces.popleft()
         self._waiting -= len(oldest)
         self.counters.left_out += len(oldest) - oldest.startswith(b"\0")

@@ -141,8 +141,7 @@ def wrench(found: Wrench, head: Message) -> Message:
 
 
 def transform(head: Message, child: str, place_m: Sequence[float], turn_rad: Sequence[float]) -> Message:
-    """A ``tf2_msgs/TFMessage``: pose of a frame in the header's, with rotations about the fixed x, y and z axes in
-    turn."""
+    """A ``tf2_msgs/TFMessage``: pose of a frame in the header's, with ``turn_rad`` as in :func:`quaternion`."""
     made = {"translation": vector(place_m), "rotation": quaternion(*turn_rad)}
     return {"transforms": [{"header": head, "child_frame_id": child, "transform": made}]}
 
@@ -239,8 +238,8 @@ def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
 
 
 def markers(rim: Sequence[Message], found: Sequence[Track], head: Message, forces: Contacts | None = None) -> Message:
-    """A ``visualization_msgs/MarkerArray`` for RViz and Foxglove: the rim, and for each contact a ball as large as its
-    zone, its id, and an arrow of the force on the link, or of the inward normal."""
+    """A ``visualization_msgs/MarkerArray``: the rim, and for each contact a ball as large as its zone, its id, and an
+    arrow of the force on the link, or of the inward normal."""
     shown = [_marker(head, "", 0, ADD, action=DELETE_ALL)]
     shown.append(_marker(head, "sheet", 0, LINE_STRIP, scale=(0.001, 0.0, 0.0), color=_GRAY, points=rim))
     known = forces_of(forces)

@@ -254,7 +254,6 @@ class Feed:
         self._send(topic, encode(TOPICS[topic].type, message))
 
     def _is_due(self, what: str, rate_hz: float) -> bool:
-        """Whether it is due at this average rate, without catching up."""
         now, due, period_s = self._board.clock(), self._due[what], 1 / rate_hz
         if now < due - EARLY * period_s:
             return False

@@ -54,7 +54,7 @@ class Settings:
     turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
     """Rotation of the sheet's frame about the fixed x, y and z axes in turn."""
     zones_hz: float = 1000.0
-    """Largest rate of zones, tracks and contacts; a frame with another number of zones is always published."""
+    """Largest rate of frames; a frame with another number of zones is always published."""
     markers_hz: float = 30.0
     diagnostics_hz: float = 1.0
     silence_s: float = 0.5
