@@ -20,9 +20,7 @@ from contactfpga.design.circuit.values import LIMITS, Circuit, CircuitError
 NAMES = ("line_pf", "switch_ohm")
 """Fitted fields of :class:`Circuit`, one per informative reading."""
 PROBABILITY = 0.95
-"""Default probability that all intervals hold."""
 LEAST_LINES = 3
-"""Least number of fully measured rows and columns."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
 """Newton's method: most rounds, relative change at its end, and relative step of the derivative."""
 NEARLY = 0.02

@@ -17,7 +17,6 @@ LEAK_S = 1e-12
 FORWARD = 0.5
 """Share of the junction voltage above which its capacitance is linear, as in SPICE."""
 OFF = float("nan")
-"""Value for a pin that does not drive."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -16,7 +16,6 @@ from contactfpga.skin import Skin
 MARGIN = 1.3
 """Ratio of recommended to computed times."""
 STEP_US = 0.01
-"""Step to which recommendations are rounded up."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,7 +17,6 @@ SHARE_1, SHARE_0 = 1 / (GAMMA * (2 - GAMMA)), (1 - GAMMA) ** 2 / (GAMMA * (2 - G
 ERROR = (-3 * GAMMA**2 + 4 * GAMMA - 2) / (12 * (2 - GAMMA))
 FIRST_S = 1e-12
 ERROR_V = 1e-3
-"""Allowed error of a step."""
 CLOSE_V = 1e-5
 """Newton's method ends when no voltage moves by more."""
 DIVERGED_V = 1e3

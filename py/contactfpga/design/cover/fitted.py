@@ -11,7 +11,6 @@ import numpy as np
 from contactfpga.design.cover.answer import CoverError
 
 LEAST = 3
-"""Least number of measured forces."""
 DRAWS = 200_000
 
 

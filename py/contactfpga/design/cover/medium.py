@@ -26,7 +26,6 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.inputs.values import shown
 
 MEDIA = ("halfspace", "bonded", "frictionless")
-"""Names for :func:`spread` and :func:`transfer`."""
 
 HIGHEST_T = 30.0
 """Wave number times thickness beyond which nothing passes: 2 t^2 exp(-t) is 2e-10 there."""

@@ -14,7 +14,6 @@ from contactfpga.skin import Skin
 
 PLATE_MM = 1.2
 GAP_MM = 0.6
-"""Default gap between caps."""
 LEAST_GAP_MM = 0.3
 """Least gap for a printer with lines of 0.4 mm."""
 BELOW_MM = 0.3

@@ -59,7 +59,6 @@ class SwitchPart:
     """Closing force."""
     travel_mm: float
     height_mm: float
-    """Height of the free switch above the board."""
     closed_by: float
     """Side or diameter of the plunger."""
     column: tuple[tuple[float, float, float, float], ...]

@@ -174,7 +174,6 @@ class States(Mapping[str, LinkState]):
 
 
 RETRY_S = 0.5
-"""Delay before another attempt to open a board."""
 WAIT_S = 0.1
 """Longest wait for a board at a time."""
 

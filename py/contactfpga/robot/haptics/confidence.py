@@ -21,7 +21,6 @@ from contactfpga.robot.haptics.contact import Interval
 from contactfpga.surfaces.shapes import Floats
 
 CHI2_1 = 3.841458820694124
-"""95 % quantile of chi-square with one degree of freedom."""
 
 LARGEST = 1e4
 """Largest push searched, in multiples of the measured force."""

@@ -77,7 +77,6 @@ def _force(found: float | NoSolution) -> float:
 
 
 ROUNDING = 1e-4
-"""Relative error of the table of forces."""
 
 
 CERTAIN = 10.0

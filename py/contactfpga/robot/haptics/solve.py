@@ -129,7 +129,6 @@ def touched(
 
 
 ROUNDING = 1e-9
-"""Share of a force that counts as rounding."""
 
 NONE: Vector = (0.0, 0.0, 0.0)
 

@@ -77,7 +77,6 @@ LEASE_MS = 1000
 MOST_RECEIVED = 1 << 20
 """Approximate largest message that a session accepts, more than any of ours."""
 CONNECT_MS = 2000
-"""Timeout of a connection."""
 
 
 FILES = (
