@@ -1,4 +1,4 @@
-"""The labeller with one cell per clock: its records are the zones, its memories neither overflow nor collide."""
+"""The serial labeller: its records are the zones, its memories neither overflow nor collide."""
 
 from functools import partial
 
@@ -81,7 +81,6 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
 def _labeller(
     proof: Proof, columns: int, connectivity: int, rows: int, closed: bool, claim
 ) -> tuple[SerialLabeller, Inside, OpenRow]:
-    """The labeller beside the specification, with claims on both."""
     m = proof.m
     dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
     inside = proof.put(dut)
@@ -120,7 +119,6 @@ def _labeller(
 
 
 def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRow) -> None:
-    """Lemmas between two rows: brackets and table agree with the specification's open row."""
     derived, columns = dut.derived, range(dut.derived.skin.columns)
     starts = Signal(len(columns), name="run_starts")
     proof.m.d.comb += starts.eq(open_row.cells & ~(open_row.cells << 1))
@@ -169,7 +167,6 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: i
 
 
 def _clusters_end_early(closes, inside: Inside):
-    """Whether clusters end early, at a column that is empty in the row before."""
     return (inside["cell_left"] | inside["before_left"]) & ~inside["before"][0]
 
 
