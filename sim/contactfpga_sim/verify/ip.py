@@ -152,8 +152,7 @@ def verilog(skin: Skin) -> str:
 def _started(text: str) -> str:
     """Verilog that four-state simulators compute correctly from the first clock on.
 
-    They compute a block once something in it changes, so each block gets a signal that changes once. Memory outputs
-    begin with 0. Unused wires of no bits go.
+    They compute a block once something in it changes, so each block gets a signal that changes once.
     """
     text = re.sub(r"^  wire \[-1:0\] \S+ ;\n", "", text, flags=re.MULTILINE)
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
@@ -172,7 +171,7 @@ def _triggered(module: str) -> str:
 
 
 def _head(skin: Skin) -> str:
-    """Header that names the sources. Yosys writes operands in their own widths, which Verilog extends correctly."""
+    """Header that names the sources."""
     return (
         f"// contactfpga {__version__}: {skin.rows}x{skin.columns} switches, Skin {skin.fingerprint.hex()}. Made by "
         "`contactfpga ip`.\n/* verilator lint_off WIDTHEXPAND */\n/* verilator lint_off WIDTHTRUNC */\n"

@@ -1,4 +1,4 @@
-"""A touch as a waveform: every signal of the gateware from a scan before a switch closes until its frame is sent."""
+"""A touch as a waveform: every signal of the gateware until the frame is sent."""
 
 from __future__ import annotations
 

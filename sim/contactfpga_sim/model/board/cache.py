@@ -1,5 +1,5 @@
-"""The folder of compiled gateware and cached results. Only files that the user or root alone can write are used, as
-they are executed."""
+"""The folder of compiled gateware and cached results. Its files are executed, so only those that the user or root alone
+can write are used."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def trusted(file: Path) -> bool:
 
 
 def whole(file: Path, tell: bool = False) -> bool:
-    """Whether the file matches its checksum from :func:`put`; ``tell`` reports a damaged file on stderr. Raises
-    :class:`CacheError` like :func:`trusted`."""
+    """Whether the file matches its checksum; ``tell`` reports a damaged file on stderr. Raises :class:`CacheError` like
+    :func:`trusted`."""
     if not trusted(file):
         return False
     total = _sum(file)

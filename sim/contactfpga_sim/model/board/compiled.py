@@ -105,8 +105,8 @@ decoded from the line."""
 class CompiledBoard(CompiledModel):
     """A compiled board of one sheet.
 
-    ``capture``: names of :data:`CAPTURABLE` to record besides ``received``. ``model``: source of native code, by
-    default that of :func:`library_of`. For errors see :mod:`contactfpga_sim.model.board.native`.
+    ``capture``: names of :data:`CAPTURABLE` to record besides ``received``. ``model``: source of native code, default
+    that of :func:`library_of`.
     """
 
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
@@ -127,7 +127,7 @@ class CompiledBoard(CompiledModel):
         self.hold(cells[None], 0)
 
     def restart(self, mutant: int = 0) -> None:
-        """Power up again as a mutant of :mod:`contactfpga_sim.verify.mutants`; 0 is the gateware itself."""
+        """Power up again, as a mutant of :mod:`contactfpga_sim.verify.mutants` if not 0."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:
@@ -276,9 +276,9 @@ SHEETS_CAPTURED = ("line", "contact", "received")
 
 
 class CompiledSheets(CompiledModel):
-    """The compiled gateware of several sheets, each with its switches.
+    """The compiled gateware of several sheets.
 
-    ``model``: the gateware, by default that of :func:`sheets_model`.
+    ``model``: default that of :func:`sheets_model`.
     """
 
     def __init__(self, several: Several, model: native.Model | None = None):

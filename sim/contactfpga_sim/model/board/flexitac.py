@@ -20,7 +20,7 @@ class FlexitacSheet:
     """Sends ``hz`` frames per second to :attr:`port` in a ``with`` block.
 
     ``scene``: function from time in s to the (16, 32) force at each cell, 0 to 1. A cell reads its rest value, up to
-    40, plus noise of 2, plus 150 at force 1. ``lost``, ``wrong``: shares of bytes lost or changed.
+    40, noise of 2, and 150 times force. ``lost``, ``wrong``: shares of bytes lost or changed.
     """
 
     def __init__(

@@ -59,7 +59,6 @@ class Netlist:
     """A design from elsewhere than Amaranth, with clock port ``clk``."""
 
     files: Mapping[str, str]
-    """Text of each file by name."""
     read: str
     """Yosys commands to read the files and leave the module ``top``."""
 
@@ -80,7 +79,7 @@ class Model:
     key: str
     """Key of all that ``elaborate`` depends on."""
     elaborate: Callable[[], Any]
-    """Function that makes the component or :class:`Netlist`, called only to build a library."""
+    """Function that makes the component or :class:`Netlist`; called only for a build."""
     defines: Mapping[str, int | str] = dataclasses.field(default_factory=dict)
     """Constants of the driver."""
     passes: str = ""
@@ -88,7 +87,7 @@ class Model:
     quiet: bool = False
     """Whether the progress line is omitted."""
     places: Callable[[str], str] | None = None
-    """Function from the generated ``model.cpp`` to ``places.inc``, which the driver includes."""
+    """Function from ``model.cpp`` to ``places.inc``, which the driver includes."""
 
 
 def component_key(component: Any) -> str:
@@ -97,7 +96,7 @@ def component_key(component: Any) -> str:
 
 
 def skin_key(skin: Skin) -> str:
-    """Key of a Skin's gateware: the Skin, the gateware with its imports, and external choices."""
+    """Key of a Skin's gateware, with imports and external choices."""
     gateware = sources.digest(sources.GATEWARE, (sources.HOST, sources.GATEWARE))
     key = (skin.fingerprint, skin.name, gateware, sources.own(own_files(skin)))
     return hashlib.sha256(repr(key).encode()).hexdigest()
@@ -110,10 +109,10 @@ class Library(ctypes.CDLL):
 
 
 def load(model: Model) -> Library:
-    """The library of a model, from the cache or built in some seconds, with progress on stderr.
+    """The library of a model, from the cache or built in some seconds with progress on stderr.
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
-    :class:`CompileFailed` if a tool fails, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
+    :class:`CompileFailed`, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
     if sys.platform == "win32":
         raise CompileFailed("on Windows sim:// runs the reference Skin and those of kits; others need Linux, as in WSL")

@@ -1,4 +1,4 @@
-"""The virtual board on a pseudo-terminal, at most in real time; a slower machine is reported."""
+"""The virtual board on a pseudo-terminal, at most in real time."""
 
 from __future__ import annotations
 

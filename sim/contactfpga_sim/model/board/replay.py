@@ -38,7 +38,7 @@ class ReplayedFrame:
 
     frame: Frame
     first_record: int | None
-    """Clocks from the transfer of the frame's last row to its first record, possibly negative; None without a zone."""
+    """Clocks from the transfer of the frame's last row to its first record, maybe negative; None without a zone."""
     last_record: int | None
     """Clocks from the transfer of the frame's last row to its last record; None without a zone."""
     duration: int
@@ -90,8 +90,8 @@ def skin_for(
 ) -> Skin:
     """A Skin of this size, scanned as fast as the link can carry frames of this many zones.
 
-    ``barycenter_bits``: fraction bits of a board that divides. Capacities are rounded up by at most a third, so that
-    recordings of one sheet share builds.
+    ``barycenter_bits``: fraction bits of a board that divides. Capacities are coarse, so that recordings of one sheet
+    share builds.
     """
     shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
     if closed:

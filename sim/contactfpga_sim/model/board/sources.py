@@ -33,8 +33,8 @@ _read: dict[Path, object] = {}
 
 
 def digest(root: str, packages: tuple[str, ...] = PACKAGES, documented: bool = True) -> str:
-    """Hash of a module, or all modules of a package, with their imports: text of ``packages`` and of data beside their
-    modules, versions of other packages. ``documented=False`` ignores docstrings, which takes three times as long."""
+    """Hash of a module, or all modules of a package, with imports: text of ``packages`` and of data beside their
+    modules, versions of other packages. ``documented=False`` ignores docstrings, in three times the time."""
     key = root, packages, documented
     if key not in _taken:
         _taken[key] = _digest(*key)
@@ -50,7 +50,7 @@ def texts(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
 
 
 def changed() -> bool:
-    """Whether a module was written since it was read, so that the running code may be neither version."""
+    """Whether a module was written since it was read."""
     return any(_stamp(file) != before for file, before in _read.items())
 
 
@@ -192,7 +192,6 @@ def _hash(file: Path) -> str:
 
 @functools.cache
 def _undocumented(file: Path) -> str:
-    """Hash of a module's text without docstrings and empty lines."""
     text = file.read_bytes().decode(errors="replace")
     lines = text.splitlines()
     with contextlib.suppress(SyntaxError):  # nothing can import it

@@ -33,7 +33,7 @@ class Storage(NamedTuple):
 
 
 class Bit(NamedTuple):
-    """A bit of a storage."""
+    """One bit of a storage."""
 
     place: int
     word: int
@@ -115,8 +115,7 @@ def _model(skin: Skin) -> Model:
 
 
 def places(model: str) -> str:
-    """Text of ``places.inc`` for a generated model: its registers, and its memories except those never written, which
-    are logic or configuration."""
+    """Text of ``places.inc``: registers and written memories of a generated model."""
     lines = [f'PLACE("{_plain(name)}", {name})' for name in _WIRE.findall(model)]
     lines += [
         f'MEMORY("{_plain(name.removeprefix("memory_"))}", {name}, {depth})'

@@ -1,5 +1,4 @@
-"""Boards packaged as WebAssembly, which wasmtime runs without a compiler. Other Skins and changed gateware have
-none."""
+"""Boards packaged as WebAssembly, which wasmtime runs without a compiler."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ from contactfpga_sim.model.board import native, sources
 
 FOLDER = Path(__file__).parent / "wasm"
 LIST = FOLDER / "files.json"
-"""By file name the key, the key of the design (unchanged by text alone) and the checksum; and versions of the tools."""
+"""By file name its key, its design's key (unchanged by text alone) and checksum; and versions of the tools."""
 
 NATIVE = "CONTACTFPGA_NATIVE"
 """Environment variable that requests native code, which is faster."""
@@ -43,8 +42,7 @@ _C_FLAGS = (*_TARGET, "-std=c99", "-Os")
 
 
 class WebAssemblyLibrary:
-    """A board in its own memory, used like a ctypes library: functions take bytes and ctypes numbers, and return their
-    ``restype``."""
+    """A board in its own memory, used like a ctypes library; functions take bytes and ctypes numbers."""
 
     def __init__(self, file: Path):
         import wasmtime
@@ -126,7 +124,7 @@ class _Function:
 
 
 def load(key: str) -> WebAssemblyLibrary | None:
-    """The packaged board with a key; None if there is none, or if :data:`NATIVE` is set."""
+    """Packaged board with a key, if any, unless :data:`NATIVE` is set."""
     if os.environ.get(NATIVE) or importlib.util.find_spec("wasmtime") is None:
         return None
     found = file(key)

@@ -18,11 +18,11 @@ Choice = tuple[frozenset[int], bool]
 """(rows of a slot, whether the slot is one row alone, not a probe)."""
 
 Choices = Generator[Choice, bool, None]
-"""Yields each slot's choice and receives whether any column read pressed in that slot."""
+"""Yields each slot's choice; receives whether any column read pressed."""
 
 
 def row_choices(rows: int, listed: frozenset[int]) -> Choices:
-    """Slots of a frame that begins with these rows on the list."""
+    """Slots of a frame, with these rows on the list at its beginning."""
     return _RowSearch(rows, listed).slots()
 
 
@@ -102,11 +102,10 @@ class RowSlot:
     released: int
     """First cycle without a driven row; the slot's end if the rows stay driven."""
     end: int
-    """First cycle of the next slot."""
 
 
 class AdaptiveScanModel:
-    """Runs through a timeline frame by frame; requests are in order of reception."""
+    """Runs through a timeline frame by frame; requests are in order."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request]):
         self.slots: list[RowSlot] = []

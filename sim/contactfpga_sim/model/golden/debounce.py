@@ -15,7 +15,7 @@ class DebounceRule:
     """The golden rule of a debounce for one switch."""
 
     even: Callable[[list[bool], int, int], list[bool]]
-    """Function from samples, one per scan, and press and release in scan periods, to the switch's states."""
+    """Function from samples, one per scan, and press and release in scan periods, to states."""
     timed: Callable[[TimedDebounce, SwitchState, bool, int], None]
     """Function that updates a switch's state by its sample."""
 
@@ -26,8 +26,8 @@ def _rule(method: object) -> DebounceRule:
 
 
 def debounced(samples: np.ndarray, method: object, press: int, release: int) -> np.ndarray:
-    """States from (F, R, C) bool samples, one per scan and switch; ``press`` and ``release`` in scan periods. A state
-    counts from its scan's sample on."""
+    """States of (F, R, C) bool switches by samples, one per scan; ``press`` and ``release`` in scan periods. A state
+    counts from its sample on."""
     rule = _rule(method).even
     result = np.zeros_like(samples)
     for place in np.ndindex(*samples.shape[1:]):
@@ -134,7 +134,7 @@ class SwitchState:
 
     pressed: bool = False
     since: int | None = None
-    """Tick since which readings differ from the state."""
+    """Tick since which readings differ."""
     ignored_since: int | None = None
     """Tick of the press while readings are ignored."""
 

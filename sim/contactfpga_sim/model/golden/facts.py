@@ -1,5 +1,5 @@
-"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, computed in exact fractions and independently
-of the gateware's table."""
+"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, in exact fractions and independent of the
+gateware's table."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def downwards(value: Fraction) -> int:
 
 
 class ScanTiming(abc.ABC):
-    """The part of a scan's golden rule that clocks and widths depend on."""
+    """The part of a scan's golden rule that clocks and widths need."""
 
     even: bool
     """Whether every frame takes the same time and every row once."""
@@ -54,7 +54,7 @@ class ScanTiming(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """The quantities R, C, M, E, X, Z, S, L, T, D, P and Q of the rules, and widths of fields on the wire."""
+    """Quantities R, C, M, E, X, Z, S, L, T, D, P and Q of the rules, and widths of fields on the wire."""
 
     skin: Skin
     place: tuple[int, int] | None = None
@@ -99,18 +99,18 @@ class Facts:
 
     @property
     def commands(self) -> bytes:
-        """Commands of the board: 1 is the self-test, 2 the sample time, 3 to 5 are of units."""
+        """Commands: 1 is the self-test, 2 the sample time, 3 to 5 are of units."""
         of_units = b"\x03\x04" + b"\x05" * bool(self.skin.unit_sums) if self.skin.units else b""
         return b"\x01" * self.skin.self_test + b"\x02" * self.samples_early + of_units
 
     @property
     def samples_early(self) -> bool:
-        """Whether the board can sample columns before the settle time ends."""
+        """Whether columns can be sampled before the settle time ends."""
         return self.skin.report == "cells" and self.skin.scan in ("raster", "reversal")
 
     @property
     def first_sample(self) -> int:
-        """The earliest clock of a row, from 1, in which columns can be sampled."""
+        """Earliest clock of a row, from 1, in which columns can be sampled."""
         return max(2, self.load + self.column_shift)
 
     @functools.cached_property
@@ -200,7 +200,7 @@ class Facts:
 
     @functools.cached_property
     def column_groups(self) -> int:
-        """Number of groups of 4, 8 or 16 columns in which a row is counted, at most four."""
+        """Number of groups of 4, 8 or 16 columns in which a row is counted."""
         group = next(width for width in (4, 8, 16) if 4 * width >= self.columns)
         return -(-self.columns // group)
 
@@ -232,7 +232,7 @@ class Facts:
 
     @functools.cached_property
     def press_ticks(self) -> int:
-        """Press time for samples that are not a scan apart: in row times, or in us for a scan that waits."""
+        """Press time in row times; for a scan that waits in us."""
         return self._ticks(exact(self.skin.debounce_press_us), self.press_scans)
 
     @functools.cached_property
@@ -254,7 +254,7 @@ class Facts:
 
     @property
     def zones(self) -> bool:
-        """Whether a frame has zone records; else it has bitmap rows."""
+        """Whether a frame has zone records, not bitmap rows."""
         return self.skin.report in ("moments", "barycenter")
 
     @property
@@ -345,5 +345,5 @@ def bits(largest: int) -> int:
 
 @functools.lru_cache(maxsize=64)
 def facts(skin: Skin) -> Facts:
-    """The facts of a Skin, cached."""
+    """Facts of a Skin, cached."""
     return Facts(skin)

@@ -20,7 +20,7 @@ class FaultHistory:
         self._words = [0]
 
     def change(self, cycle: int, word: int) -> None:
-        """Set the word from ``cycle`` on; cycles of calls rise."""
+        """Set the word from ``cycle`` on; cycles rise."""
         assert cycle >= self._cycles[-1], "changes come in order"
         self._cycles.append(cycle)
         self._words.append(word)
@@ -30,7 +30,7 @@ class FaultHistory:
         return self._words[bisect.bisect_right(self._cycles, cycle) - 1]
 
     def between(self, first: int, last: int) -> list[tuple[int, int, int]]:
-        """(first, last, word) of each stretch of cycles, inclusive."""
+        """(first, last, word) of each stretch of cycles."""
         begin = bisect.bisect_right(self._cycles, first) - 1
         ends = [*self._cycles[begin + 1 :], last + 1]
         stretches = zip(self._cycles[begin:], ends, self._words[begin:])
@@ -38,7 +38,7 @@ class FaultHistory:
 
 
 def report(facts: Facts, digits: Sequence[int] | None = None) -> bytes:
-    """A report of these digits as on the wire, by default without faults."""
+    """A report of these digits, by default without faults."""
     return _sealed(facts, _digits(0, facts.fault_bits) if digits is None else digits, 0)
 
 
@@ -77,7 +77,7 @@ class Reports:
         self._due = cycle + 1 if self._due is None else min(self._due, cycle + 1)
 
     def due(self, cycle: int) -> int | None:
-        """The cycle from which a report waits, if not after ``cycle``."""
+        """Cycle from which a report waits, if not after ``cycle``."""
         found = [at for at in (self._due, self._differs(cycle - 2)) if at is not None and at <= cycle]
         return min(found, default=None)
 

@@ -34,7 +34,7 @@ class Queue:
     """The queue of items before the packer."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
-        """Put a record in; returns the cycle from which the packer can read the item, and the item's bits."""
+        """Put a record in; returns the item's bits after the cycle from which the packer can read it."""
         return put + 2, data
 
     def take(self, cycle: int, item: int) -> None:
@@ -128,15 +128,13 @@ def barycenter(total: int, area: int, fraction_bits: int) -> int:
 
 
 class Divider(Queue):
-    """Divides one zone at a time; items enter a trace when the packer reads them."""
+    """Divides one zone at a time; an item enters a trace when the packer reads it."""
 
     def __init__(self, facts: Facts, trace: Trace):
         self._facts = facts
         self._trace = trace
         self._free = 0
-        """Cycle from which a zone can begin."""
         self._gone = 0
-        """Cycle in which the previous item was read."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
         begun = max(self._free, put + 2)

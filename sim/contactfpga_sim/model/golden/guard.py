@@ -14,8 +14,8 @@ RETRY_US = 2**16
 
 
 def closed(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
-    """(row lines, column lines) bool: closed switches with whole lines to both pins. With ``guard``, guard lines are
-    last, with an open corner."""
+    """(row lines, column lines) bool: closed switches with whole lines to both pins. Guard lines are last, with an open
+    corner."""
     cells, _ = timeline.at(cycle)
     shut = np.ones((facts.row_lines, facts.column_lines), bool)
     shut[-1, -1] = not facts.skin.guard
@@ -50,7 +50,7 @@ class FaultyLines:
         self, lines: Literal["rows", "columns", "stuck"], found: np.ndarray, renews: bool, only: int | None = None
     ) -> None:
         """Apply a check that found these of all rows, columns or stuck columns faulty, or that checked ``only`` one
-        row. If the round ``renews``, lines found good are no longer reported."""
+        row. If it ``renews``, lines found good are no longer reported."""
         place = slice(None) if only is None else slice(only, only + 1)
         told = self._told[lines]
         kept = np.zeros_like(told) if renews else told

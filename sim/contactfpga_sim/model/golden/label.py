@@ -124,7 +124,7 @@ def _before(frames: np.ndarray) -> np.ndarray:
 
 
 def _over_the_seam(frames: np.ndarray, connectivity: int) -> np.ndarray:
-    """(N, R) bool: whether the ends of a row and the row before are joined over the seam."""
+    """(N, R) bool: whether a row and the row before are joined over the seam."""
     ends = np.stack([_before(frames)[..., [0, -1]], frames[..., [0, -1]]])  # which row, N, R, first or last column
     return np.asarray(ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
 

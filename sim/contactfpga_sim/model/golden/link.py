@@ -1,5 +1,4 @@
-"""The link: hellos, fault reports, the newest frame and the newest sweep of units share the wire; several sheets share
-a line, round-robin."""
+"""The link: hellos, fault reports, frames and unit readings share the wire, and several sheets a line."""
 
 from __future__ import annotations
 
@@ -26,8 +25,7 @@ class Sender(Protocol):
 class SharedLine:
     """Asks one sheet per cycle, round-robin, until one sends a packet; then the next is asked.
 
-    The line is known up to the cycle that all sheets have reached by :meth:`advance`, so a sheet's thread that is ahead
-    waits for the others.
+    A sheet's thread that is ahead waits until all sheets have reached its cycle by :meth:`advance`.
     """
 
     def __init__(self, sheets: int):
@@ -54,7 +52,7 @@ class SharedLine:
             self._reach(number, math.inf)
 
     def _reach(self, number: int, cycle: float) -> None:
-        """Advance this sheet alone to a cycle that not all have reached; all links stand still meanwhile."""
+        """Advance this sheet alone; all links stand still meanwhile."""
         before, self._reached[number] = min(self._reached), cycle
         known = min(self._reached)
         if known > before or self._sheets == 1:
@@ -121,7 +119,7 @@ class Link:
         self._line.links[self._number] = self
 
     def want_hello(self, cycle: int) -> None:
-        """A hello waits from ``cycle`` on, and answers all requests until it is taken."""
+        """A hello waits from ``cycle`` on; it answers all requests until then."""
         self._hellos.append(cycle)
 
     def offer(self, cycle: int, packet: bytes) -> None:
@@ -142,7 +140,7 @@ class Link:
         self._slot_over = None
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which the whole slot was taken, if not after ``cycle``."""
+        """Cycle in which the whole slot was taken, if not after ``cycle``."""
         self.advance(cycle)
         return self._slot_over if self._slot_over is not None and self._slot_over <= cycle else None
 
@@ -179,7 +177,7 @@ class Link:
         return self._reports.due(cycle) if self._reports and self._line.idle_from <= cycle else None
 
     def finish(self, cycle: int) -> None:
-        """Advance the wire up to ``cycle``, and fill in the hellos' state from the inputs, which are now all known."""
+        """Advance the wire up to ``cycle``, and fill in the hellos' state."""
         self.advance(cycle)
         for begin, taken, sent in self._blank:
             self._fill_in(begin, taken, sent)

@@ -116,7 +116,7 @@ class Pipeline:
         self.told: scan.Changes = []
         """(cycle, faults) of every change of reported faulty lines."""
         self.well: list[int] = []
-        """Cycles in which a whole frame was packed or an untouched sheet checked."""
+        """Cycles in which a frame was packed or an untouched sheet checked."""
         self._free = 0
         self._handed = -1
         self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
@@ -158,11 +158,11 @@ class Pipeline:
         return RowPipeline(self._facts, self)
 
     def taken(self, offered: int) -> int:
-        """The cycle in which a row offered from a cycle on is taken, at most one per clock."""
+        """Cycle in which a row offered from a cycle on is taken, at most one per clock."""
         return max(offered, self._handed + 1)
 
     def hand_over(self, taken: int, cells: np.ndarray, alone: bool, last: bool, earliest: int = 0) -> int:
-        """Hand a taken row to the labeller, a row driven alone through the debounce; returns the cycle."""
+        """Hand over a taken row, through the debounce if driven alone; returns the cycle."""
         cycle = max(taken + self._late * alone, self._free, earliest)
         self._handed = cycle
         self._trace.rows.append((cycle, _word(cells), last))

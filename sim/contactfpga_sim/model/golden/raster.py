@@ -61,7 +61,6 @@ def sampled(facts: Facts, slot: int) -> int:
 
 
 def _asked_before(facts: Facts, slot: int) -> int:
-    """The cycle from which a request is too late for a frame that begins with this slot."""
     if facts.samples_early:
         return facts.row_shift + slot * facts.row_clocks
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
@@ -133,8 +132,8 @@ def _read(facts: Facts, timeline: Timeline, slot: int, ahead: int = 0) -> np.nda
 
 
 def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed with no row driven, from the sample before the frame's first slot
-    to the one before its last."""
+    """(column lines,) bool: columns that read pressed with no row driven, from the sample before the first slot to the
+    one before the last."""
     columns = np.zeros(facts.column_lines, bool)
     for slot in range(max(0, frame * facts.row_lines), (frame + 1) * facts.row_lines):
         if slot:
@@ -143,7 +142,7 @@ def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
 
 
 def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Request] = ()) -> list[Changes]:
-    """By frame (cycle, word) of each check, the last at the frame's end. A frame sampled early has no row checks."""
+    """By frame (cycle, word) of each check. A frame sampled early has no row checks."""
     if not facts.skin.guard:
         return [[]] * count
     told, result = FaultyLines(facts), []

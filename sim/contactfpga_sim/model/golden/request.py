@@ -1,4 +1,4 @@
-"""Requests and commands of the host, and the number that the board repeats (docs/protocol.md)."""
+"""Requests and commands of the host, and the board's answer in a hello (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -40,10 +40,8 @@ class Reception:
 
 
 def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"", kind: int = KIND) -> bytes:
-    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit.
-
-    ``closing``: that of the addressed sheet among several. Another ``kind`` makes an invalid request.
-    """
+    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit. ``closing``:
+    of the addressed sheet among several. Another ``kind`` makes an invalid request."""
     return _sent(_digits(number, 3) + bytes([kind << 4 | hello]), bit_clocks, closing)
 
 
@@ -86,8 +84,8 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
 def heard(
     received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False, closing: bytes = b""
 ) -> Reception:
-    """Requests and supported ``commands`` in (cycle, bytes), which begin back to back at the pin in that cycle;
-    ``closing``: that of this sheet among several."""
+    """Requests and supported ``commands`` in (cycle, bytes), back to back at the pin from that cycle on; ``closing``:
+    of this sheet among several."""
     found = Reception([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):

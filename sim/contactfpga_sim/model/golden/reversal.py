@@ -174,7 +174,6 @@ class ReversalScanModel:
         return (self.checks.word if self.checks else 0) | joined << checked
 
     def _watch(self, begin: int, end: int) -> None:
-        """The sheet rests in these cycles, which is reported now and then without guard lines."""
         period = reversal_lines.CHECK_US * self._facts.clocks_per_us
         if not self.checks:
             for cycle in range(-(-begin // period) * period, end + 1, period):

@@ -54,7 +54,7 @@ class StuckColumns:
         self._guard: list[int] = []
 
     def rests(self, begin: int, end: int) -> None:
-        """Sample in each of these cycles, a rest."""
+        """Sample in each of these cycles of a rest."""
         if begin <= end:
             self._go_to(self._passed(begin - 1))
             self._rest(end)
@@ -181,13 +181,13 @@ class GuardChecks:
 
     @property
     def asked(self) -> int:
-        """The cycle from which a resting sheet is checked."""
+        """Cycle from which a resting sheet is checked."""
         period = CHECK_US * self._facts.clocks_per_us
         return (self._last // period + 1) * period + 1
 
     def after(self, sample: int) -> tuple[int, bool]:
-        """Check after the last row of a frame was sampled; returns the cycle of the check's sample, and whether it
-        finds the guard column stuck."""
+        """Check after the last row of a frame was sampled; returns the cycle of the sample, and whether the guard
+        column reads stuck."""
         facts = self._facts
         wait = 1 + max(facts.project, facts.settle) if self._of_rows else facts.row_clocks
         return self._check(sample, sample + wait)
@@ -237,8 +237,7 @@ COMMAND = 1
 
 
 class SelfTestModel:
-    """Self-test slots: no line, each row, each column. They run at once after power-up, and after a command as they are
-    sent."""
+    """Self-test slots: no line, each row, each column; at once after power-up, after a command as they are sent."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], stages: Stages):
         self.discharged: list[tuple[int, int]] = []
@@ -258,7 +257,7 @@ class SelfTestModel:
         self._rises = np.zeros(facts.rows + facts.columns, bool)
 
     def asked(self, until: int) -> int | None:
-        """The cycle from which a slot is wanted, if not after ``until``."""
+        """Cycle from which a slot is wanted, if not after ``until``."""
         if self._waits:
             over = self._stages.slot_over(until)
             if over is None:

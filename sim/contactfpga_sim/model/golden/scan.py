@@ -24,21 +24,20 @@ class Scan:
     offered: list[int]
     """Cycle in which each row is offered to the next stage."""
     stuck: int
-    """Number of columns, without a guard column, that read pressed with no row driven."""
+    """Number of columns that read pressed with no row driven."""
     time_us: int
-    """Device time of the first row's strobe, less the column shift, without wrapping."""
+    """Device time of the first row's strobe, less the column shift, unbounded."""
     requested: bool
     """Whether a request arrived since the previous scan began."""
     heard: int
-    """Lowest three bits of the last request's number before the scan began; 0 without any."""
+    """Lowest three bits of the last request's number; 0 without any."""
     told: int
     """Cycle from which a hello reports the stuck columns."""
     slots: int
     """Duration in row times."""
     alone: frozenset[int]
-    """Rows driven alone."""
     faults: int = 0
-    """Faults reported at the end: :attr:`contactfpga_sim.model.golden.guard.FaultyLines.word`."""
+    """:attr:`contactfpga_sim.model.golden.guard.FaultyLines.word` at the end."""
 
     motion: bool = False
     """Whether a row read touched at the frame's beginning, but empty when driven."""
@@ -55,13 +54,13 @@ Changes = list[tuple[int, int]]
 
 @dataclasses.dataclass(frozen=True)
 class ScanOutput:
-    """Pin changes of a scan in the requested cycles, and beyond."""
+    """Pin changes of a scan."""
 
     contact: Changes
     driven: Changes
     """Changes of the driven rows; bit r is row r."""
     beginnings: list[int]
-    """First cycles of frames, one of them beyond."""
+    """First cycles of frames, one beyond."""
 
 
 class Rows(Protocol):
@@ -93,7 +92,7 @@ class Stages(Protocol):
         """Send a self-test slot from a cycle on; read lines are bits."""
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which the slot was sent, if not after ``cycle``. All earlier events must have been reported."""
+        """Cycle in which the slot was sent, if not after ``cycle``. All earlier events must have been reported."""
 
     def frame(self, one: Scan, cells: np.ndarray) -> None:
         """Take all rows of a frame, (R, C) debounced ``cells``, at once."""
@@ -109,7 +108,6 @@ class Play:
     facts: Facts
     timeline: Timeline
     requests: Sequence[Request]
-    """Requests in order of arrival."""
     cycles: int
     stages: Stages
 
@@ -123,7 +121,7 @@ class ScanRule(ScanTiming):
 
 
 def early_clocks(facts: Facts, requests: Sequence[Request], late: int) -> int:
-    """Clocks by which samples of a frame precede the settle time's end, by commands received before cycle ``late``."""
+    """Clocks by which a frame's samples precede the settle time's end, by commands before cycle ``late``."""
     moved = [one.command[1] for one in requests if one.cycle < late and one.command and one.command[0] == 2]
     fits = moved and facts.samples_early and facts.first_sample <= moved[-1] < facts.settle
     return facts.settle - moved[-1] if fits else 0

@@ -79,7 +79,7 @@ class Timeline:
         stuck: Iterable[np.ndarray | None] | None = None,
         received: Sequence[tuple[int, bytes]] = (),
     ) -> Timeline:
-        """A timeline that holds each (R, C) frame, with its stuck columns, for exactly one scan from power-up."""
+        """Each (R, C) frame, with its stuck columns, held for one scan from power-up."""
         held = [np.asarray(cells, bool) for cells in frames]
         lines = list(stuck) if stuck is not None else [None] * len(held)
         first, scan = facts(skin).row_shift, facts(skin).scan_clocks
@@ -117,11 +117,11 @@ class Trace:
     bytes: list[tuple[int, int]] = dataclasses.field(default_factory=list)
     """(cycle, value) of each byte handed to the UART."""
     line: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the transmit pin, high before cycle 0."""
+    """(cycle, level) of changes, high before cycle 0."""
     contact: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the contact pin, low before cycle 0."""
+    """(cycle, level) of changes, low before cycle 0."""
     alive: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the alive pin, low before cycle 0."""
+    """(cycle, level) of changes, low before cycle 0."""
 
     def events(self, boundary: str) -> list[tuple[Any, ...]]:
         """Events of one of :data:`BOUNDARIES`."""

@@ -27,7 +27,7 @@ class UnitSample(NamedTuple):
     done: int
     """Cycle in which the reading is available."""
     time_us: int
-    """Time in the packet: that of the sweep's first reading."""
+    """Time of the sweep's first reading."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ConverterRule:
             yield sweep
 
     def first(self, facts: Facts) -> int:
-        """Cycle in which the first conversion selects the converter: two levels and a register after power-up."""
+        """Cycle in which the first conversion selects the converter."""
         return 2 * self.level(facts) + 1
 
 

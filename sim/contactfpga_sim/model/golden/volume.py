@@ -28,7 +28,7 @@ class Departures:
     :func:`contactfpga_sim.model.golden.zones.turned`."""
 
     def sorted_moments(self) -> np.ndarray:
-        """The moments, sorted by area, sum x, sum y within each frame."""
+        """Moments, sorted by area, sum x, sum y within each frame."""
         area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
@@ -41,7 +41,7 @@ class Departures:
 def all_departures(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> Departures:
-    """Every zone of (N, R, C) bool frames, with its departure."""
+    """All zones of (N, R, C) bool frames, with their departures."""
     frames = np.asarray(frames, bool)
     count, rows, columns = frames.shape
     chunk = max(1, _AT_ONCE // (rows * columns))
@@ -58,8 +58,8 @@ def all_departures(
 def row_clocks(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(N, R) int64 each, for the rows of (N, R, C) bool frames: clocks to the next handover, and to the end mark after
-    a last row."""
+    """(N, R) int64 each: clocks from a row of (N, R, C) bool frames to the next one, and to the end mark after a last
+    row."""
     return _clocks(np.asarray(frames, bool), connectivity, labeller, closed)[1:]
 
 
@@ -75,10 +75,7 @@ def last_record_clocks(
 
 
 def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
-    """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1.
-
-    Least labels spread to neighbors until nothing changes; in every round each cell also takes its label's label.
-    """
+    """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1."""
     count, rows, columns = frames.shape
     index = np.arange(frames.size).reshape(frames.shape)
     nothing = frames.size
@@ -133,8 +130,8 @@ def _flat(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray
 
 
 def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """:func:`min_labels` of frames of a closed sheet; the turn of the cell with that label, seen from each cell; and 1
-    where a neighbor disagrees about the turn. (N, R, C) int64 each."""
+    """:func:`min_labels` on a closed sheet; the turn of the cell with that label, seen from each cell; and 1 where a
+    neighbor disagrees. (N, R, C) int64 each."""
     nothing = frames.size
     least = np.where(frames, np.arange(nothing).reshape(frames.shape), nothing)
     turns = np.zeros(frames.shape, int)
@@ -156,8 +153,8 @@ def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np
 
 
 def turned(zone: np.ndarray, turns: np.ndarray, disagree: np.ndarray, most: int) -> np.ndarray:
-    """(n,) int64: turns of each zone as in its record, from every pressed cell's zone number, 0 to n - 1, and the other
-    results of :func:`closed_labels`. ``most``: the sheet's cells."""
+    """(n,) int64: turns of each zone as in its record, from the pressed cells' zones, 0 to n - 1, and other results of
+    :func:`closed_labels`. ``most``: the sheet's cells."""
     count = int(zone.max(initial=-1)) + 1
     lowest, highest = np.full(count, len(turns)), np.full(count, -len(turns))
     np.minimum.at(lowest, zone, turns)

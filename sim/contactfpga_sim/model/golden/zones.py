@@ -49,7 +49,7 @@ def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
 
 
 def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
-    """Label the connected pieces of an (R, C) bool array whose last column is a neighbor of the first.
+    """Label the connected pieces where the last column is a neighbor of the first.
 
     Returns an (R, C) int array as :func:`flood`, and :func:`turned` of each piece.
     """
@@ -66,8 +66,8 @@ def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list
 
 
 def turned(turns: list[int], ring: bool, most: int) -> int:
-    """Number of a piece's cells on the upper of its two turns. A ring has its area instead; a piece over more than two
-    turns has all ones, in the bits of the sheet's cell count."""
+    """Number of a piece's cells on the upper of its two turns; for a ring its area; for more than two turns all ones,
+    in the bits of the sheet's cell count."""
     lowest = min(turns)
     if ring:
         return len(turns)
@@ -117,7 +117,6 @@ class Labelling:
     end: int
     """Clocks from the last row to the end mark."""
     departures: tuple[Departure, ...]
-    """Zones in order of departure."""
 
 
 Strips = Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, np.ndarray]]

@@ -127,8 +127,7 @@ def palm(scale: float = 1.0) -> Shape:
 
 
 def sole(length_mm: float = 260.0) -> Shape:
-    """A bare right foot, toes toward -y: the sole as one contact, and the big toe, separated by 8 mm for a foot of 260
-    mm."""
+    """A bare right foot, toes toward -y: sole and big toe as two contacts, 8 mm apart for a foot of 260 mm."""
     scale = length_mm / 260
     outer = Rectangle(16 * M * scale, 50 * M * scale, 22 * M * scale, 25 * M * scale)
     return (*_scaled(scale, (4, 98, 30, 32), (-2, -50, 46, 36), (-26, -112, 15, 18)), outer)
@@ -188,8 +187,8 @@ def _shrunk(part: Ellipse, share: float) -> Ellipse:
 def approaching(contact: Contact, speed_mm_s: float) -> Contact:
     """The contact, of fixed shape and force, arriving at 0 s at this speed until it has its force.
 
-    Its indentation is then 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5), with E*
-    = :data:`BODY_PA`; the deepest of several parts counts.
+    Its final indentation is 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5), with
+    E* = :data:`BODY_PA`; the deepest part counts.
     """
     if callable(contact.shape) or callable(contact.force_n):
         raise ValueError("the contact has a force or a shape of its own over time; it cannot approach as well")

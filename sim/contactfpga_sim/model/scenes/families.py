@@ -1,4 +1,4 @@
-"""Families of scenes at random places. The same seed gives the same scenes, each by its number alone.
+"""Families of scenes at random places, each scene by seed and number.
 
 A scene is wholly on the sheet if it fits, else in the middle, within a pitch. Sheets of the same extents get the same
 scenes whatever their pitch, shifted with the sheet's corner.
@@ -52,8 +52,8 @@ APPROACH_MM_S = (50.0, 250.0)
 
 
 def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
-    """The scenes of :func:`placements` with rising forces: all contacts touch at 0 s and approach at one speed, drawn
-    from :data:`APPROACH_MM_S`, until ``settled_s``."""
+    """:func:`placements` with rising forces: all contacts touch at 0 s and approach at one speed, drawn from
+    :data:`APPROACH_MM_S`, until ``settled_s``."""
     name = zlib.crc32(family.encode())
     scenes = placements(family, count, seed, skin, first, **options)
     speeds = (

@@ -35,7 +35,7 @@ class LoadedUnits:
         return np.asarray(np.maximum(self._steps @ wrench, self._least) + self._zeros)
 
     def under(self, wrench: Floats) -> Sequence[int]:
-        """Readings of all units."""
+        """Readings under a (6,) wrench."""
         noisy = self.exactly(wrench) + self._sigma * self._rng.standard_normal(len(self._sigma))
         found: list[int] = np.clip(np.rint(noisy), 0, self._full).astype(int).tolist()
         return found
@@ -82,7 +82,7 @@ class UnitReadings(LoadedUnits):
         return point, normal, np.cross(across, normal), across
 
     def exact(self, seconds: float) -> Floats:
-        """(n,): readings without noise, rounding and limits."""
+        """(n,): readings at a time, without noise, rounding and limits."""
         return self.exactly(self.wrench(seconds))
 
     def __call__(self, seconds: float) -> Sequence[int]:

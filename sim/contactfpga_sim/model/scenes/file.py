@@ -39,7 +39,7 @@ class Range:
     high: float
 
     def draw(self, rng: np.random.Generator) -> float:
-        """A random number of the range."""
+        """A random number."""
         return self.low if self.low == self.high else float(rng.uniform(self.low, self.high))
 
 
@@ -230,8 +230,8 @@ PLACES = 10
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     """Scene ``number`` of a file on a sheet, and its sampling instant in s, after all approaches.
 
-    A scene depends on the file's content, the number, and the sheet's pitch and size. Raises SceneFileError if contacts
-    do not fit as far apart as requested.
+    The file's content, the number, and the sheet's pitch and size decide. Raises SceneFileError if contacts do not fit
+    as far apart as requested.
     """
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
@@ -247,7 +247,6 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
 
 
 def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | None:
-    """Contacts of a scene; None if one found no place."""
     placed: list[tuple[Shape, Contact]] = []
     for kind in file.kinds:
         for _ in range(int(rng.integers(kind.number[0], kind.number[1] + 1))):

@@ -30,8 +30,8 @@ FOOT_MM = 260.0
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """Contacts over time, placed on the sheet laid flat, for sheets of any pitch and size, through any cover. On a
-    closed sheet places wrap: a contact beyond one end is also at the other."""
+    """Contacts over time, placed on the sheet laid flat, for sheets of any pitch and size. On a closed sheet a contact
+    beyond one end is also at the other."""
 
     contacts: tuple[Contact, ...]
 

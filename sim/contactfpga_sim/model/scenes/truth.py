@@ -1,10 +1,10 @@
 """Number, size and place of contacts, from their continuous shapes alone.
 
 Overlapping or touching parts are one contact. A row of constant y cuts each convex part in one interval; the union of
-intervals is integrated over y by Gauss-Legendre between all heights of beginnings, ends, corners and crossings of
-outlines. The error is at most 1e-7 of the area, unless two outlines cross twice between adjacent :data:`SAMPLES`.
+intervals is integrated over y by Gauss-Legendre between all beginnings, ends, corners and crossings of outlines. The
+error is at most 1e-7 of the area, unless two outlines cross twice between adjacent :data:`SAMPLES`.
 
-A closed sheet, laid flat, repeats for any number of turns, as do its contacts.
+A closed sheet, laid flat, repeats, as do its contacts.
 """
 
 from __future__ import annotations
@@ -106,8 +106,7 @@ def _groups(parts: Sequence[Part], box: Box) -> list[list[Part]]:
 def distance_m(parts: Sequence[Part], box: Box) -> float:
     """Below 0 if all parts share a point in the box; else a distance along x or y in m.
 
-    The difference of the rightmost left end and the leftmost right end is convex over y, so bisection finds its
-    minimum.
+    The distance is convex over y, so bisection finds its minimum.
     """
     low = max(_heights(part, box)[0] for part in parts)
     high = min(_heights(part, box)[1] for part in parts)
@@ -165,7 +164,6 @@ def _outlines(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
 
 
 def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> list[float]:
-    """Heights between which outlines keep their order; each part is cut from start to end or nowhere."""
     middle, half = (start + end) / 2, (end - start) / 2
     active = [part for part in parts if np.isfinite(part.span(np.array(middle))[0])]
     if not active:  # between two parts that hardly touch
@@ -247,13 +245,11 @@ def _unrolled(group: Sequence[Part], band: Box, around_m: float) -> tuple[float,
 
 
 def _around(group: Sequence[Part], box: Box, around_m: float) -> tuple[float, float, float]:
-    """Area and barycenter of one turn, counting overlaps once."""
     area, _, y = measured(on_all_turns(group, box, around_m), box)
     return area, math.nan, y
 
 
 def _groups_around(parts: Sequence[Part], band: Box, around_m: float) -> Iterator[tuple[list[Part], bool]]:
-    """Joined parts, each on its turn, and whether they close around."""
     turns: dict[int, int] = {}
     for seed in range(len(parts)):
         if seed in turns:

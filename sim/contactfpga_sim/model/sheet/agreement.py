@@ -86,8 +86,6 @@ def _case(
 
 
 def _drawn(rng: np.random.Generator) -> Circuit:
-    """A circuit of random values on a logarithmic scale."""
-
     def between(low: float, high: float) -> float:
         return float(f"{low * (high / low) ** rng.random():.2g}")
 
@@ -106,7 +104,7 @@ def _drawn(rng: np.random.Generator) -> Circuit:
 
 
 def compared(case: SpiceCase) -> SpiceComparison:
-    """Run both models."""
+    """Run both models on a case."""
     phase = case.phase
     ours = phases.passed(phase)
     seconds, volts = run(phase, float(ours.trace.seconds[-1]))

@@ -104,8 +104,6 @@ class Ads131m08:
             self._ready_n = 0
 
     def _next_frame(self) -> int:
-        """The oldest unread result, else the last one again: status, eight channels in two's complement, unused
-        check."""
         if self._results:
             self._last = self._results[0]
         status, check = 0x050000 | 0xFF00 * bool(self._results), 0xA5A500

@@ -107,9 +107,9 @@ class Matrix:
 
     A pressed switch passes its row's selecting level to its column, by a series diode: low with ``col2row``, where
     columns are otherwise pulled up; high with ``row2col``. A driven column passes the released level to released rows,
-    which are otherwise pulled to the selecting level; an undriven column follows such a row, as its own pull is weaker.
-    A stuck column cannot be driven. After a self-test's discharge, released columns stay at the selecting level for a
-    slot, as their pulls are weak. Masked cells may be pressed; the board must ignore them.
+    which are otherwise pulled to the selecting level, as are undriven columns on them. A stuck column cannot be driven.
+    After a self-test's discharge, released columns stay at the selecting level for a slot. The board must ignore masked
+    cells.
 
     Switches and faults are in the sheet's rows and columns, guard lines last; levels are those of the lines that these
     are soldered to.

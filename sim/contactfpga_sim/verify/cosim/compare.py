@@ -12,8 +12,7 @@ Event = tuple[Any, ...]
 class Mismatch(AssertionError):
     """The first difference between two traces.
 
-    ``expected`` and ``got``: payloads at ``boundary`` in ``cycle``; None without one. The message tells if one side's
-    next payload is later.
+    ``expected`` and ``got``: payloads at ``boundary`` in ``cycle``; None without one.
     """
 
     def __init__(self, boundary: str, expected: Event | None, got: Event | None):

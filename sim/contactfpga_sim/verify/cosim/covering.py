@@ -93,8 +93,6 @@ def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
 
 
 class _Open:
-    """Pairs in no row yet: each value of each choice has a number, and its open partners are bits of an integer."""
-
     def __init__(self, counts: Sequence[int]):
         self.counts = counts
         self._first = list(itertools.accumulate(counts, initial=0))
@@ -196,7 +194,6 @@ def _registers(choice: dict[str, Any]) -> dict[str, Any]:
 
 
 def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float, float]:
-    """Settle and release time in us: the shortest accepted, one with odd clocks, or a long one."""
     release = {"tight": 1, "uneven": 3, "long": 2 * megahertz}[kind]
     for settle in range(1, 10_000):
         exact = (settle / megahertz, release / megahertz)
@@ -214,7 +211,7 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
 def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
     """Random cells that change at any cycle, stuck columns, requests and other bytes.
 
-    Of a scan that waits only some columns are ever stuck, as it does not drive stuck columns.
+    A scan that waits does not drive stuck columns, so it gets few.
     """
     rng = np.random.default_rng([seed, 7])
     shape = (skin.rows, skin.columns)

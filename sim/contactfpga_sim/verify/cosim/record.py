@@ -21,7 +21,7 @@ PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "
 
 
 def ports(names: tuple[str, ...], skin: Skin) -> tuple[str, ...]:
-    """Names of these that the Skin's top has."""
+    """Those of the names that the Skin's top has."""
     has = {"item": skin.report == "barycenter", "alive": skin.alive}
     return tuple(name for name in names if has.get(name.split("_")[0], True))
 

@@ -83,7 +83,7 @@ def _encoded(value: int) -> bytes:
 
 
 class Graph:
-    """A growing set of nodes, simplified and without duplicates."""
+    """A growing set of simplified nodes without duplicates."""
 
     def __init__(self, variables: int):
         """Nodes 1 to ``variables`` are variables."""

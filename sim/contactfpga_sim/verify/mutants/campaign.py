@@ -1,6 +1,6 @@
 """Random mutants of the gateware, and which of them the comparison with the golden model detects.
 
-Survivors of short stimuli are tried for a proof of equivalence, then in long stimuli and longer proofs.
+Survivors of short stimuli are tried for a proof of equivalence, then in longer stimuli and proofs.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Events = Mapping[str, np.ndarray]
 def survivors(
     design: Design, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus], until: float = math.inf
 ) -> list[int]:
-    """Mutants that no stimulus tells from the gateware, of stimuli that begin before ``until``."""
+    """Mutants that no stimulus, begun before ``until``, tells from the gateware."""
     left = list(numbers)
     with _board(design, model) as board:
         for stimulus in stimuli:
@@ -160,7 +160,7 @@ def chosen(name: str) -> tuple[Design, tuple[str, ...]]:
 def left_by(
     design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus], until: float = math.inf
 ) -> list[Mutant]:
-    """Mutants that agree with the golden model under every stimulus that begins before ``until``, a time of
+    """Mutants that agree with the golden model under every stimulus begun before ``until``, a
     :func:`time.monotonic`."""
     given = list(itertools.takewhile(lambda _: time.monotonic() < until, stimuli))
     left: list[Mutant] = []
@@ -179,8 +179,8 @@ def examine(
     say: Callable[[str], None] = lambda _: None,
     budget_s: float = math.inf,
 ) -> list[Result]:
-    """Fates of ``count`` mutants of what is :func:`chosen`; ``long_s``: seconds of a longer proof. After ``budget_s``
-    seconds no proof and no long stimulus begins.
+    """Fates of ``count`` mutants of what is :func:`chosen`; ``long_s``: seconds of a longer proof. No proof and no long
+    stimulus begins after ``budget_s`` seconds.
 
     Raises :class:`contactfpga_sim.verify.mutants.proof.Contradiction` if a killed mutant is proved equivalent.
     """

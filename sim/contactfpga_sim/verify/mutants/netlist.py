@@ -148,14 +148,13 @@ def _stage(place: str, *names: str) -> str | None:
 
 
 def module_of(name: str) -> str:
-    """The module of Top with this cell, wire or register of the flattened design. A number follows if a signal of Top
-    has its name."""
+    """Module of Top with this cell, wire or register, and a number if a signal of Top has its name."""
     inside = in_sheet(name.removeprefix("$flatten").replace("\\", ""))
     return re.sub(r"\$\d+$", "", inside.partition(".")[0])
 
 
 def in_sheet(name: str) -> str:
-    """A name without that of its sheet."""
+    """A name without its sheet."""
     return re.sub(r"^sheet_\d+\.", "", name)
 
 

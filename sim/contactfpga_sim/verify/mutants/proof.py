@@ -72,8 +72,8 @@ class Prover:
         self._folder.cleanup()
 
     def equivalent(self, mutant: Mutant, limit_s: int, until: float = math.inf) -> bool:
-        """Whether the mutant is proved equivalent, with at most ``limit_s`` processor seconds for each question, and
-        none after ``until``, a time of :func:`time.monotonic`."""
+        """Whether the mutant is proved equivalent, with at most ``limit_s`` processor seconds per question, and none
+        after ``until``, a :func:`time.monotonic`."""
         number = self._mutants.index(mutant) + 1
         return any(self._never_differs(number, cut, limit_s, until) for cut in self._cuts(mutant))
 

@@ -100,7 +100,7 @@ def _optional(skin: Skin) -> Iterator[Stimulus]:
 
 
 def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
-    """Requests with invalid pulses between them: low levels of up to half a bit, or past the stop bit's middle."""
+    """Requests with low levels between them, of up to half a bit or past the stop bit's middle."""
     if uart.pulsed(facts(skin).bit_clocks):
         return
     rng = np.random.default_rng(17)
@@ -131,7 +131,7 @@ def _crowded(skin: Skin, scans: int) -> Stimulus:
 
 
 def _meeting(skin: Skin, chains: int) -> Stimulus:
-    """Chains of hellos, then a waiting frame. They end at all clocks of a hello's time around the next frame's end
+    """Chains of hellos, then a waiting frame, ending at all clocks of a hello's time around the next frame's end
     mark."""
     known = facts(skin)
     scan, byte = known.scan_clocks, 10 * known.bit_clocks
@@ -250,7 +250,6 @@ def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int],
 
 
 def _number(reached: int, rng: np.random.Generator) -> int:
-    """A threshold that is reached, missed by one step, or far above."""
     number = reached + int(rng.integers(2))
     if rng.random() < 0.25:
         number |= 1 << int(rng.integers(min(reached.bit_length(), NUMBER_BITS - 1), NUMBER_BITS))
@@ -263,8 +262,8 @@ def _of_bits(most: int, rng: np.random.Generator) -> int:
 
 def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
     """Each pair of rows and of columns joined, each row with the supply and each column with a strong pull, alone and
-    with another; each followed by a whole sheet, both with a self-test. Returns the timeline, joints by starting cycle,
-    and the number of cycles."""
+    with another; each followed by a whole sheet, both with a self-test. Returns the timeline, joints by cycle, and
+    number of cycles."""
     shorts = [Shorts(rows=(pair,)) for pair in itertools.combinations(range(skin.rows), 2)]
     shorts += [Shorts(columns=(pair,)) for pair in itertools.combinations(range(skin.columns), 2)]
     shorts += [Shorts(supplied=(row,)) for row in range(skin.rows)]

@@ -83,8 +83,8 @@ def _driven(name: str, line: int, width: int, level: str, enable: str) -> str:
 def wrapper(skin: Skin) -> tuple[dict[str, str], str]:
     """Connections of the chip's ports that this module adds, and the needed Verilog.
 
-    A column counts as driven only at its proper level: the released one, or with two drive levels the first column's,
-    and the other one for the guard column.
+    A column counts as driven only at its proper level: the released one, or of two the first column's; a guard column
+    at the other.
     """
     ports: dict[str, str] = {}
     text = ""

@@ -1,4 +1,4 @@
-"""The adaptive scan: its choice of rows, and that rows driven together meet no other driven ones."""
+"""The adaptive scan: its choice of rows, and no contention of rows driven together."""
 
 from functools import partial
 

@@ -1,7 +1,4 @@
-"""Claims, planted bugs, and Yosys' solver: by induction, forever, or by search from power-up.
-
-A bug gives a wrong value to a signal that a class drives, in the elaborated design.
-"""
+"""Claims, planted bugs, and Yosys' solver: by induction, forever, or by search from power-up."""
 
 import dataclasses
 import re
@@ -24,7 +21,7 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 @dataclasses.dataclass(frozen=True)
 class Bug:
-    """A signal with a wrong value, in every component of a class."""
+    """A wrong value of a signal that a class drives, in the elaborated design."""
 
     name: str
     owner: type

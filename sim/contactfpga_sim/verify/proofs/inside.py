@@ -18,8 +18,8 @@ class Inside:
         self._fragment = fragment
 
     def __getitem__(self, path: str) -> Value:
-        """The signal driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else a signal
-        that is only read and keeps its initial value."""
+        """The signal driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else a read
+        one, which keeps its initial value."""
         names = path.split(".")
         fragment = self._fragment
         while len(names) > 1 and (sub := _sub(fragment, names[0])) is not None:

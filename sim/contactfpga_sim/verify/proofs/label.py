@@ -145,7 +145,7 @@ def _brackets(m, row, earlier, later):
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
-    """Free: any rows at any time, and when records are taken.
+    """Free: rows at any time, and when records are taken.
 
     Claimed: while a record waits it is unchanged, no row is taken and nothing changes inside.
     """
@@ -164,9 +164,9 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed:
 
 
 def an_end_mark_a_frame(proof: Proof, columns: int, connectivity: int) -> None:
-    """Free: any rows at any time, and when records are taken.
+    """Free: rows at any time, and when records are taken.
 
-    Claimed: the end marks are the last rows taken, except those still inside, at most three.
+    Claimed: the end marks are the last rows taken, except at most three still inside.
     """
     m = proof.m
     dut = RunLabeller(skin_of(4, columns, connectivity))

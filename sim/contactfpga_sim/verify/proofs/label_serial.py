@@ -70,10 +70,10 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken at once.
+    """Free: rows at any time. Assumed: records are taken at once.
 
     Claimed: when a row can be taken, the zones that end with the previous row have left, each once, and after a last
-    row one end mark; that is so after at most C + e + 2 clocks, or two more for a sheet whose ends meet.
+    row one end mark; that is so after at most C + e + 2 clocks, on a closed sheet two more.
     """
     _labeller(proof, columns, connectivity, rows, closed, proof.claim)
 
@@ -150,7 +150,7 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time, and when records are taken.
+    """Free: rows at any time, and when records are taken.
 
     Claimed: while a record waits no row is taken, no bracket is written, and no register changes.
     """

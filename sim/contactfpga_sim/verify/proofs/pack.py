@@ -59,8 +59,6 @@ def _described_until_commit(proof: Proof, dut: Packer, plain: "_PlainBytes") -> 
 
 
 class _PlainBytes:
-    """Bytes of items and trailer in order, one per clock, from the clock after their arrival."""
-
     def __init__(self, m: Module, dut: Packer):
         derived, items, send = dut.derived, dut.items, dut.frames.verdict.send
         queue = Signal(8 * max(derived.item_bytes, derived.trailer_bytes), name="queue")

@@ -193,7 +193,6 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
 
 
 def level_lemmas(proof: Proof, inside: Inside, columns, released: int) -> None:
-    """Lemmas on the columns' synchronizer."""
     first = proof.before(columns, init=released)
     proof.lemma(inside["reader.sync.stage0"] == first)
     proof.lemma(inside["reader.sync.stage1"] == proof.before(first, init=released))

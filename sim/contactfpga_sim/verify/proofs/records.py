@@ -28,7 +28,7 @@ from contactfpga_sim.verify.proofs.zones import (
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken at once.
+    """Free: rows at any time. Assumed: records are taken at once.
 
     Claimed: from the second clock after a row to the second clock after the next one, exactly the zones that end with
     it leave, each once, and after a last row one end mark.

@@ -72,7 +72,7 @@ class Sheet:
 
 
 def pins(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and the later stages in each clock.
+    """Free: the sheet and the later stages.
 
     Claimed: at most one row is selected, and none while rows are released; no column is driven then nor in the clock
     before or after; rows are released together. In the first clock nothing is driven.
@@ -124,7 +124,6 @@ def _clock_lemmas(sheet: Sheet) -> None:
 
 
 def synchronizer_lemmas(sheet: Sheet) -> None:
-    """Lemmas on the synchronizers of columns and rows."""
     inside, flip = sheet.inside, 0 if sheet.skin.selects_low else -1
     for stage, seen in enumerate((sheet.read_1, sheet.read_2)):
         sheet.proof.lemma(inside[f"rows.stage{stage}"] == (seen ^ flip)[: sheet.skin.rows])
@@ -132,7 +131,7 @@ def synchronizer_lemmas(sheet: Sheet) -> None:
 
 
 def lasts(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and the later stages in each clock. Assumed: column 0 reads released where it is driven.
+    """Free: the sheet and the later stages. Assumed: column 0 reads released where it is driven.
 
     Claimed: a row is selected for the settle time, after column 0 was driven for the precharge time; where rows count,
     it had been driven, with rows released, for the projection time.

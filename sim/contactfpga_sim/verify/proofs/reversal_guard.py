@@ -21,7 +21,7 @@ def _inverted(sheet: Sheet) -> Value:
 
 
 def pins(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and the later stages in each clock.
+    """Free: the sheet and the later stages.
 
     Claimed: at most one row is selected, including the guard row, and none while rows are released; no column is driven
     then nor in the clock before or after; rows are released together, except the guard row, held at the released level.

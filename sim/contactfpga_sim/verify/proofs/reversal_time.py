@@ -1,4 +1,4 @@
-"""Longest times of line reversal: from frame to frame, and from a touch of an untouched sheet."""
+"""Longest times of line reversal: between frames, and from a touch."""
 
 from functools import partial
 from typing import Any

@@ -49,7 +49,7 @@ class Tested:
 
 
 def one_line(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, commands, and the later stages in each clock.
+    """Free: the sheet, commands, and the later stages.
 
     Claimed: columns at the released level and rows at the selecting one are driven in separate clocks. Two or more
     lines are at the selecting level only while none is at the other. In a slot either all driven lines are at the

@@ -1,5 +1,4 @@
-"""Stages that pass on their inputs: offers stay, nothing is lost or repeated; and the divider, which rounds to the
-nearest step."""
+"""Stages that pass on their inputs, without loss or repetition; and the divider."""
 
 from functools import partial
 

@@ -73,7 +73,6 @@ def _readings(proof: Proof, dut: Mcp3208, rises: Value, edges: Value, miso: Valu
 
 
 def _tie(proof: Proof, inside, least: int, edges: Value, unit: Value, begun: Value, since: dict[str, Signal]) -> None:
-    """Lemmas that tie the observer's counters to the inner ones, which precede the pins by a clock."""
     dut, level, clock, its_unit = inside.component, inside["level"], inside["clock"], inside["unit"]
     last_unit = dut.skin.units - 1
     late, phase = proof.before(level, init=38), proof.before(clock)
@@ -120,8 +119,8 @@ def thresholds(proof: Proof, skin: Skin) -> None:
     clocks apart.
 
     Claimed: two clocks after a reading of the unit its bit is whether a threshold is set and the reading at least that
-    far from the zero; it stays until the next reading. Nothing is over or armed before a threshold is set, as the
-    unit's does.
+    far from the zero; it stays until the next reading. Before a threshold is set nothing is over or armed; the unit's
+    arms it.
     """
     m = proof.m
     dut = Watch(skin)

@@ -300,8 +300,8 @@ def _any(bits: Iterable) -> Value:
 
 
 def flood_around(m: Module, derived: Derived, frame, wanted):
-    """Number of zones of a frame with the record ``wanted``: every pressed cell spreads over turns side by side, two
-    rows per turn for zones without a ring."""
+    """Number of zones of a frame with the record ``wanted``: every pressed cell spreads over turns of the frame side by
+    side. Without a ring, two rows per turn are needed."""
     cells = derived.skin.rows * derived.skin.columns
     turns = derived.skin.rows // 2 + 1
     count = 0
