@@ -34,7 +34,7 @@ LOOKS = 240
 """Clocks between two samples of the forces."""
 
 SCANS = 4
-"""Scans per run, the first untouched."""
+"""Scans per run: an untouched one, then the scene."""
 
 TOUCH_SCAN = 1
 
@@ -145,6 +145,7 @@ def feel() -> str:
 
 
 def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
+    """Cycle of the frame's first start bit, cycle of its last byte's end, bytes on the wire, and the frame."""
     for got in frames_in(skin, trace.bytes):
         if got.frame.cells:
             return got.first + 1, got.last + 1 + 10 * skin.derived.bit_clocks, got.size, got.frame

@@ -34,7 +34,7 @@ class Queue:
     """The queue of items before the packer."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
-        """Put a record in; returns the item's bits after the cycle from which the packer can read it."""
+        """Put a record in; returns the cycle from which the packer can read the item, and the item's bits."""
         return put + 2, data
 
     def take(self, cycle: int, item: int) -> None:

@@ -119,7 +119,7 @@ class Link:
         self._line.links[self._number] = self
 
     def want_hello(self, cycle: int) -> None:
-        """A hello waits from ``cycle`` on; it answers all requests until then."""
+        """A hello waits from ``cycle`` on, and answers all requests until it is taken."""
         self._hellos.append(cycle)
 
     def offer(self, cycle: int, packet: bytes) -> None:

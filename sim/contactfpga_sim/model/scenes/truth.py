@@ -164,6 +164,7 @@ def _outlines(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
 
 
 def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> list[float]:
+    """Heights between which outlines keep their order; each part is cut from start to end or nowhere."""
     middle, half = (start + end) / 2, (end - start) / 2
     active = [part for part in parts if np.isfinite(part.span(np.array(middle))[0])]
     if not active:  # between two parts that hardly touch

@@ -194,6 +194,7 @@ def _registers(choice: dict[str, Any]) -> dict[str, Any]:
 
 
 def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float, float]:
+    """Settle and release time in us: the shortest accepted, one with odd clocks, or a long one."""
     release = {"tight": 1, "uneven": 3, "long": 2 * megahertz}[kind]
     for settle in range(1, 10_000):
         exact = (settle / megahertz, release / megahertz)
