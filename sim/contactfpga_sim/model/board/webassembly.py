@@ -188,7 +188,7 @@ def tools() -> dict[str, str]:
 
 
 def board_key(gateware: str, driver: str, defines: Mapping[str, int | str]) -> str:
-    """Key of a board: its gateware, this module, and the driver with its constants."""
+    """Key of a board: its gateware, the build options, and the driver with its constants."""
     options = (_FLAGS, native.FLATTEN, native.TO_CPP, sorted(defines.items()))
     drivers = (*sorted(native.DRIVERS.glob("*.h")), native.DRIVERS / driver)
     return _key(gateware, options, *(sum_of(file.read_bytes()) for file in drivers))
