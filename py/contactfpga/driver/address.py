@@ -1,6 +1,4 @@
-"""Port names: a serial port, a virtual board, a recording, a board on the network, one of several sheets, or a foreign
-sheet.
-"""
+"""Port names, decoded."""
 
 from __future__ import annotations
 
@@ -42,16 +40,16 @@ class Sim:
     scene: str | None = None
     skin: str | None = None
     threshold: float | None = None
-    """Number above which a cell of a recorded scene counts as pressed."""
+    """Number above which a cell of a recorded scene is pressed."""
     units: str | None = None
-    """File of the pressure units on which the scene presses."""
+    """File of pressure units, pressed by the scene."""
     sheets: str | None = None
-    """File of several sheets on one FPGA, in place of a Skin; the scene touches each of them."""
+    """File of several sheets on one FPGA, instead of a Skin; the scene touches each."""
 
     @classmethod
     def parse(cls, name: str) -> Sim:
-        """Decode an address. ``%`` and two hex digits stand for a byte of UTF-8; every other character except ``&``
-        stands for itself, including ``+`` and ``#``. Raises :class:`AddressError`.
+        """Decode an address. ``%`` and two hex digits stand for a byte of UTF-8; all other characters except ``&``
+        stand for themselves. Raises :class:`AddressError`.
         """
         head, _, query = name.partition("?")
         if head not in ("sim://", "sim:"):
@@ -102,11 +100,11 @@ class Replay:
 
     path: Path
     pace: float | None = None
-    """Speed relative to the recording's own time; None: as fast as it is read."""
+    """Speed relative to real time; None: as fast as it is read."""
     start_s: float = 0.0
-    """Start of playback in an MCAP file: the last hello before this time in s."""
+    """Time in s; an MCAP file plays from the last hello before it."""
     link: str | None = None
-    """Name of the link to play from an MCAP file with several."""
+    """Link to play from an MCAP file with several."""
 
     @classmethod
     def parse(cls, name: str) -> Replay:
@@ -132,7 +130,7 @@ class Replay:
 
 
 _REPLAY_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
-"""Beginning of the options; the path itself may contain other question marks."""
+"""Beginning of the options; the path may contain other question marks."""
 REPLAY_FORM = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
 
 
@@ -153,7 +151,7 @@ class Net:
     connect: str | None = None
     config: str | None = None
     wait_s: float = 0.5
-    """Longest time in s for which a publisher may be gone before the port counts as lost."""
+    """Time in s after which a missing publisher counts as lost."""
 
     @classmethod
     def parse(cls, name: str) -> Net:
@@ -195,7 +193,7 @@ class Flexitac:
 
     device: str
     margin: int = 15
-    """Threshold of a pressed cell above its rest, of 255."""
+    """Excess over its rest from which a cell is pressed, of 255."""
     frames: int = 20
     """Number of first frames, without touch, that determine the rest."""
     pitch_mm: float = 3.0
@@ -262,7 +260,7 @@ Address = Serial | Sim | Replay | Net | Flexitac | SheetOf
 
 
 def parse(name: str) -> Address:
-    """Decode a port's name. Raises :class:`AddressError`, also for a file that is no port."""
+    """Decode a port's name. Raises :class:`AddressError`, also for an unsuitable file."""
     if (sheet := SheetOf.parse(name)) is not None:
         return sheet
     if name.startswith(SIM):
@@ -279,7 +277,7 @@ def parse(name: str) -> Address:
 
 
 def _no_port(name: str) -> str | None:
-    """Reason why a name cannot be a serial port; None: it may be one."""
+    """Reason why a name cannot be a serial port, or None."""
     if not name:
         return "the port has no name; leave it out to take the board that is plugged in"
     scheme, colon, _ = name.partition("://")

@@ -35,9 +35,9 @@ class Board(BoardFacts):
     ...             break
 
     Made by :func:`open`. Thread-safe. :meth:`read`, :meth:`next` and :meth:`latest` share one queue; a thread that
-    wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another process; in
-    a child of ``fork`` it is closed. After :meth:`close` every method raises :class:`BoardClosed`, even one that was
-    already waiting. In ``async with`` it is an :class:`AsyncBoard`.
+    wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another process; a
+    child of ``fork`` sees it closed. After :meth:`close` every method raises :class:`BoardClosed`, even a waiting one.
+    In ``async with`` it is an :class:`AsyncBoard`.
     """
 
     def __init__(
@@ -80,11 +80,11 @@ class Board(BoardFacts):
         return self._frames.next(timeout)
 
     def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
-        """The newest waiting frame, or the next one if none waits. Older ones are dropped.
+        """The newest waiting frame, or the next one if none waits; older ones are dropped.
 
-        With ``max_age_s``, in seconds, it returns no frame that arrived longer ago, or that was scanned longer ago and
-        delayed on its way, as far as the clocks show. It raises :class:`NoData` as soon as no such frame can come. A
-        recording gives its next frame. ``timeout`` and other errors as for :meth:`next`.
+        With ``max_age_s``, in seconds, it returns no frame that arrived earlier, or that was scanned earlier and
+        delayed, as far as the clocks show, and raises :class:`NoData` as soon as none can come. A recording gives its
+        next frame. ``timeout`` and other errors as for :meth:`next`.
         """
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
@@ -106,32 +106,31 @@ class Board(BoardFacts):
 
     def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
         """Send a command: 1, test the lines; 2, see :meth:`sample_at`. Returns the first complete frame scanned after
-        the board took the command. If answers are lost, the board may take it twice.
+        the board took it. The board may take it twice if answers are lost.
 
-        ``value`` is the command's argument, ``timeout`` is in seconds. Raises :class:`NoSuchCommand` if the board does
-        not take it, ValueError for numbers out of range, and the errors of :meth:`read`.
+        ``value`` is its argument, ``timeout`` is in seconds. Raises :class:`NoSuchCommand` if the board does not take
+        it, ValueError for numbers out of range, and the errors of :meth:`read`.
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
 
     def sample_at(self, clocks: int = 0, timeout: float = 1.0) -> Zones:
-        """From the next frame on, sample the columns this many clocks of the board after a row is selected; 0 restores
-        the settle time. This measures the settle time that the sheet needs (``contactfpga wire --settle``). Returns the
-        first frame sampled in this way. Until the value is 0 again, or the board restarts, slower cells do not read
-        pressed.
+        """From the next frame on, sample the columns this many clocks of the board after a row is selected. This
+        measures the settle time that the sheet needs (``contactfpga wire --settle``). Returns the first frame sampled
+        in this way. Until the value is 0 again, or the board restarts, slower cells do not read pressed.
 
-        The settle time also replaces larger values and those that are too early for the board: less than 2 clocks, or
-        less than columns on shift registers take. Raises the errors of :meth:`command`; boards with ``report =
-        "cells"`` and ``scan = "raster"`` or ``"reversal"`` take it.
+        0, larger values than the settle time, and values too early for the board (less than 2 clocks, or than shift
+        registers take) mean the settle time. Raises the errors of :meth:`command`; boards with ``report = "cells"`` and
+        ``scan = "raster"`` or ``"reversal"`` take it.
         """
         return self.command(SAMPLE_AT, clocks, timeout)
 
     def self_test(self, timeout: float = 2.0) -> SelfTest:
-        """Have the board drive each of its lines alone, and return the result (:class:`SelfTest`).
+        """Have the board drive each of its lines alone, between scans, and return the result (:class:`SelfTest`).
 
         Bridged diodes show only while their switch is pressed: repeat the test, and combine the results with
-        :func:`contactfpga.instruments.self_test.merged`. The scan continues between the slots of the test. ``timeout``
-        in seconds. Raises :class:`NoSuchCommand` if the board has no self-test, and the errors of :meth:`read`. Without
-        the board's Skin its mask is unknown, so lines that do not rise cannot be distinguished from absent ones.
+        :func:`contactfpga.instruments.self_test.merged`. ``timeout`` in seconds. Raises :class:`NoSuchCommand` if the
+        board has no self-test, and the errors of :meth:`read`. If the Skin is unknown, so is its mask, and lines that
+        do not rise cannot be distinguished from absent ones.
         """
         slots = _run_self_test(self._link, checked(timeout))
         try:
@@ -142,19 +141,15 @@ class Board(BoardFacts):
         return SelfTest(slots, sheet.rows, sheet.columns, self.hello.guard, mask)
 
     def set_zero(self, unit: int, reading: int, timeout: float = 1.0) -> Zones:
-        """Set the reading of an unloaded pressure unit, in steps of its converter. Errors as for :meth:`command`."""
+        """Set the reading of an unloaded pressure unit, in steps of its converter; as :meth:`command`."""
         return self.command(*zero_value(self._unit_facts(), unit, reading), timeout=timeout)
 
     def set_threshold(self, unit: int, deviation: int, timeout: float = 1.0) -> Zones:
-        """Make a unit raise ``contact`` when it deviates this much from its zero, either way; 0: never. Errors as for
-        :meth:`command`.
-        """
+        """Make a unit raise ``contact`` at this deviation from its zero, either way; 0: never. As :meth:`command`."""
         return self.command(*threshold_value(self._unit_facts(), unit, deviation), timeout=timeout)
 
     def set_sum_threshold(self, index: int, deviation: int, timeout: float = 1.0) -> Zones:
-        """Make a weighted sum of deviations raise ``contact``, as :meth:`set_threshold` does for a unit; ``index`` is
-        its place in the Skin's ``unit_sums``.
-        """
+        """:meth:`set_threshold` for a weighted sum of deviations, by its place in the Skin's ``unit_sums``."""
         return self.command(*sum_threshold_value(self._unit_facts(), index, deviation), timeout=timeout)
 
     def _unit_facts(self) -> UnitFacts:
@@ -167,7 +162,7 @@ class Board(BoardFacts):
         yield from self._frames
 
     async def __aiter__(self) -> AsyncIterator[Zones]:
-        """Every frame in ``async for``, until a recording ends."""
+        """Every frame in ``async for``."""
         async for zones in self._frames:
             yield zones
 
@@ -188,9 +183,7 @@ class Board(BoardFacts):
         self.close()
 
     def greet(self, timeout: float) -> None:
-        """Wait for the hello, without which no frame can be read. The frame that answers the request stays for
-        :meth:`next`.
-        """
+        """Wait for the hello; the frame that answers the request stays for :meth:`next`."""
         if self.live:
             self._frames.put_back(self.read(timeout))
             return
@@ -211,9 +204,8 @@ class AsyncBoard(BoardFacts):
     >>> asyncio.run(main())
     2
 
-    Every frame comes in ``async for``. :func:`open` itself blocks until the board's hello, at most for its ``timeout``;
-    where no task may block that long, use ``await asyncio.to_thread(contactfpga.open, port)``. Commands are methods of
-    :attr:`board`.
+    :func:`open` itself blocks until the board's hello, at most for its ``timeout``; where no task may block that long,
+    use ``await asyncio.to_thread(contactfpga.open, port)``. Commands are methods of :attr:`board`.
     """
 
     def __init__(self, board: Board, link: Link, frames: Subscription, expected: Skin | None):
@@ -226,7 +218,7 @@ class AsyncBoard(BoardFacts):
         return await _in_thread(self.board.read, timeout)
 
     async def next(self, timeout: float = 1.0) -> Zones:
-        """Await the next frame in order; errors as for :meth:`Board.next`. A canceled task takes no frame."""
+        """Await the next frame; errors as for :meth:`Board.next`. A canceled task takes no frame."""
         return await self._frames.awaited(timeout)
 
     async def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
@@ -261,9 +253,9 @@ class Opening(Protocol):
 
 
 ATTEMPT_S = 0.5
-"""Time after which a self-test with lost slots is requested again; longer for a slow line."""
+"""Least time in s after which a self-test with lost slots is repeated."""
 SLOT_BITS = 5000
-"""Most bits on the wire from one slot to the next: the slot, a frame, and sometimes a hello."""
+"""Most bits on the wire per slot: the slot, a frame, and sometimes a hello."""
 
 
 class _SlotListener:
@@ -293,7 +285,7 @@ class _SlotListener:
 
 
 def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
-    """All slots of a test that begins after this call. Raises :class:`ReadTimeout`, and the errors of a command."""
+    """All slots of a new test. Raises :class:`ReadTimeout`, and the errors of a command."""
     deadline = link.clock() + timeout
     while True:
         slots = _listen_for_slots(link)

@@ -20,19 +20,19 @@ _EPOCH_US = 1 << EPOCH_BITS
 _SEQUENCES = 1 << SEQUENCE_BITS
 
 MOST_US = _EPOCH_US
-"""Longest time from the hello or frame before a frame to that frame: hellos come twice per second."""
+"""Longest time before a frame without another frame or hello, which come twice per second."""
 MOST_S = 8.0
-"""Longest pause in s after which a frame's time is unambiguous: half the period of its wrapping time field."""
+"""Longest pause after which a frame's time is unambiguous: half the period of its time field."""
 SETTLED_S = 1.0
-"""Time in s after a reading pause by which all bytes that waited have been read."""
+"""Time after a reading pause by which all waiting bytes have been read."""
 BEGUN_US = 1 << 21
-"""Age of an unreported restart: without a received hello, a board may have restarted this long ago."""
+"""Longest time since a restart of which no hello has arrived."""
 
 
 class Timeline:
     """Frame counts and times since the board's power-up, from the few bits in frames, and from hellos.
 
-    A frame whose time cannot be explained is not passed on before the next hello, so that no time is wrong.
+    No frame has a wrong time: one whose time is ambiguous is dropped, and so are others until the next hello.
     """
 
     def __init__(self, stats: Stats, live: bool):
@@ -52,17 +52,17 @@ class Timeline:
 
     @property
     def known(self) -> bool:
-        """Whether the next frame's time can be explained, as far as is known so far."""
+        """Whether the next frame's time can be explained, as far as known."""
         return self._known
 
     def doubt(self, now: float) -> None:
-        """Note a long reading pause: bytes read now may have waited, and bytes after them may be missing."""
+        """Note a reading pause: bytes read now may have waited, and later ones may be missing."""
         self._known = False
         self._doubted = now
 
     def take_hello(self, hello: Hello, now: float, fresh: bool) -> None:
-        """Take the board's count of sent frames and its approximate time. ``fresh``: the hello answers a request sent
-        since :meth:`doubt`.
+        """Take the board's frame count and approximate time. ``fresh``: the hello answers a request since
+        :meth:`doubt`.
         """
         if self._greeted:
             self._compare(hello)
@@ -102,7 +102,7 @@ class Timeline:
         return time_us
 
     def place(self, time_us: int) -> int | None:
-        """The time since power-up in us, from the low bits of a time close to now; None if unknown."""
+        """The time since power-up in us from the low bits of a time close to now; None if unknown."""
         if not self._known or self._last_us < 0:
             return None
         return self._last_us + (time_us - self._last_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
@@ -116,16 +116,16 @@ class Timeline:
 
     @property
     def last(self) -> tuple[int, Frame, float] | None:
-        """Time of the last frame in us since power-up, the frame, and its arrival in s on the host's clock; None if no
-        frame can continue it.
+        """The last frame with its time since power-up in us and its arrival in s on the host's clock; None if no frame
+        can continue it.
         """
         if self.before is None or self._time_us is None or not self._known:
             return None
         return self._time_us, self.before, self._now
 
     def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
-        """Times since power-up in us of consecutive frames by :func:`continues`. Either the first one is expected, or
-        the one before it was explained.
+        """Times since power-up in us of frames that continue one another (:func:`continues`) and the last explained
+        frame.
 
         ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: their last frame.
         """
@@ -165,7 +165,7 @@ class Timeline:
 
 
 def continues(packets: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether each frame's time follows from the one before it, provided that that one is known.
+    """(n,) bool: whether each frame's time follows from a known time of the one before.
 
     ``packets``: consecutive ones, of :data:`contactfpga.wire.many.FIELDS`.
     """
@@ -177,7 +177,7 @@ def continues(packets: np.ndarray) -> np.ndarray:
 
 
 def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
-    """Difference of each value from the previous one, the first from ``before``; ``modulus`` is a power of two."""
+    """Differences of successive values, from ``before`` on; ``modulus`` is a power of two."""
     steps = values.copy()
     steps[1:] -= values[:-1]
     steps[0] -= before
@@ -187,17 +187,17 @@ def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
 MOST_PPM, USUAL_PPM = 200.0, 50.0
 """Largest and usual difference of the two clock rates, in ppm."""
 WINDOW_S = 60.0
-"""Age in s beyond which arrivals do not count."""
+"""Age beyond which arrivals do not count."""
 PIECE_S = 0.25
-"""Length in s of a piece of the window, in which only the least delayed arrival counts."""
+"""Length of a piece of the window, in which only the least delayed arrival counts."""
 UNKNOWN_S = 0.02
-"""Assumed bound in s of the least delay until a request is answered."""
+"""Assumed bound of the least delay until a request is answered."""
 STEP_S = 0.005
-"""Contradiction of the bounds in s beyond which a clock has been stepped."""
+"""Contradiction of the bounds that indicates a step of a clock."""
 QUIET_S = 5.0
-"""Time in s without an answered request after which the fit assumes one."""
+"""Time without an answered request after which the fit assumes one."""
 CAUTION = 1.25
-"""Factor on the stated uncertainty, because clocks do not keep to a straight line."""
+"""Factor on the uncertainty, because clocks do not keep to straight lines."""
 MOST_ASKED, MOST_POINTS = 64, 512
 """Most answered requests and most least-delayed arrivals that count."""
 
@@ -207,17 +207,16 @@ _SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
 class _Point(NamedTuple):
     device_s: float
     excess_s: float
-    """Advance of the host's clock over the board's since the first frame, delays included."""
+    """Advance of the host's clock over the board's, delays included."""
 
 
 class ClockFit:
-    """A running fit of the board's clock to the host's since one power-up: device and host times in, lines from one
-    clock to the other out.
+    """A running fit of the board's clock to the host's since one power-up: device and host times in, lines between the
+    clocks out.
 
     Delays only add. A frame arrives after its sampling, so the least delayed arrivals, less the wire time of their
     bytes, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
-    which bounds the host's clock from below. The true line lies between these bounds, with a slope that crystals can
-    have.
+    which bounds it from below. The true line lies between these bounds, with a slope that crystals can have.
 
     Sums are formed in order and exponentials one by one, so that the same fit in C (c/clockfit.h) rounds alike.
     """
@@ -227,9 +226,7 @@ class ClockFit:
         self.forget()
 
     def forget(self) -> None:
-        """Drop all measurements after a restart or a clock step, except the least delay, which belongs to the
-        transport.
-        """
+        """Drop all measurements after a restart or a clock step, except the transport's least delay."""
         self._pieces: collections.deque[_Point] = collections.deque(maxlen=MOST_POINTS)
         self._piece = -math.inf  # number of the last one
         self._asked: collections.deque[_Point] = collections.deque(maxlen=MOST_ASKED)
@@ -239,9 +236,7 @@ class ClockFit:
         self._height_s = self._slope = self._variance = 0.0
 
     def arrived(self, time_us: int, arrived_s: float, wire_s: float) -> None:
-        """Add the arrival of a frame, the last one of those that arrive together; ``wire_s`` is the wire time of its
-        bytes.
-        """
+        """Add the last frame of those that arrived together; ``wire_s`` is the wire time of its bytes."""
         if not self._pieces:
             self._base_us, self._base_s = time_us, arrived_s - wire_s
         point = self._point(time_us, arrived_s - wire_s)
@@ -265,8 +260,7 @@ class ClockFit:
             self._least_s = max(0.0, self._least_s - below_s)
 
     def answered(self, time_us: int, asked_s: float) -> None:
-        """Bound the sampling of the last frame given to :meth:`arrived`: it was after ``asked_s`` on the host's clock.
-        """
+        """State that the last frame given to :meth:`arrived` was sampled after ``asked_s`` on the host's clock."""
         asked = self._point(time_us, asked_s)
         if asked.excess_s > self._bound(asked.device_s) + STEP_S:  # arrivals from before a step
             self._pieces.clear()
@@ -277,7 +271,7 @@ class ClockFit:
         self._way_s = self._least_s
 
     def _suppose(self) -> None:
-        """After a long time without requests, assume that the least delay since then has at most doubled."""
+        """Without requests for long, assume that the least delay has at most doubled."""
         now_s = self._newest.device_s
         if now_s - (self._asked[-1].device_s if self._asked else 0.0) > QUIET_S:
             since = [point for point in self._pieces if point.device_s > now_s - QUIET_S]
@@ -293,8 +287,8 @@ class ClockFit:
         return self._height_s + self._slope * (device_s - self._fitted_s)
 
     def _fit(self) -> None:
-        """Take the mean of all lines between the bounds. All are equally likely, except for their slopes: near that of
-        crystals, and near that of the least delayed arrivals.
+        """Take the mean of all lines between the bounds, weighted by how likely their slopes are for crystals and for
+        the least delayed arrivals.
         """
         for points in (self._pieces, self._asked):
             while points and points[0].device_s < self._newest.device_s - WINDOW_S:
@@ -317,9 +311,8 @@ class ClockFit:
         self._variance = _total(weights * ((middles - middle) ** 2 + gaps**2 / 12)) * CAUTION**2
 
     def _likely(self, widest: int, gap_s: float) -> np.ndarray:
-        """Likelihood of each slope from arrivals alone. Their scatter and the open gap limit what they tell, because
-        frame times and bus times can beat slowly, so that delays rise and fall for long. ``widest``: index of the slope
-        with the widest gap between the bounds.
+        """Likelihood of each slope from arrivals alone. Delays may hide a slope as far as they vary, and as the bounds
+        allow, because frame and bus times can beat slowly. ``widest``: index of the slope with the widest gap.
         """
         device_s, excess_s = np.array(self._pieces).T
         heights = excess_s - _SLOPES[widest] * device_s
@@ -331,8 +324,8 @@ class ClockFit:
     def arrived_in_turn(
         self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Call :meth:`arrived` for many frames after the first one. Returns, before each of them, all fields of
-        :meth:`line` but the first. Only arrivals that change the fit are taken one by one.
+        """Call :meth:`arrived` for many frames after the first one; returns, before each of them, all fields of
+        :meth:`line` but the first. Frames that do not change the fit are handled together.
         """
         count, at = len(times_us), 0
         base_us, (base_s, rate, sigma_s) = np.empty(count, np.int64), np.empty((3, count))
@@ -359,11 +352,10 @@ class ClockFit:
 
     @property
     def begun(self) -> bool:
-        """Whether a frame has arrived."""
         return bool(self._pieces)
 
     def line(self, arrived_s: float) -> HostLine | None:
-        """The map for frames that arrive at this time; None before the first :meth:`arrived`."""
+        """The map for frames that arrive now; None before the first :meth:`arrived`."""
         if not self._pieces:
             return None
         now_s = self._newest.device_s
@@ -381,21 +373,21 @@ def _exponentials(values: np.ndarray) -> np.ndarray:
 
 
 def _hides(point: _Point, earlier: _Point) -> bool:
-    """Whether a later point of the same piece makes an earlier one redundant: every line below it is below both."""
+    """Whether a later point of the same piece makes an earlier one redundant: a line below it is below both."""
     if math.floor(earlier.device_s / PIECE_S) < math.floor(point.device_s / PIECE_S):
         return False
     return earlier.excess_s - point.excess_s > MOST_PPM * 1e-6 * (point.device_s - earlier.device_s)
 
 
 def _least(points: collections.deque[_Point] | list[_Point], now_s: float, sign: int = 1) -> np.ndarray:
-    """For each slope (times ``sign``), the present height of the highest line below the points."""
+    """For each slope (times ``sign``), height now of the highest line below the points."""
     device_s, excess_s = np.array(points).T
     least: np.ndarray = (excess_s - sign * _SLOPES[:, None] * (device_s - now_s)).min(axis=1)
     return least
 
 
 def _middle_slope(points: list[_Point]) -> float:
-    """Slope of the lower convex hull's edge over the middle of the time span; the points are in order of time."""
+    """Slope of the lower convex hull over the middle of the time span; points are in order of time."""
     hull: list[_Point] = []
     for point in points:
         while len(hull) > 1 and _turns_down(hull[-2], hull[-1], point):
@@ -424,12 +416,12 @@ class HostClock:
         self._latest: tuple[int, int] | None = None  # time and bytes of the last of them
 
     def begin(self, now: float) -> None:
-        """Packets arrived at this time."""
+        """Begin to take the packets that arrived together now."""
         self._line = None if self.fit is None else self.fit.line(now)
 
     def take(self, time_us: int, size: int, now: float, asked_s: float | None) -> HostLine | None:
-        """Take a frame of those packets, or the last one of a run, with its ``size`` in bytes. ``asked_s``: time of the
-        request that it answers, if any.
+        """Take a frame of ``size`` bytes, or the last one of a run. ``asked_s``: time of the request that it answers
+        first.
         """
         if self.fit is None:
             return None
@@ -444,9 +436,9 @@ class HostClock:
     def take_reads(
         self, times_us: np.ndarray, sizes: np.ndarray, arrived_s: np.ndarray, counts: np.ndarray
     ) -> HostLines | None:
-        """The host's lines of successive reads that answer no request, after the first arrival (:attr:`begun`); None in
-        a recording. ``arrived_s`` and ``counts``: time and number of frames of each read; ``times_us`` and ``sizes``:
-        time and bytes of its last frame.
+        """The host's lines of successive reads that answer no request, after :attr:`begun`; None in a recording.
+        ``arrived_s`` and ``counts``: arrival and number of frames of each read; ``times_us`` and ``sizes``: time and
+        bytes of its last frame.
         """
         if self.fit is None:
             return None
@@ -459,14 +451,13 @@ class HostClock:
         return self.fit is None or self.fit.begun
 
     def end(self, now: float) -> None:
-        """The packets that arrived together are complete."""
+        """End the packets that arrived together."""
         if self.fit is not None and self._latest is not None:
             time_us, size = self._latest
             self.fit.arrived(time_us, now, size * self.byte_s)
         self._latest = None
 
     def forget(self) -> None:
-        """Drop the fit after a restart or a change of the board."""
         self._line = self._latest = None
         if self.fit is not None:
             self.fit.forget()

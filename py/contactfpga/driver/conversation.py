@@ -47,42 +47,37 @@ class Arrival:
 
 
 class Steady(NamedTuple):
-    """The meaning of frames while each continues the last one and changes only counters and clocks."""
+    """The meaning of frames while they change only counters and clocks, because each continues the last one."""
 
     time_us: int
-    """Time of the last frame in us since power-up."""
+    """Time of :attr:`before` since power-up."""
     before: Frame
     """The last frame."""
     came_s: float
-    """Arrival of the last frame, in s on the host's clock."""
+    """Arrival of :attr:`before`, on the host's clock."""
     fit: ClockFit
-    """Fit of the clocks after the last frame."""
     byte_s: float
-    """Time of a byte on the wire, in s."""
+    """Time of a byte on the wire."""
     sheet: Sheet
     faults: tuple[str, ...]
-    """Names of the faults of a flagged frame."""
     history: UnitHistory | None
 
     def zones(self, frame: Frame, time_us: int, before: Frame, line: HostLine) -> Zones:
-        """Zones of a frame that continues the last one, perhaps with others between. ``before`` is the frame just
-        before it. No counter changes.
-        """
+        """Zones of a frame, without counting it; ``before`` is the frame just before it."""
         return Zones(frame, self.sheet, time_us, before, line, self.faults, self.history)
 
 
 Event = Arrival | Hello | Faults | SelfTestSlot | UnitSamples | SkinMismatch | VersionMismatch
 
 FEW, FEW_IN_RUN = 16, 8
-"""Number of packets below which decoding one by one is faster, and the same for taking frames."""
+"""Least number of packets, and of frames, whose joint processing is faster."""
 
 
 class Conversation:
     """The host's side of the protocol on one port.
 
     ``port``: its name, for messages. ``expected``: the Skin from which the board must be built; None: any. ``live``: a
-    board is at the other end; otherwise the bytes are a recording, without arrival times. ``fit`` makes the fit of its
-    clocks.
+    board is at the other end, not a recording, which has no arrival times. ``fit`` makes the fit of its clocks.
     """
 
     def __init__(
@@ -96,15 +91,12 @@ class Conversation:
         self.port = port
         self.stats = Stats()
         self.hello: Hello | None = None
-        """The last hello."""
         self.sheet: Sheet | None = None
-        """Sheet by which frames are read; None before the first hello, or if the Skin is not the expected one."""
+        """Sheet by which frames are read; None before a hello of the expected Skin."""
         self.numbers: set[int] = set()
         """Sheet numbers in packets before the first hello."""
         self.lines = Lines(expected.mask if expected is not None else ())
-        """State of the board's lines, by its reports."""
         self.units = UnitLine(self.stats)
-        """State of the board's pressure units, by its reports."""
         self._expected = expected
         self._live = live
         self._requests = Requests(rng)
@@ -112,8 +104,7 @@ class Conversation:
         self._clock = HostClock(fit() if live else None)
         self._reader = protocol.HelloReader()
         self.frame_format: tuple[Widths, bytes] | None = None
-        """Widths of frames, and the bytes that their check begins with; None if frames have to be decoded one by one.
-        """
+        """Widths of frames, and first bytes of their check; None if frames have to be decoded singly."""
         self._widths: Widths | None = None
         self._rest = b""
         self._noticed = math.inf
@@ -124,7 +115,7 @@ class Conversation:
     def ask(self, now: float, until: float) -> int:
         """Request a frame scanned after ``now``; returns the ticket that :attr:`Arrival.answers` reaches.
 
-        Until the time ``until`` a request that seems lost is sent again. :meth:`data_to_send` returns its bytes.
+        Until ``until`` a request that seems lost is sent again.
         """
         self._notice(now)
         return self._requests.ask(now, until, hello=not self._timeline.known)
@@ -135,16 +126,15 @@ class Conversation:
         return self._requests.command(command, now, until)
 
     def end_command(self) -> None:
-        """Stop repeating the command."""
         self._requests.end_command()
 
     def doubt(self, now: float) -> None:
-        """Note a reading pause: bytes received from now on may have waited, or may be much later than those before."""
+        """Note a reading pause: bytes received from now on may have waited, or may be much later."""
         self._timeline.doubt(now)
         self._doubted = now
 
     def data_to_send(self) -> bytes:
-        """Bytes to send to the board now; call after each :meth:`ask` and each :meth:`receive`."""
+        """Bytes to send to the board now; call it after other methods."""
         return self._requests.data_to_send()
 
     def receive(self, data: bytes, now: float) -> list[Event]:
@@ -157,8 +147,8 @@ class Conversation:
         return events
 
     def receive_runs(self, data: bytes, now: float, decoded: many.PacketTable | None = None) -> list[Event | Run]:
-        """Events as of :meth:`receive`, but many frames that answer no further request come as runs. ``decoded``: all
-        packets that ``data`` completes, decoded by the sheet and check of the last hello.
+        """Events as of :meth:`receive`, but successive frames that answer no further request come as runs. ``decoded``:
+        all packets that ``data`` completes, by the last hello.
         """
         packets = self._split(data, now)
         if decoded is not None and len(decoded.packets) != len(packets):
@@ -173,8 +163,8 @@ class Conversation:
         return events
 
     def receive_reads(self, reads: Reads) -> Iterator[tuple[float, list[Event | Run]]]:
-        """Events of successive reads, each with the arrival of its bytes in s. Reads that contain only frames that
-        continue one another give one run.
+        """Events of successive reads, each with its arrival in s. Reads of frames that continue one another give one
+        run.
         """
         table = reads.decoded
         ends = None if table is None or len(table.packets) < FEW_IN_RUN else _ends(continues(table.packets))
@@ -194,12 +184,12 @@ class Conversation:
             at += 1
 
     def skip(self, missing: int, rest: bytes) -> None:
-        """Count ``missing`` overwritten bytes; ``rest`` is the beginning of the packet that the next read completes."""
+        """Count ``missing`` overwritten bytes; ``rest`` begins the next packet."""
         self._rest = rest
         self.stats.bytes += missing
 
     def steady(self) -> Steady | None:
-        """The current steady state; None if a continuing frame might change more than counters and clocks."""
+        """The current steady state; None if a continuing frame might change more."""
         last, fit = self._timeline.last, self._clock.fit
         if last is None or fit is None or not fit.begun or self.lines.fading or self.frame_format is None:
             return None
@@ -208,7 +198,7 @@ class Conversation:
         return Steady(*last, fit, self._clock.byte_s, self._widths.sheet, names, self.units.history)
 
     def pass_time(self, now: float, paused: bool) -> None:
-        """Note that nothing came until now. The reader prevents ``paused``, a long pause as of :meth:`doubt`."""
+        """Note that nothing came until now. ``paused``: the reader was away too long, see :meth:`doubt`."""
         if paused:
             self.doubt(now)
         self._noticed = now
@@ -223,8 +213,8 @@ class Conversation:
         return [packet for packet in packets if packet]
 
     def _steady(self, reads: Reads, at: int, ends: list[int]) -> int:
-        """The read up to which each frame continues the one before; ``at`` unless these are many enough, with one in
-        the last read.
+        """The read up to which frames continue one another; ``at`` unless they are many enough, with one in the last
+        read.
         """
         first = reads.packets_before(at)
         end = reads.last_within(at, ends[first + 1] if first + 1 < len(ends) else first)
@@ -277,7 +267,7 @@ class Conversation:
     ) -> int:
         """Take at least one packet, up to a change of the sheet; returns their number.
 
-        A frame that may not continue the one before is decoded alone, because it decides the meaning of the next ones.
+        A frame that may not continue the one before is decoded alone, because it decides how to read the next ones.
         """
         before, widths = self._before(), self._widths
         table, ends, follows = None, [0], False
@@ -301,8 +291,8 @@ class Conversation:
         return at
 
     def _stretches(self, packets: np.ndarray, now: float) -> tuple[list[int], bool]:
-        """For each place, and the one after the last, the end of the stretch in which each frame continues the one
-        before; and whether the first frame is expected.
+        """For each place, and the one after the last, the end of the frames that continue one another; and whether the
+        first is expected.
         """
         found = continues(packets)
         _, time_us, _, heard, *_ = packets[0].item()
@@ -323,7 +313,7 @@ class Conversation:
         return Run(widths.sheet, packets, starts, table.records, times_us, line, before, faults, self.units.history)
 
     def _heard(self, heard: int, time_us: int, packet_bytes: int, now: float) -> HostLine | None:
-        """Report the low bits of a request's number, in a frame with a known time, to requests and clocks."""
+        """Take the request number of a frame with a known time."""
         answered = self._requests.answered
         self._requests.take_frame(heard, now)
         asked_s = self._requests.answered_sent_s if self._requests.answered > answered else None
@@ -346,7 +336,7 @@ class Conversation:
         return event
 
     def _decoded(self, decoded: many.PacketTable, index: int, packet_bytes: int, now: float) -> Event | None:
-        """The event of :meth:`_packet` for an already decoded frame."""
+        """:meth:`_packet` for a decoded frame."""
         assert self._widths is not None
         start, end = decoded.starts[index], decoded.starts[index + 1]
         frame = frame_of(decoded.packets[index].item(), decoded.records[start:end], self._widths.sheet)
@@ -468,7 +458,7 @@ class Conversation:
 
 
 def _ends(found: np.ndarray) -> list[int]:
-    """For each place, and the one after the last, the first place from there on that was not found."""
+    """For each place, and the one after the last, the next place that was not found."""
     places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
     ends: list[int] = np.minimum.accumulate(places[::-1])[::-1].tolist()
     return ends

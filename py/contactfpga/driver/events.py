@@ -22,8 +22,8 @@ SideEvent = Faults | SelfTestSlot | UnitSamples
 class Lines:
     """The last fault report of a board, and the names of its faults while frames are flagged.
 
-    A report that the faults are gone overtakes the last frames with these faults. So their names hold until an
-    unflagged frame or another report.
+    A report that faults are gone overtakes the last flagged frames, so the names hold until an unflagged frame or
+    another report.
     """
 
     def __init__(self, mask: Iterable[tuple[int, int]] = ()):
@@ -36,18 +36,16 @@ class Lines:
         self._names: tuple[str, ...] = self._unnamed
 
     def forget(self) -> None:
-        """Drop all reports after a restart or a change of the board."""
         self.told, self.fading, self._names = None, False, self._unnamed
 
     def take_hello(self, hello: Hello) -> None:
-        """Learn which faults the board can report."""
         unnamed = UNNAMED if hello.guard or (hello.self_test and self.told is None) else STUCK
         if self._names == self._unnamed:
             self._names = (unnamed,)
         self._unnamed = (unnamed,)
 
     def take_report(self, plain: bytes, hello: Hello) -> Faults | None:
-        """Decode an unsealed report; returns it if it differs from the one before. Raises :class:`PacketError`."""
+        """Decode an unsealed report; returns it if it is new. Raises :class:`PacketError`."""
         sheet = hello.sheet
         found = decode_faults(plain, sheet.rows, sheet.columns, hello.guard, hello.self_test)
         found = found.named(sheet.rows, sheet.columns, self._mask)
@@ -77,11 +75,9 @@ class UnitLine:
         self._sequence: int | None = None  # of the last sweep
 
     def forget(self) -> None:
-        """Drop all sweeps after a restart or a change of the board."""
         self.history = self._sequence = None
 
     def take_hello(self, hello: Hello) -> None:
-        """Learn which units the board has."""
         if hello.units is None:
             self.forget()
         elif self.history is None or self.history.facts != hello.units:
@@ -135,7 +131,7 @@ class Silence:
 
 def longest_pause_s(hello: Hello | Skin, skin: Skin | None) -> float:
     """The longest time in s between the last bytes of successive frames of a working board: a keep-alive or a scan, and
-    a frame on the wire. For an unknown Skin the scan counts as 0, and the keep-alive as the longest.
+    a frame. For an unknown Skin, no scan and the longest keep-alive are assumed.
     """
     wire_s = (Widths(hello.sheet).max_frame_bytes + BETWEEN_BYTES) * 10 / hello.baud
     if hello.send == "on_change":

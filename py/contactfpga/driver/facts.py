@@ -31,7 +31,7 @@ class BoardFacts:
         return f"<Board {self.port}: {sheet.rows}x{sheet.columns} cells>"
 
     def __reduce__(self) -> NoReturn:
-        """Refuse pickling and copying: closing a copy would close the port of the original."""
+        """Refuse copies: closing one would close the port of the original."""
         raise TypeError(f"{self.port}: an open board cannot be copied or sent to another process; open its port there")
 
     @property
@@ -41,7 +41,7 @@ class BoardFacts:
 
     @property
     def live(self) -> bool:
-        """Whether a board that answers requests is at the other end; False for a recording."""
+        """Whether a board that answers requests is at the other end, not a recording."""
         return self._link.transport.live
 
     @property
@@ -79,8 +79,7 @@ class BoardFacts:
 
     @property
     def skin(self) -> Skin:
-        """The board's whole Skin: the one given to :func:`open`, or the reference Skin if the board has its
-        fingerprint.
+        """The board's whole Skin: the one given to :func:`open`, or the reference Skin by its fingerprint.
 
         Raises :class:`ContactFPGAError` for any other board, whose hello describes only the :attr:`sheet`.
         """
@@ -95,15 +94,15 @@ class BoardFacts:
 
     @property
     def faults(self) -> Faults | None:
-        """Faults of the lines, as last reported by the board: within 1 ms of a change and after each hello, even
-        without a frame. None before the first report, or if the Skin has neither ``guard`` nor ``self_test``.
+        """Faults of the lines, reported by the board within 1 ms of a change and after each hello, even without a
+        frame. None before the first report, or if the Skin has neither ``guard`` nor ``self_test``.
         """
         self._link.check_open()
         return self._link.conversation.lines.told
 
     @property
     def unit_history(self) -> UnitHistory | None:
-        """The last readings of the pressure units, also in :attr:`Zones.units`; None if the board has no units."""
+        """The last readings of the pressure units; None if the board has none."""
         self._link.check_open()
         return self._link.conversation.units.history
 
@@ -133,7 +132,7 @@ class BoardFacts:
 
         With ``deadline_s`` it raises :class:`NoData` when no frame comes for longer. The deadline must allow for the
         longest pause of a working board: a scan and a frame on the wire, or with ``send = "on_change"`` its keep-alive
-        and a frame. It has no effect in a recording, which has no arrival times.
+        and a frame. It has no effect in a recording.
         """
         self._link.check_open()
         deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)

@@ -1,8 +1,7 @@
 """Search for a board's port: the only one, the one of a Skin, ``name:LEFT``, ``usb:SERIAL``.
 
-Serial ports of supported boards have known USB ids. A search only listens, because boards say hello twice per second
-unasked, and foreign devices with the same USB chip must get no byte. A port that another program reads is skipped
-before its settings are touched.
+A search only listens at ports with USB ids of supported boards: boards say hello twice per second unasked, and foreign
+devices with the same USB chip must get no byte. A port that another program reads is skipped untouched.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ class Candidate:
 
 
 MORE = "CONTACTFPGA_PORTS"
-"""Environment variable with further ports to search, separated as in PATH, for ports without USB ids."""
+"""Environment variable with ports to search that have no USB ids, separated as in PATH."""
 
 
 def candidates() -> list[Candidate]:
@@ -77,9 +76,8 @@ def candidates() -> list[Candidate]:
 
 
 def choose(ports: Iterable[object]) -> list[Candidate]:
-    """Those of ``ports`` (objects like serialx.SerialPortInfo) that may be a supported board.
-
-    If the system does not tell the interface number, every port of a chip is a candidate.
+    """Those of ``ports`` (objects like serialx.SerialPortInfo) that may be a supported board: every port of a chip if
+    the system does not tell interface numbers.
     """
     found = []
     for port, usb in itertools.product(ports, SUPPORTED):
@@ -92,9 +90,9 @@ def choose(ports: Iterable[object]) -> list[Candidate]:
 
 
 LISTEN_S = 1.2
-"""Longest wait in s for a hello, which boards send every 0.5 s."""
+"""Longest wait for a hello; boards send one every 0.5 s."""
 PATIENT_S = 8.0
-"""Longest wait in s if frames may be arriving: on a busy machine a virtual board is slower than its clock."""
+"""Longest wait if frames may be arriving: a virtual board may be slower than its clock."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,7 +105,7 @@ class Reply:
     problem: str
     """Reason for the missing hello; "" if there is one."""
     busy: bool = False
-    """Whether the port is open elsewhere, so that nobody could listen."""
+    """Whether the port is open elsewhere."""
 
     def __str__(self) -> str:
         said = self.problem if self.hello is None else f"says hello: {describe(self.hello)}"
@@ -151,7 +149,6 @@ def survey(candidates: Sequence[Candidate], baud: int) -> list[Reply]:
 
 
 def _heard(candidate: Candidate, baud: int) -> list[Reply]:
-    """Boards at a port: one, or each sheet of one that serves several."""
     try:
         names = sheets.open_at(candidate.device) or [candidate.device]
         heard = [one for name in names for one in listen(name, baud).items()]
@@ -161,7 +158,7 @@ def _heard(candidate: Candidate, baud: int) -> list[Reply]:
 
 
 def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, Hello]:
-    """Hellos received without a request at this port within ``seconds``, by the port to open."""
+    """Hellos sent unasked at this port within ``seconds``, by the port to open."""
     seconds = LISTEN_S if seconds is None else seconds
     transport = connect(device, baud)
     of_sheets = sheets.Greetings(device)
@@ -201,7 +198,7 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
 
 
 def _meant(heard: Sequence[Reply], port: str | None, skin: Skin | None) -> list[Reply]:
-    """The boards selected by port name and by Skin; among several, those with the Skin's name."""
+    """Boards selected by port name or Skin; among several, those with the Skin's name."""
     found = [one for one in heard if one.hello is not None]
     if port is not None and port.startswith(NAME):
         found = _named(found, port.removeprefix(NAME))
@@ -219,7 +216,6 @@ def _named(found: Sequence[Reply], name: str) -> list[Reply]:
 
 
 def _of(port: str | None, skin: Skin | None) -> str:
-    """Description of the boards that were searched."""
     name = f" named {visible(port.removeprefix(NAME))!r}" if port is not None and port.startswith(NAME) else ""
     return name + (f" with fingerprint {skin.fingerprint.hex()}" if skin is not None else "")
 
@@ -231,7 +227,6 @@ def _nobody(port: str | None, skin: Skin | None, heard: Sequence[Reply]) -> str:
 
 
 def _hint(meant: Sequence[Reply]) -> str:
-    """Way to tell these boards apart."""
     names = [one.hello.name for one in meant if one.hello is not None]
     numbers = [one.candidate.serial_number for one in meant]
     for scheme, keys in ((NAME, names), (USB, numbers)):

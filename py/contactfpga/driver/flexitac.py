@@ -20,7 +20,6 @@ from contactfpga.wire.framing import DELIMITER, KINDS, PacketError
 from contactfpga.wire.protocol import HEARD_DIGITS, KIND_REQUEST, REQUEST_HELLO, check_prefix, encode_hello
 
 MARK = b"\xaa\x55"
-"""Beginning of a frame."""
 BITS_PER_BYTE = 10
 """Bits of a byte on the line, with start and stop."""
 DAMAGED = b"\x01\x00"
@@ -85,7 +84,7 @@ class Heard:
 
 
 HELLO_US = 500_000
-"""Interval of hellos in us, as of boards: after a break, a network reader needs one to know the time again."""
+"""Interval of hellos, by which a network reader knows the time after a break."""
 
 
 class FlexitacPort:
@@ -180,9 +179,7 @@ class FlexitacPort:
         return framing.seal(body, check_prefix(self._skin))
 
     def clock(self) -> float:
-        """Seconds on the computer's clock."""
         return self._port.clock()
 
     def close(self) -> None:
-        """Close the port."""
         self._port.close()

@@ -1,4 +1,4 @@
-"""Protection of a parent's ports, files and locks from a child of ``fork``, which inherits them."""
+"""Protects the parent's ports, files and locks, which a child of ``fork`` inherits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Owner(Protocol):
     """An object with resources that the parent continues to use."""
 
     def forked(self) -> None:
-        """Called in the child, where no other thread exists but locks may be held; must not block."""
+        """Called in the child, the only thread there, while locks may be held; must not block."""
 
 
 _owners: weakref.WeakSet[Owner] = weakref.WeakSet()
@@ -23,7 +23,7 @@ _functions: list[Callable[[], None]] = []
 
 
 def watch(owner: Owner) -> None:
-    """Call the object's ``forked`` in every child from now on, as long as the object lives."""
+    """Call the object's ``forked`` in every child from now on."""
     _owners.add(owner)
 
 
@@ -34,7 +34,7 @@ def in_child(function: Callable[[], None]) -> Callable[[], None]:
 
 
 def discard(file: BinaryIO) -> None:
-    """Make the child's file write nowhere, so that buffered bytes are not written twice."""
+    """Redirect the child's file to nowhere, so that buffered bytes are not written twice."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     os.dup2(nowhere, file.fileno(), inheritable=False)
     os.close(nowhere)

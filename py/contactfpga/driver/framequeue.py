@@ -22,7 +22,7 @@ class FrameQueue:
         self.dropped = 0
         """Frames that were not taken in time."""
         self.shown = 0
-        """Number of the last frame given by :meth:`show`; waiting frames up to it are dropped."""
+        """Number of the last frame given by :meth:`show`; frames up to it are dropped."""
         self.others = 0
         """Number of waiting items that are no frames."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
@@ -38,8 +38,8 @@ class FrameQueue:
         return max(self._gone, self.shown)
 
     def show(self, number: int) -> bool:
-        """Mark a frame as given to the listener outside of the queue; False if the listener already had it. Needs a
-        lock common to all callers, not the board's.
+        """Mark a frame as given to the listener outside of the queue; False if it already had it. All callers hold a
+        common lock, not necessarily the board's.
         """
         if number <= self.seen:
             return False
@@ -47,7 +47,6 @@ class FrameQueue:
         return True
 
     def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
-        """Append an item."""
         self._items.append(item)
         if isinstance(item, (Zones, Run)):
             self._came += _count(item)
@@ -108,7 +107,7 @@ class FrameQueue:
         self._drop(1)
 
     def keep_last(self) -> None:
-        """Drop all but the last item, or all up to the first error, which is raised."""
+        """Drop all but the last item, or raise the first error."""
         self._drop_shown()
         while self._held > 1:
             error = self.first_error()
@@ -131,11 +130,11 @@ class FrameQueue:
 
     @property
     def _held(self) -> int:
-        """Waiting frames, including shown ones that are not dropped yet, whose number another thread may change."""
+        """Number of waiting frames, with shown ones, which another thread may change."""
         return self._came - self._gone + self.others
 
     def _drop(self, most: int) -> int:
-        """Drop the first item, but at most ``most`` frames of a run; returns the number of dropped frames."""
+        """Drop the first item, or at most ``most`` frames of a run; returns the number of frames."""
         item = self._items[0]
         if not isinstance(item, (Zones, Run)):
             self._items.popleft()

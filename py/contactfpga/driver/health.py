@@ -21,12 +21,11 @@ RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
 
 LATENCY_MS = 1
 EVENT_CHAR = 0x100
-"""FTDI event character: byte 0, the delimiter, and bit 8, which enables it. The chip passes its buffer on at this byte.
-"""
+"""FTDI event character at which the chip passes its buffer on: byte 0, the delimiter, and bit 8 to enable it."""
 
 CLOCK_ERROR = 0.01
 JITTER_S = 0.03
-"""Jitter in s of a frame's arrival with an FTDI chip's default latency timer."""
+"""Jitter of arrivals with an FTDI chip's default latency."""
 
 
 class Finding(NamedTuple):
@@ -57,7 +56,7 @@ def _group_command(port: str) -> str:
 
 
 def ftdi(port: str, folder: Path = USB_SERIAL) -> Iterator[Finding]:
-    """Check the FTDI chip's latency timer, and the udev rule that sets it and the event character."""
+    """Check the FTDI chip's latency timer, and the udev rule for it and the event character."""
     device = folder / Path(port).resolve().name
     timer = device / "latency_timer"
     if not timer.exists():

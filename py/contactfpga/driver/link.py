@@ -34,20 +34,19 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 LOG = logging.getLogger("contactfpga")
-"""Logger of the board's identity and the end of its faults (INFO), and of restarts, lost frames and faults (WARNING).
-Silent unless the program configures logging. Faults are logged as they change, everything else at most twice per
-second.
+"""Logger of the board's identity and the end of its faults (INFO), and of restarts, lost frames and faults (WARNING),
+at most twice per second except for faults. Silent unless the program configures logging.
 """
 LOG.addHandler(logging.NullHandler())
 
 READ_S = 0.05
-"""Interval in s at which the reader checks whether the board was closed."""
+"""Interval of checks whether the board was closed."""
 
 ASK_S = 1.0
-"""Interval in s of requests by :meth:`Link.ask`."""
+"""Interval of requests by :meth:`Link.ask`."""
 
 SIMULATED_READ_S = 0.002
-"""Longest simulated time in s of one read, for which :meth:`Link.close` may have to wait."""
+"""Longest simulated time of one read, which may delay :meth:`Link.close`."""
 
 Result = Zones | SideEvent | ContactFPGAError | Hello | bool
 """Kinds of awaited results."""
@@ -67,7 +66,7 @@ class _Waiter:
 class Link:
     """A transport, its conversation, and the threads that wait for results.
 
-    A thread of its own reads a live port. If time passes only during reads (``sim://``), or all bytes exist already
+    A separate thread reads a live port. If time passes only during reads (``sim://``), or all bytes exist already
     (``replay://``), one of the waiting threads reads for all.
     """
 
@@ -82,7 +81,6 @@ class Link:
         """Lock of the whole state, notified on changes."""
         self._queues: weakref.WeakSet[FrameQueue] = weakref.WeakSet()
         self.last: Zones | Run | None = None
-        """The last frame or run."""
         self.last_s = transport.clock()
         """Arrival of :attr:`last`."""
         self._frames = 0  # that came
@@ -100,14 +98,12 @@ class Link:
         forks.watch(self)
 
     def start(self) -> None:
-        """Begin to read. Listeners that need the first byte must be registered before."""
+        """Begin to read, after registration of listeners that need the first byte."""
         if self.transport.threaded:
             threading.Thread(target=self._read_all, name=f"reader of {self.transport.name}", daemon=True).start()
 
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
-        """A queue for items from now on, as long as it is referenced; with all events, it begins with the last reported
-        faults.
-        """
+        """A queue for items from now on, while it is referenced; with all events, first the last reported faults."""
         with self.changed:
             queue = FrameQueue(maxsize, all_events, self._frames)
             self._queues.add(queue)
@@ -120,12 +116,11 @@ class Link:
         self._queues.discard(queue)  # type: ignore[arg-type]
 
     def clock(self) -> float:
-        """Seconds on the clock of timeouts."""
         self.check_open()
         return self.transport.clock()
 
     def read(self, timeout: float) -> Result:
-        """Request a frame; returns the first one scanned after now, or an error in its place."""
+        """Request a frame; returns the first one scanned after now, or an error."""
         deadline = self.clock() + timeout
         with self.changed:
             self.check_open()
@@ -139,7 +134,7 @@ class Link:
                 self._waiters.remove(waiter)
 
     def ask(self) -> None:
-        """Send a request at most once per second, without waiting: its answer bounds the frames' latency."""
+        """Send a request, at most once per second, whose answer bounds the frames' latency."""
         with self.changed:
             now = self.transport.clock()
             if now < self._asked_s + ASK_S:
@@ -149,7 +144,7 @@ class Link:
         self._send()
 
     def command(self, command: Command, timeout: float) -> Result:
-        """Send a command; returns the first frame scanned after the board took it, or an error in its place. Raises
+        """Send a command; returns the first frame scanned after the board took it, or an error. Raises
         :class:`NoSuchCommand`.
         """
         deadline, denied = self.clock() + timeout, self._denied()
@@ -179,13 +174,13 @@ class Link:
             self._commanding.release()
 
     def silence(self, since: float) -> Silence:
-        """Time without a frame, for a listener that has waited since that moment; the caller holds the lock."""
+        """Time without a frame, for a listener since that moment; the caller holds the lock."""
         last = self.last[len(self.last) - 1] if isinstance(self.last, Run) else self.last
         seconds = self.transport.clock() - max(since, self.last_s)
         return Silence(self.transport.name, seconds, self.conversation.stats.bytes - self._last_bytes, last)
 
     def abandon(self) -> None:
-        """Make the reader close the port when no listener can exist any more. Takes no lock."""
+        """Make the reader close a port without possible listeners. Takes no lock."""
         self._closing = True
 
     def close(self) -> None:
@@ -211,7 +206,7 @@ class Link:
 
     def _leave(self) -> None:
         """Leave the transport, with the lock held. The last thread of a closed board closes the port, unless
-        :meth:`close` waits to do so and to raise errors.
+        :meth:`close` waits to do so.
         """
         if self._closing:
             self.changed.notify_all()
@@ -252,8 +247,8 @@ class Link:
                     self._read_once(min(left, SIMULATED_READ_S))
 
     def linger(self, until: float, seconds: float) -> None:
-        """Receive until the moment ``until``, for at most ``seconds``. Raises the errors of :meth:`wait_for`, except
-        :class:`ReadTimeout` and :class:`PortLost`, which the next call raises.
+        """Receive until the moment ``until``, for at most ``seconds``. :class:`ReadTimeout` and :class:`PortLost` are
+        left to the next call.
         """
         with contextlib.suppress(ReadTimeout, PortLost):
             self.wait_for(lambda: None, until, seconds)
@@ -295,11 +290,11 @@ class Link:
             self._send()
 
     def catch_up(self) -> None:
-        """Take bytes that another thread has read; no effect if waiting threads read for themselves."""
+        """Take bytes that another thread has read, if any does."""
 
     def newest(self, queue: FrameQueue, timeout: float) -> Zones | None:
-        """The newest frame that the queue has not yet had, which the queue then continues after; None if the queue
-        decides. Raises the errors of :meth:`wait_for`.
+        """The newest frame that the queue has not had, after which the queue continues; None if the queue decides.
+        Raises the errors of :meth:`wait_for`.
         """
         return None
 
@@ -360,9 +355,7 @@ class Link:
             LOG.info("%s: no fault any more", self.transport.name)
 
     def _send(self) -> None:
-        """Write the conversation's bytes in order. One thread writes at a time, and also writes what others request
-        meanwhile. A caller that holds the lock keeps it.
-        """
+        """Write the conversation's bytes in order. One thread writes for all; a caller that holds the lock keeps it."""
         with self.changed:
             while self._writing is None and not self._closing and (data := self.conversation.data_to_send()):
                 self._writing = threading.get_ident()
@@ -376,7 +369,6 @@ class Link:
             self.check_open()
 
     def _read_all(self) -> None:
-        """Body of the reader thread, until the board is closed or the port is lost."""
         while True:
             with self.changed:
                 try:
@@ -421,8 +413,8 @@ class Said(Protocol):
 
 
 def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounters | None) -> ReadTimeout:
-    """The error of a port without a frame within ``timeout`` seconds; ``start``: number of earlier bytes. ``net``:
-    counters of the network, if there is one.
+    """The error of a port without a frame within ``timeout`` seconds; ``start``: earlier bytes; ``net``: the network's
+    counters.
     """
     stats = said.stats
     head = f"{name}: no frame within {timeout:g} s"

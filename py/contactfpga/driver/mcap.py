@@ -30,14 +30,13 @@ HEAD = 9
 LARGEST = 1 << 25
 """Most bytes of a record in the file."""
 UNPACKED = 1 << 23
-"""Most unpacked bytes of a chunk: ours have 64 KiB or one message, other programs' 4 MiB."""
+"""Most unpacked bytes of a chunk; ours have 64 KiB or one message, other programs' 4 MiB."""
 RATIO = 1000
-"""Largest compression ratio of a chunk of more than :data:`FREE` bytes, which bounds the time for a file by its size.
-Our ratio is about 3.
+"""Largest compression ratio of a chunk above :data:`FREE` bytes, which limits a file's time by its size; ours is about
+3.
 """
 FREE = 1 << 17
 _MESSAGE = 22
-"""Bytes of a message's record before its data."""
 
 
 class RecordingError(ContactFPGAError):
@@ -56,7 +55,7 @@ class Cut(Unreadable):
 
 
 def record(file: BinaryIO) -> tuple[int, bytes] | None:
-    """Kind and content of the record at the file's position; None at the end of the file. Raises :class:`Cut`."""
+    """Kind and content of the next record; None at the end of the file. Raises :class:`Cut`."""
     head = file.read(HEAD)
     if not head:
         return None
@@ -78,9 +77,7 @@ def parsed(kind: Any, data: bytes) -> Any:
 
 
 def inside(chunk: Chunk) -> Iterator[Any]:
-    """Messages, channels and schemas of a chunk, in order. Raises :class:`Unreadable` before the first one if the chunk
-    is damaged or unpacks to too many bytes.
-    """
+    """Messages, channels and schemas of a chunk, in order. Raises :class:`Unreadable` before the first one."""
     from mcap.opcode import Opcode
     from mcap.records import Channel, Schema
 
@@ -110,7 +107,7 @@ def message(data: bytes) -> Any:
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """The chunk's bytes: exactly as many as it states, and never more than allowed."""
+    """The chunk's bytes, exactly as many as it states and may have."""
     size, packed = chunk.uncompressed_size, chunk.data
     if size > min(UNPACKED, max(FREE, RATIO * len(packed))):
         raise Unreadable
@@ -150,10 +147,9 @@ _COUNT = struct.Struct("<I")
 
 MAX_LINKS = 64
 MAX_NAME = 256
-"""Most characters of a link's name, which a table of frames repeats in each row."""
+"""Most characters of a link's name, which tables repeat in each row."""
 MAX_TEXTS = 1000
 _FOOTER_BYTES = HEAD + 20 + len(MAGIC)
-"""Bytes of the footer of a closed file."""
 
 
 def numbered(path: Path, number: int) -> Path:
@@ -162,8 +158,8 @@ def numbered(path: Path, number: int) -> Path:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files of a recording to ``path``, in order: the file itself, or the parts of a split recording. Raises
-    :class:`RecordingError` if a part is missing.
+    """The files of a recording to ``path``, in order: one, or the parts of a split one. Raises :class:`RecordingError`
+    if a part is missing.
     """
     if path.suffix != SUFFIX or path.exists():
         return [path]
@@ -213,8 +209,8 @@ class McapPart:
         return found
 
     def read(self, link: str, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
-        """(arrival of the last byte in ns, bytes) of a link in order, from ``begin_ns`` up to ``end_ns``. One chunk is
-        in memory at a time.
+        """(arrival of the last byte in ns, bytes) of a link in order, from ``begin_ns`` up to ``end_ns``, with one
+        chunk in memory.
         """
         from mcap.opcode import Opcode
         from mcap.records import Chunk, Message
@@ -313,8 +309,8 @@ class Summary:
 
 
 def _each(file: BinaryIO, kind: int, places: list[tuple[int, int]]) -> Iterator[bytes]:
-    """Contents of the records of this kind at these (position, size) places, in order. Raises :class:`Unreadable`, also
-    for a repeated place, so that the time is bounded by the file's size.
+    """Contents of the records of this kind at these (position, size) places. Raises :class:`Unreadable`, also for a
+    repeated place.
     """
     free = 0
     for at, size in sorted(places):
@@ -341,11 +337,11 @@ def data_of(message: bytes) -> bytes:
 
 
 HELLO_NS = 600_000_000
-"""Longest interval of hellos in ns, with a margin; boards send two per second."""
+"""Longest interval of hellos, with a margin."""
 
 
 class McapBytes:
-    """A recording whose files were closed or recovered. Each call of :meth:`pieces` reads independently."""
+    """A recording whose files were closed or recovered. Calls of :meth:`pieces` are independent."""
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
@@ -362,7 +358,7 @@ class McapBytes:
 
     @property
     def links(self) -> list[str]:
-        """Names of the links, in the order in which they were added."""
+        """Names of the links, in order of addition."""
         return list(self._links)
 
     def checked(self, link: str | None) -> str:
@@ -377,7 +373,7 @@ class McapBytes:
         raise RecordingError(f"{self.path} has no link {link!r}; it has {names}")
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """The texts of this name in the metadata; repetitions in further files count once."""
+        """The texts of this name in the metadata, without repetitions in further files."""
         found: list[dict[str, str]] = []
         for part in self._parts:
             found += [one for one in part.texts(name) if one not in found]
@@ -426,7 +422,6 @@ class McapStream:
         return data
 
     def close(self) -> None:
-        """Close the file."""
         self._pieces.close()  # type: ignore[attr-defined]
 
 
@@ -443,7 +438,6 @@ def _last_hello(pieces: Iterable[tuple[int, bytes]]) -> int:
 
 
 def _after(pieces: Iterable[tuple[int, bytes]], at: int) -> Iterator[tuple[int, bytes]]:
-    """The pieces without their first ``at`` bytes."""
     for moment, data in pieces:
         if at < len(data):
             yield moment, data[at:]

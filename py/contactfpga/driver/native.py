@@ -1,8 +1,8 @@
 """Python binding, by ctypes, of the C thread that reads ports (c/reader.c).
 
-A plain C library needs neither Python's headers nor a build for each Python version; the installation compiles it if
-there is a C compiler (hatch_build.py). Waiting calls release the interpreter's lock, the others keep it. So the newest
-frame is copied after the waiting thread has the lock again, and is as new as possible.
+A plain C library needs no build for each Python version; the installation compiles it if there is a C compiler
+(hatch_build.py). Waiting calls release the interpreter's lock, the others keep it. So a thread that has waited gets the
+newest frame at the time at which it continues.
 """
 
 from __future__ import annotations
@@ -68,8 +68,6 @@ class Base(ctypes.Structure):
 
 
 class Newest(NamedTuple):
-    """The newest frame."""
-
     packets: int
     """Number of the frame's packet since the port was opened, from 1."""
     time_us: int
@@ -77,7 +75,7 @@ class Newest(NamedTuple):
     after_another: bool
     """Whether the frame before it, :meth:`Port.before`, came after :meth:`Port.settle`."""
     line: HostLine
-    """Map from the board's clock to the host's, with the frame's arrival."""
+    """Map from the board's clock to the host's, with the arrival."""
     frame: Frame
 
 
@@ -144,8 +142,7 @@ def refusal(port: object) -> str:
 
 
 class NativeFit(ClockFit):
-    """A :class:`~contactfpga.driver.clock.ClockFit` in C, which the reading thread continues after :meth:`Port.settle`.
-    """
+    """A :class:`~contactfpga.driver.clock.ClockFit` in C, which the reading thread continues."""
 
     def __init__(self) -> None:
         self._library = library()
@@ -182,7 +179,7 @@ class NativeFit(ClockFit):
 
 
 class Port:
-    """A port that the C thread reads; with descriptor -1, its bytes come from :meth:`feed`."""
+    """A port that the C thread reads, or with descriptor -1 gets from :meth:`feed`."""
 
     def __init__(self, descriptor: int, now: float):
         self._library, self._inherited = library(), False
@@ -198,7 +195,6 @@ class Port:
         forks.watch(self)
 
     def forked(self) -> None:
-        """Detach the port in a child process."""
         self._inherited = True
 
     def __del__(self) -> None:
@@ -229,11 +225,11 @@ class Port:
         self._library.wait(self._address, packets, 0, seconds)
 
     def wait_for_much(self, seconds: float) -> None:
-        """Wait until a ring is a quarter full, for the port's end, or for ``seconds``."""
+        """:meth:`wait` until a ring is a quarter full."""
         self._library.wait(self._address, 0, 1, seconds)
 
     def paused(self, now: float) -> bool:
-        """Whether the last read is so long ago that frame times have become ambiguous."""
+        """Whether frame times are ambiguous since the last read."""
         return bool(self._library.notice(self._address, now))
 
     @property
@@ -268,7 +264,6 @@ class Port:
         self._decodes = frame_format
 
     def _make_room(self) -> None:
-        """Allocate buffers for the newest frame and the one before it."""
         self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
         self._newest_view = self._newest.data
         self._newest_at = self._newest.ctypes.data
@@ -276,8 +271,8 @@ class Port:
     # ---- what came
 
     def take(self) -> tuple[Reads, bytes, int] | None:
-        """All waiting reads, the beginning of their first packet if bytes before them were overwritten, and the number
-        of these bytes; None if nothing waits.
+        """All waiting reads, the beginning of their first packet if it was overwritten, and the number of overwritten
+        bytes; None if nothing waits.
         """
         if not (size := self._library.waiting(self._address)):
             return None
@@ -324,8 +319,8 @@ class Port:
         self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
-        """The newest frame; None if it is not newer than packet ``packets``, which was taken before :meth:`settle` or
-        came later. Raises :class:`Unsettled` if received packets have to be taken first. Not thread-safe.
+        """The newest frame; None unless it is newer than packet ``packets``. Raises :class:`Unsettled` if received
+        packets have to be taken first. Not thread-safe.
         """
         found = self._library.newest(self._address, packets, self._newest_at)
         if found <= 0:
@@ -342,7 +337,6 @@ class Port:
         return self._frame(second, _NEWEST.size + 2 * FIELDS.itemsize + first[-1] * self._columns * _WORD)
 
     def _frame(self, fields: tuple[int, ...], start: int) -> Frame:
-        """The frame with these fields and the records from ``start`` on."""
         assert self._decodes is not None
         shape = fields[-1], self._columns
         copied = bytearray(self._newest_view[start : start + shape[0] * shape[1] * _WORD])

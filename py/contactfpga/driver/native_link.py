@@ -1,9 +1,8 @@
-"""A link whose port is read by a thread in C, so that no further Python thread has to run first.
+"""A link whose port is read by a thread in C, so that frames wait for no other Python thread.
 
-The C thread notes arrivals and decodes frames (:mod:`contactfpga.driver.native`). Each calling thread takes what
-arrived and lets the conversation interpret it, as in a :class:`~contactfpga.driver.link.Link`. Without calls, a thread
-does so every two seconds. While each frame continues the one before, the newest frame is known even before the others
-are taken.
+The C thread notes arrivals and decodes frames (:mod:`contactfpga.driver.native`). Calling threads let the conversation
+interpret them, as in a :class:`~contactfpga.driver.link.Link`; without calls, a thread does so every two seconds. While
+frames continue one another, the newest is known before the others are taken.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 SERVE_S = 2.0
-"""Interval in s of taking data without calls, and delay of logs. For a file of recorded bytes,
-:data:`contactfpga.driver.link.READ_S` holds.
+"""Interval of taking data without calls, which delays logs; for a file of recorded bytes it is
+:data:`contactfpga.driver.link.READ_S`.
 """
 
 
@@ -58,11 +57,8 @@ class NativePort:
 
 
 class _Base(NamedTuple):
-    """State of the conversation after all taken packets, on which newer frames build."""
-
     steady: Steady
     packets: int
-    """Number of packets that the conversation had taken."""
     more_frames: int
     """Frame number minus packet number, constant while frames continue one another."""
 
@@ -70,7 +66,7 @@ class _Base(NamedTuple):
 class NativeLink(Link):
     """A :class:`~contactfpga.driver.link.Link` to a board on a :class:`NativePort`.
 
-    The newest frame needs no lock :attr:`changed`, under which a thread may process many frames.
+    The newest frame does not need the lock :attr:`changed`, under which threads may work long.
     """
 
     fit = NativeFit
@@ -96,7 +92,6 @@ class NativeLink(Link):
 
     @property
     def last_s(self) -> float:
-        """Arrival of the last frame in s on the host's clock."""
         self.catch_up()
         return self._last_s
 
@@ -105,7 +100,7 @@ class NativeLink(Link):
         self._last_s = moment
 
     def catch_up(self) -> None:
-        """Take everything received, with the consequences of its lateness."""
+        """Take everything received, and conclude from its delay."""
         with self.changed:
             if self._taking or self._inherited:
                 return
@@ -164,9 +159,7 @@ class NativeLink(Link):
             self._core.wait(seen, min(left, READ_S))
 
     def _left(self, deadline: float, timeout: float, start: int) -> float:
-        """Seconds until the deadline; raises the errors of :meth:`wait_for` if nothing can come by then. ``start``:
-        bytes received before the wait.
-        """
+        """Seconds until the deadline; raises if nothing can come by then. ``start``: bytes received before the wait."""
         if self._failure is not None:
             raise self._failure.with_traceback(None)
         if (left := deadline - self.transport.clock()) > 0:
@@ -191,8 +184,8 @@ class NativeLink(Link):
             self.check_open()
 
     def _newest(self, queue: FrameQueue) -> Zones | int | None:
-        """The newest frame that the queue has not had; or the number of the last known packet if there is none yet;
-        None if the queue decides. Raises :class:`Unsettled`.
+        """The newest frame that the queue has not had; otherwise the number of the packet after which it comes; None if
+        the queue decides. Raises :class:`Unsettled`.
         """
         try:
             return self._show(queue)

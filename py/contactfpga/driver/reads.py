@@ -1,4 +1,4 @@
-"""Successive reads of a port, with the packets that are already decoded."""
+"""Successive reads of a port, with decoded packets."""
 
 from __future__ import annotations
 
@@ -12,20 +12,18 @@ from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import PacketTable
 
 PAUSED, NOISE = 1, 2
-"""Flags of a read: the reader had paused too long for known times; more bytes than a packet came without a delimiter.
-"""
+"""Flags of a read: after a pause that makes times ambiguous; with too many bytes without a delimiter."""
 
 
 READ = np.dtype([("at_s", "<f8"), ("bytes", "<i8"), ("packets", "<i8"), ("records", "<i8"), ("odd", "<i8")])
-"""One read: ``bytes`` and ``packets`` are totals up to it, ``odd`` has the flags :data:`PAUSED` and :data:`NOISE`."""
+"""One read: ``bytes`` and ``packets`` are totals up to it, ``odd`` has flags."""
 
 
 class Reads:
     """Consecutive reads.
 
-    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes. ``decoded``: every
-    packet's fields, its size in bytes in (n,) ``sizes``, and whether it is a whole frame by ``frame_format``
-    (:attr:`contactfpga.driver.conversation.Conversation.frame_format`).
+    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes. ``decoded``: each
+    packet's fields, its bytes in (n,) ``sizes``, and whether it is a whole frame by ``frame_format``.
     """
 
     def __init__(
@@ -48,26 +46,23 @@ class Reads:
         return len(self.at_s)
 
     def paused(self, at: int) -> bool:
-        """Whether the reader had paused before this read too long for known times."""
+        """Whether times are ambiguous because of a pause before this read."""
         return bool(self._reads["odd"][at] & PAUSED)
 
     def packets_before(self, at: int) -> int:
-        """Packets completed before this read."""
         return self._packets[at]
 
     def data_of(self, at: int, end: int | None = None) -> bytes:
-        """Bytes of this read, or of those up to ``end``."""
         return self._data[self._bytes[at] : self._bytes[at + 1 if end is None else end]]
 
     def decoded_at(self, at: int) -> PacketTable | None:
-        """Packets that this read completed."""
         if self.decoded is None or len(self) == 1:
             return self.decoded
         return self.decoded.part(self._packets[at], self._packets[at + 1])
 
     def last_within(self, at: int, packets: int) -> int:
-        """End of the reads from this one on that have only the first ``packets`` packets, no flags and no long pause,
-        and that end with a packet.
+        """End of the unflagged reads from this one on within the first ``packets`` packets, without long pauses; the
+        last one has a packet.
         """
         end = bisect.bisect_right(self._packets, packets, at + 1, self._next_break(at) + 1) - 1
         while end > at and self._packets[end] == self._packets[end - 1]:
@@ -75,7 +70,7 @@ class Reads:
         return end
 
     def _next_break(self, at: int) -> int:
-        """The first flagged read from here on, or the first that came too late after the one before."""
+        """The first flagged or late read from here on."""
         if self._reads["odd"][at]:
             return at
         place = bisect.bisect_right(self._breaks, at)
@@ -91,8 +86,8 @@ class Reads:
     def last_frames(
         self, at: int, end: int, times_us: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """For each read with frames: time (from ``times_us``) and size with delimiter of its last frame, arrival, and
-        number of frames.
+        """For each read with frames: time and size of its last frame, arrival, and number of frames. ``times_us``: of
+        each frame.
         """
         by = np.array(self._packets[at : end + 1])
         counts = np.diff(by)

@@ -129,7 +129,7 @@ def open_recorded(name: str) -> ByteFile:
 
 
 def check(path: str | Path) -> None:
-    """Refuse an output file that cannot be made or is not empty, before a board is opened or built."""
+    """Refuse a nonempty or impossible output file before a board is opened or built."""
     place = Path(path)
     if place.is_file():
         _check_empty(path, place.stat())
@@ -160,8 +160,8 @@ def _check_empty(path: str | Path, found: os.stat_result) -> None:
 
 
 class ReplayTransport:
-    """A byte stream recorded by ``open(port, record=FILE)`` or `contactfpga record`: ``replay://FILE`` plays it as fast
-    as it is read, ``replay://FILE?pace=1`` in its own time.
+    """A byte stream of ``open(port, record=FILE)`` or `contactfpga record`, played by ``replay://FILE``, with
+    ``?pace=1`` in its own time.
     """
 
     live = threaded = False

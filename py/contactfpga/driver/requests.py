@@ -11,8 +11,8 @@ from contactfpga.wire import protocol
 from contactfpga.wire.command import Command, encode_command
 
 MOST_APART = 5
-"""Most steps between the last number repeated by a frame and the last one sent, for sending another: frames on their
-way then carry at most six numbers, and the next one is the seventh.
+"""Largest lead of the last sent number over the last one in a frame that permits another request: frames on their way
+then have at most six numbers, and low bits distinguish seven.
 """
 
 _LOWS = (1 << HEARD_BITS) - 1
@@ -30,19 +30,18 @@ class _Stage(enum.Enum):
 class Requests:
     """Numbers requests, and tells which ones a frame answers.
 
-    Each caller gets a ticket, counted from 1. One request may serve several tickets. A command is a request whose
-    answer serves its own ticket alone: until then nothing else is sent.
+    Each caller gets a ticket, counted from 1; one request may serve several. A command is a request with a ticket of
+    its own: until its answer nothing else is sent.
     """
 
     def __init__(self, rng: random.Random | None = None):
         self.retry_s = 0.5
-        """Time in s after which an unanswered request is sent again, as long as a caller waits."""
+        """Time after which an unanswered request is repeated for its caller."""
         self.pulsed: bool | None = None
-        """Whether the board reads pulses; None: unknown, so both forms are sent, of which it takes one as a request."""
+        """Whether the board reads pulses; None: unknown, so both forms are sent."""
         self.answered = 0
         """Highest answered ticket."""
         self.answered_sent_s = 0.0
-        """Time at which the last answered request was sent."""
         self._rng = rng or random.SystemRandom()
         self._out = bytearray()
         self._stage = _Stage.UNKNOWN
@@ -61,12 +60,11 @@ class Requests:
 
     @property
     def idle(self) -> bool:
-        """Whether every request is answered."""
         return self._tickets == self.answered
 
     def ask(self, now: float, until: float, hello: bool = False) -> int:
-        """Ticket for a frame scanned after ``now``, for which the caller waits until ``until``. ``hello``: request a
-        hello as well.
+        """Ticket for a frame scanned after ``now``; the caller waits until ``until``. ``hello``: request one as
+        well.
         """
         self._tickets += 1
         self._until = max(self._until, until)
@@ -75,8 +73,8 @@ class Requests:
         return self._tickets
 
     def command(self, command: Command, now: float, until: float) -> int:
-        """Ticket for a frame scanned after the board took this command, one at a time. If an answer is lost, the board
-        may take it again.
+        """Ticket for a frame scanned after the board took this command, perhaps twice if an answer is lost; one at a
+        time.
         """
         assert self._command is None, "one command at a time"
         self._tickets += 1
@@ -95,13 +93,12 @@ class Requests:
             self._send(now, hello)
 
     def data_to_send(self) -> bytes:
-        """Bytes to send to the board now."""
         data = bytes(self._out)
         self._out.clear()
         return data
 
     def sent_since(self, number: int, moment: float) -> bool:
-        """Whether this is the last sent number, sent since ``moment``."""
+        """Whether this is the last number, sent since ``moment``."""
         return number == self._number and self._sent_at >= moment
 
     def take_hello(self, heard: int, pulsed: bool, now: float) -> None:
@@ -165,8 +162,8 @@ class Requests:
                     self._out += encode_command(number, command, hello, pulsed)
 
     def _random(self) -> int:
-        """A number whose lowest bits have not recently been followed by its next ones, so that frames which waited in
-        the board while the hello overtook them cannot carry them.
+        """A random number whose lowest bits and then the next ones are no recent sequence: frames that the hello
+        overtook cannot carry them.
         """
         recent = list(self._recent)
         while True:

@@ -1,7 +1,6 @@
-"""Shared port of an FPGA with several sheets, whose packets have the sheet's number (docs/protocol.md).
+"""A port of an FPGA with several sheets, whose packets have the sheet's number (docs/protocol.md).
 
-``PORT#1`` is sheet 1 at a port. It behaves like the port of a board with this sheet alone. The real port is open while
-one of its sheets is open.
+``PORT#1`` is sheet 1 at a port, and behaves like a board of its own. The real port is open while one of its sheets is.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ READ_S = 0.05
 """Time in s for which one sheet reads for all."""
 
 MOST_WAIT = 16_384
-"""Most packets that wait for a sheet; beyond that, the oldest are dropped, which shows as a gap in its numbers."""
+"""Most packets that wait for a sheet; beyond that, the oldest are dropped."""
 
 _DAMAGED = b"\x01\x00"
-"""Stands for a packet of an unknown sheet: every sheet counts it as damaged."""
+"""A packet of an unknown sheet, which every sheet counts as damaged."""
 
 
 class Sorter:
@@ -43,8 +42,8 @@ class Sorter:
         self._rest = b""
 
     def take(self, data: bytes) -> list[tuple[int | None, bytes]]:
-        """(sheet, packet with its delimiter) of all packets that ``data`` completes. Without a sheet, the packet is one
-        that every sheet refuses.
+        """(sheet, packet with its delimiter) of all packets that ``data`` completes; packets without a sheet are
+        invalid for every sheet.
         """
         *packets, self._rest = (self._rest + data).split(b"\0")
         found = [self._sorted(packet) for packet in packets if packet]
@@ -86,7 +85,7 @@ class SharedPort:
         return [f"{self.inner.name}#{number}" for number in range(self._sorter.sheets or 0)]
 
     def add(self, sheet: SheetPort) -> None:
-        """Keep packets of this sheet from now on. Another bitstream may have been loaded since the last hello."""
+        """Keep packets of this sheet from now on. The bitstream may have changed."""
         with self._changed:
             self._sorter.alone = False
             self._waiting[sheet] = deque(maxlen=MOST_WAIT)
@@ -97,7 +96,7 @@ class SharedPort:
             return self._waiting.pop(sheet, None) is not None and not self._waiting
 
     def read(self, sheet: SheetPort, timeout_s: float) -> bytes:
-        """Received bytes of this sheet, after at most ``timeout_s``; one of the waiting sheets reads for all."""
+        """Received bytes of this sheet; one of the waiting sheets reads for all."""
         until = self.inner.clock() + timeout_s
         with self._changed:
             while True:
@@ -116,7 +115,7 @@ class SharedPort:
                     return b""
 
     def write(self, data: bytes) -> None:
-        """Send bytes as a whole, because interleaved requests of two sheets are invalid."""
+        """Send bytes in one piece: interleaved requests of two sheets are invalid."""
         with self._writing:
             self.inner.write(data)
 
@@ -219,7 +218,7 @@ def share(address: SheetOf, baud: int, connect: Callable[[str, int], Transport] 
 
 
 def open_at(port: str) -> list[str]:
-    """Ports of the sheets at a port that is open in this process; otherwise none."""
+    """Ports of the sheets at a port, if it is open in this process."""
     with _lock:
         shared = _open.get(port)
         return [] if shared is None or shared.failure is not None else shared.names

@@ -14,13 +14,11 @@ class NetCounters:
     messages: int = 0
     """Messages received."""
     lost_messages: int = 0
-    """Messages that did not arrive: dropped because the network was too slow, or lost while it was broken."""
+    """Messages that did not arrive, because the network was too slow or broken."""
     lost_bytes: int = 0
     """Bytes of the board in lost messages."""
     refused: int = 0
-    """Messages dropped because they were malformed, duplicate, late, from a second publisher of the key, or followed by
-    no later message.
-    """
+    """Messages dropped as malformed, duplicate, late, of a second publisher, or followed by no later message."""
     publishers: int = 0
     """Publishers heard: 1, plus one for each restart."""
     breaks: int = 0
@@ -30,7 +28,7 @@ class NetCounters:
     left_out: int = 0
     """Bytes that this program did not take in time."""
     denied: int = 0
-    """Messages to the board, of all programs, that the publisher did not pass on."""
+    """Messages of all programs to the board that the publisher refused."""
 
 
 @dataclasses.dataclass
@@ -46,19 +44,17 @@ class Stats:
     frames: int = 0
     """Frames received whole and passed on."""
     lost: int = 0
-    """Frames that the board sent and that did not arrive whole. They are counted from gaps in the sequence numbers. The
-    count is exact at each hello, which has the number of sent frames.
+    """Frames that the board sent and that did not arrive whole, by gaps in the sequence numbers; exact at each hello,
+    which has the number of sent frames.
     """
     unexplained: int = 0
-    """Whole frames that were not passed on, because their times were unknown until the next hello: after a pause on the
-    line, or after a restart.
+    """Whole frames that were not passed on, because a pause or restart made their times unknown until the next
+    hello.
     """
     dropped: int = 0
     """Frames dropped from the full queue of ``Board.next``, oldest first."""
     overwritten: int = 0
-    """Frames that the board replaced by newer ones before sending them; each gap counts modulo
-    2^``Widths.overwritten_bits``.
-    """
+    """Frames replaced by newer ones on the board; each gap counts modulo 2^``Widths.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
     """Refused packets, by reason: framing, crc, length, kind, content, noise."""
     resynchronized: int = 0
@@ -70,13 +66,11 @@ class Stats:
     sweeps: int = 0
     """Sweeps of the pressure units received."""
     sweeps_lost: int = 0
-    """Sweeps that did not arrive, because they were damaged, or because newer ones replaced them while frames filled
-    the line; each gap counts modulo 256.
-    """
+    """Sweeps that were damaged, or replaced by newer ones on a full line; each gap counts modulo 256."""
     sweeps_unexplained: int = 0
-    """Sweeps that were not passed on, because their times were unknown until the next frame."""
+    """Sweeps that were not passed on, because no frame told their times yet."""
     before_hello: int = 0
-    """Packets before the first hello, which cannot be read without it."""
+    """Packets before the first hello, which are unreadable."""
     unknown_kinds: int = 0
     """Valid packets of kinds unknown to this host."""
     foreign_version: int = 0
@@ -91,7 +85,7 @@ class Stats:
     """All bytes received."""
 
     net: NetCounters | None = None
-    """Counters of the network for a ``zenoh://`` port; None for any other port."""
+    """Counters of the network for a ``zenoh://`` port; otherwise None."""
 
     def to_dict(self) -> dict[str, object]:
         """All counters as plain Python values, ready for JSON."""

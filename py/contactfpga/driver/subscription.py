@@ -18,7 +18,7 @@ from contactfpga.zones.zone import Zones
 Item = TypeVar("Item")
 
 POLL_S = 1e-9
-"""Wait in s for a timeout of 0: simulated time and recordings advance only during a wait."""
+"""Wait for a timeout of 0: simulated time and recordings advance only during a wait."""
 
 
 class Listening(Generic[Item]):
@@ -73,8 +73,8 @@ class Listening(Generic[Item]):
             self._link.changed.notify_all()
 
     def settle(self, all_taken: Callable[[int], bool], timeout: float = 1.0) -> int:
-        """Read until ``all_taken`` is true of the number of the board's bytes whose frames are all here or taken;
-        returns the number of items waiting then. Raises :class:`ReadTimeout`.
+        """Read until ``all_taken`` is true of the number of bytes whose frames are here or taken; returns the number of
+        waiting items. Raises :class:`ReadTimeout`.
         """
         waiting = 0
 
@@ -127,7 +127,7 @@ class Listening(Generic[Item]):
                 raise
 
     def _silent_at(self) -> float:
-        """Time of the next silence: a deadline after the last frame or the last reported silence."""
+        """Time of the next silence to report."""
         if self._deadline_s is None:
             return float("inf")
         return max(self._noticed, self._link.last_s) + self._deadline_s
@@ -197,8 +197,8 @@ class Subscription(Listening[Zones]):
         return self._link.newest(self._frames, checked(timeout))
 
     def newest(self, max_age_s: float, timeout: float) -> Zones:
-        """The next frame that arrived and was scanned at most ``max_age_s`` ago; raises :class:`NoData` as soon as
-        there can be none.
+        """The next frame that arrived and was scanned at most ``max_age_s`` ago; raises :class:`NoData` if there can be
+        none.
         """
         if not self._link.transport.live:
             return self.next(timeout)
@@ -230,12 +230,12 @@ class Subscription(Listening[Zones]):
             self._frames.skip_to(zones)
 
     def keep_last(self) -> None:
-        """Drop all frames but the last one; raises an error caused by a hello."""
+        """Drop all frames but the last; raises a pending error."""
         with self._link.changed:
             self._frames.keep_last()
 
     def raise_first(self) -> None:
-        """Raise an error that a hello caused before the first frame."""
+        """Raise a pending error before the first frame."""
         with self._link.changed:
             if (error := self._frames.first_error()) is not None:
                 raise error
@@ -262,14 +262,14 @@ def checked_item(found: object) -> object:
 
 
 def checked(timeout: float) -> float:
-    """A timeout in seconds as a float; raises ValueError unless it is positive and finite."""
+    """A timeout in seconds; raises ValueError unless it is positive and finite."""
     if not is_finite(timeout) or timeout <= 0:
         raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
     return float(timeout)
 
 
 def checked_span(max_s: float) -> float:
-    """The seconds of a batch as a float; raises ValueError unless they are finite and not below 0."""
+    """The seconds of a batch; raises ValueError unless they are finite and not below 0."""
     if not is_finite(max_s) or max_s < 0:
         raise ValueError(f"max_s is {max_s!r}; it must be a number of seconds, 0 or more")
     return float(max_s)

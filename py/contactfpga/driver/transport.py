@@ -1,4 +1,4 @@
-"""Transports of bytes with a common interface: a serial port, the simulated board, a recording, or a foreign sheet."""
+"""Sources of bytes with a common interface."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ SCHEMES = {
     "flexitac": "contactfpga.driver.flexitac:FlexitacPort",
     "sheet": "contactfpga.driver.sheets:share",
 }
-"""Opener of each scheme's addresses as "module:attribute", loaded on first use: a function of the address that returns
-a :class:`Transport`, or for ``sim`` a :class:`SimulatedPort`.
+"""Opener of each scheme's addresses as "module:attribute", loaded on first use. It makes a :class:`Transport` of an
+address, or for ``sim`` a :class:`SimulatedPort`.
 """
 
 OPENED_BY_NAME = {Replay: "replay", Net: "zenoh", Flexitac: "flexitac"}
@@ -45,9 +45,7 @@ class Transport(Protocol):
     live: bool
     """Whether the other end is a board that answers requests."""
     threaded: bool
-    """Whether bytes come by themselves, so that a separate thread has to read them; otherwise time passes, or the
-    recording continues, only during reads.
-    """
+    """Whether bytes come by themselves, and a separate thread has to read them."""
 
     def read(self, timeout_s: float) -> bytes:
         """Available bytes, waiting at most ``timeout_s`` for the first one; b"" if none came.
@@ -119,11 +117,10 @@ class SerialTransport:
             self._port.close()
 
     def forked(self) -> None:
-        """Close the child's descriptor; the lock belongs to the parent, and ends with the last descriptor."""
+        """Close the child's descriptor; the parent keeps the lock."""
         self.close()
 
     def fileno(self) -> int:
-        """The port's file descriptor."""
         return int(self._port.fileno())
 
     def lost(self, error: Exception) -> PortLost:
@@ -160,7 +157,7 @@ class SimulatedPort(Protocol):
     """A board in simulated time, such as :class:`contactfpga_sim.model.board.virtual.VirtualBoard`."""
 
     def read(self, seconds: float) -> bytes:
-        """Advance simulated time until bytes come, at most ``seconds``; returns these bytes."""
+        """Advance simulated time until bytes come, at most ``seconds``; returns them."""
 
     def write(self, data: bytes) -> None:
         """Send bytes to the board."""
@@ -180,7 +177,7 @@ class SimTransport:
     def __init__(self, name: str, board: SimulatedPort):
         self.name = name
         self.rng: random.Random | None = getattr(board, "rng", None)
-        """The board's own random generator for request numbers, if it has one: equal runs then give equal bytes."""
+        """The board's random generator of request numbers: equal runs give equal bytes."""
         self._board = board
         if _SIMULATED.setdefault(id(board), self) is not self:
             raise PortBusy(f"{name} is in use: this program opened it already; close that first")
@@ -202,7 +199,7 @@ class SimTransport:
 
 
 _SIMULATED: weakref.WeakValueDictionary[int, SimTransport] = weakref.WeakValueDictionary()
-"""Open transports by the identity of their boards: two readers would take each other's bytes."""
+"""Open transports by board, since two readers would take each other's bytes."""
 
 forks.in_child(_SIMULATED.clear)
 
@@ -231,9 +228,7 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
-    """The board of ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: used if the address names no
-    file.
-    """
+    """The board of ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default."""
     board: SimulatedPort = _opener("sim")(name, skin)
     return board
 

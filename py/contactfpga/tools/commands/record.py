@@ -1,4 +1,4 @@
-"""`contactfpga record`: a board's data into a file; and recovery of a file that was not closed."""
+"""`contactfpga record`: a board's data into a file; and recovery of an unclosed file."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
 
 def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
-    """A function that computes the forces at contacts of a link with pressure units."""
+    """Maker of the forces at contacts of a link with pressure units."""
     from contactfpga.robot.body.snapshot import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
@@ -139,7 +139,7 @@ def _pieces(count: int) -> str:
 
 
 class _Progress:
-    """A progress line, overwritten if the terminal can, and the final message."""
+    """A progress line, overwritten if possible, and the final message."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

@@ -1,4 +1,4 @@
-"""Numbers on the command line: each type names its range and unit when a value is outside."""
+"""Types of numbers on the command line, whose errors name range and unit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ def number(low: float, high: float, unit: str = "", *, above: bool = False, hint
 
 
 def whole(low: int, high: int, unit: str = "") -> Callable[[str], int]:
-    """A whole number from ``low`` to ``high``."""
     return _between(int, "whole number", low, high, unit, False, "")
 
 
@@ -44,7 +43,7 @@ def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
 
 
 def length(high: float, low: float = MIN_LENGTH_M) -> Callable[[str], float]:
-    """A length in m; values in mm are out of range."""
+    """A length in m, whose range excludes values in mm."""
     return number(low, high, "m", hint=IN_METERS)
 
 

@@ -41,10 +41,10 @@ def tables(
     texts: Sequence[int] = (),
     styles: Mapping[int, str] | None = None,
 ) -> Iterator[Table]:
-    """The head and lines of ``rows`` as few tables of this width, each beginning with the first ``keys`` columns.
+    """The head and lines of ``rows`` as few tables of this width, each with the first ``keys`` columns.
 
-    ``texts``: left-aligned columns of words; the last column is wrapped if needed, and so is the first if it is the
-    only key. ``styles``: of lines by number.
+    ``texts``: left-aligned columns of words. The last column is wrapped if needed, and so is an only key. ``styles``:
+    of lines by number.
     """
     columns = [list(column) for column in zip(*rows, strict=True)]
     last = len(columns) - 1

@@ -28,7 +28,7 @@ class Graded(NamedTuple):
     prediction: Prediction
     measured: float
     within: float
-    """Tolerance of the measured value either way, from rounding to clocks."""
+    """Tolerance of the measurement from rounding to clocks."""
 
     @property
     def holds(self) -> bool:
@@ -66,7 +66,6 @@ class BringUpReport:
 
     @property
     def faults(self) -> int:
-        """Number of faults found."""
         return sum(step.faults for step in self.steps)
 
     def to_dict(self) -> dict[str, Any]:

@@ -52,7 +52,6 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def bare_skin(board: Board, hidden: str) -> Skin:
-    """The board's Skin without debounce."""
     skin = flags.known_skin(board)
     if skin is None:
         raise ContactFPGAError(
@@ -68,7 +67,7 @@ def bare_skin(board: Board, hidden: str) -> Skin:
 
 
 def _overwritten(board: Board) -> list[Finding]:
-    """Findings about gaps between frames, whose events are unknown."""
+    """Findings about gaps between frames."""
     stats = board.stats
     share = stats.overwritten / max(1, stats.overwritten + stats.frames)
     if share < MANY:
