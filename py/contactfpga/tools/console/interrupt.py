@@ -39,8 +39,8 @@ class Interruption(KeyboardInterrupt):
 def guarded(body: Callable[[], int | None]) -> int:
     """The status of ``body``; neither Ctrl-C nor a user's error ends it with a traceback.
 
-    It handles Ctrl-C even if ignored: shells start background processes so, which also get the signal that ends a
-    command.
+    Shells start background processes with Ctrl-C ignored, but the same signal ends them; this function handles it
+    anyway.
     """
     global _came
     _came = None

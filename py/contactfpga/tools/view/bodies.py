@@ -1,4 +1,4 @@
-"""A robot with sheets on its links, live or recorded: each link's newest frame, and sliders for its joints."""
+"""A robot with sheets on its links, live or recorded."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ ROBOT_SIDES = {
         "back": (-1.0, 0.0, 0.1),
     }.items()
 }
-"""A robot faces x, with z up."""
+"""Views of a robot that faces x, with z up."""
 
 
 class RobotSource(Protocol):
@@ -86,7 +86,6 @@ class BodySource:
         return driver.open(virtual, plan.skin, timeout=self._timeout)
 
     def states(self) -> dict[str, LinkState]:
-        """Current states of all links."""
         return self._open.latest().links
 
     def close(self) -> None:
@@ -110,7 +109,7 @@ class DrawnRobot:
         arrows: np.ndarray | None = None,
         label: str | None = None,
     ) -> list[contacts.Row]:
-        """A link's newest frame; returns its contacts.
+        """Draw a link's newest frame; returns its contacts.
 
         Args:
          name: of the link.
@@ -158,7 +157,6 @@ class RobotView(abc.ABC):
         self._table = server.gui.add_html(contacts.table(()))
 
     def _add_rest(self, server: viser.ViserServer, title: str) -> None:
-        """Add sides to look from, and facts, to the panel."""
         controls.add(server, self.cameras, lambda: (f"contactfpga: {shortened(title)}", self._rows))
         self._facts = server.gui.add_markdown("")
 
@@ -186,8 +184,6 @@ class RobotView(abc.ABC):
 
 
 class BodyView(RobotView):
-    """A robot with boards, or a recording of them."""
-
     def __init__(self, server: viser.ViserServer, source: RobotSource):
         self._source = source
         self.stage = RobotStage(server, source.body)
@@ -217,7 +213,6 @@ class BodyView(RobotView):
         return [row for name, state in self._states.items() for row in self._draw(name, state)]
 
     def _move(self) -> None:
-        """Draw the links at their current poses."""
         if self._source.angles != self._moved:
             self._moved = dict(self._source.angles)
             self.stage.move(self._moved)
@@ -312,6 +307,6 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
 
 
 def holds_robot(recording: Recording) -> bool:
-    """Whether a recording has a robot with all files of its table; earlier versions stored the table alone."""
+    """Whether a recording has a robot with all files of its table, which earlier versions omitted."""
     texts = recording.texts(packed.ROBOT)
     return bool(texts) and set(texts[0]) != {packed.TOML}

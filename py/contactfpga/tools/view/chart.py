@@ -1,4 +1,4 @@
-"""Charts in the panel, as SVG in the page's colors: contacts and area over the last seconds, forces since a touch."""
+"""Charts in the panel, as SVG in the page's colors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LEFT, RIGHT, TOP, BOTTOM = 26, 34, 24, 118
 """Plot within the picture, in its units of about a pixel."""
 SECONDS = (-10, -8, -6, -4, -2, 0)
 AREA = "#2b8fd0"
-"""Lighter than the pressed cells' color, for dark panels."""
+"""Color of areas, lighter than pressed cells for dark panels."""
 FORCES = ((picture_style.VERMILLION, ""), ("#d99000", "5 2"), (AREA, ""))
 """Colors and dashes of the curves of :func:`force_chart`."""
 LEGEND = 14
@@ -39,8 +39,9 @@ def chart(strip: Strip) -> str:
 
 
 def force_chart(forces_n: np.ndarray, seconds: float, curves: Sequence[tuple[int, str]]) -> str:
-    """SVG of (curves, n) forces in N over ``seconds`` from a touch, nan where unknown; ``curves``: of each the number
-    of its color and dashes in :data:`FORCES`, and its name."""
+    """SVG of (curves, n) forces in N over ``seconds`` from a touch, nan where unknown; ``curves``: number in
+    :data:`FORCES` and name of each.
+    """
     most = top(np.nan_to_num(forces_n), 5, (1, 2, 3, 4, 6, 8, 10))
     shift = LEGEND * len(curves) - TOP + 18
     parts = []
@@ -67,14 +68,14 @@ def _svg(parts: Sequence[str], height: float, label: str) -> str:
 
 
 def top(values: np.ndarray, least: int, steps: Sequence[int] = (1, 2, 5, 10)) -> int:
-    """One of the steps times a power of ten, at least the largest value, so that the axis seldom changes."""
+    """Top of an axis: a step times a power of ten, at least the largest value, so that the axis seldom changes."""
     wanted = max(least, math.ceil(values.max(initial=0.0)))
     power = int(10 ** (len(str(wanted)) - 1))
     return next(times * power for times in steps if times * power >= wanted)
 
 
 def _signed(number: float) -> str:
-    """Write a number with the minus sign of typography."""
+    """A number with the minus sign of typography."""
     return f"{number:g}".replace("-", "−")
 
 

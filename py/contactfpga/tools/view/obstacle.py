@@ -10,11 +10,10 @@ NOTHING, BALL, HAND = OBSTACLES = ("none", "ball", "hand")
 FASTEST_M_S = 0.5
 """Largest speed of following the mouse, as MuJoCo's contacts ignore the speed of placed bodies."""
 AWAY_M = np.array([0.0, 0.0, 100.0])
-"""Waiting place of unchosen obstacles."""
+"""Place of unchosen obstacles."""
 AHEAD_M = 0.06
 """Initial place in front of a sheet, along x."""
 BALL_M = 0.03
-"""Radius."""
 STEEP = 1 / 3
 """Sine of the elevation from which the view counts as downward."""
 FARTHEST = 3.0
@@ -24,7 +23,7 @@ ALL_BITS = 2**31 - 1
 """Collision bits of a geom that touches everything touchable."""
 
 FINGERS_M = (-0.033, -0.011, 0.011, 0.033)
-"""Places of fingers along x on the palm, which is across y; they point up."""
+"""Places of upright fingers along x on the palm, which is across y."""
 
 
 def add(spec: Any) -> None:
@@ -73,7 +72,7 @@ class Obstacle:
 
 
 class Grip:
-    """A drag in the horizontal plane seen from above, else in the plane of two axes that faces the camera."""
+    """A drag in the horizontal plane seen from above, otherwise in the plane of two axes that faces the camera."""
 
     def __init__(self, obstacle: Obstacle, eye_m: np.ndarray, grabbed_m: np.ndarray):
         """(3,) places of the camera, and of the grip."""

@@ -43,7 +43,7 @@ PANEL_S = 0.25
 
 
 class View:
-    """Shows a source in a server's page."""
+    """A source shown in a server's page."""
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
         self._source = source
@@ -71,7 +71,7 @@ class View:
 
 
 FOREARM = Skin(rows=16, columns=16, closed=True, surface="cylinder", radius_mm=45.0)
-"""As in examples/forearm.toml."""
+"""Skin of examples/forearm.toml."""
 
 
 def own_skin(flat: bool = False) -> Skin:
@@ -108,7 +108,7 @@ class ViewRequest:
     units: str | Path | None = None
     """File of the pressure units; by default from ``sim://``."""
     flat: bool = False
-    """By default show a flat sheet instead of one around a forearm."""
+    """Whether the default sheet is flat instead of around a forearm."""
     reading: Reading = silent
     """Receives the progress of reading a recording without index."""
     mujoco: str | None = None
@@ -123,8 +123,7 @@ class ViewRequest:
 def opened(
     named: ViewRequest | None = None, host: str = server.LOCAL, http_port: int | None = None
 ) -> Iterator[ServedView]:
-    """Open the request, a virtual board by default, and serve a view of it; raises the errors of
-    :func:`contactfpga.open`."""
+    """Open the request and serve a view of it; raises the errors of :func:`contactfpga.open`."""
     named = named or ViewRequest()
     _check(named)
     source, hand = _source(named)
@@ -203,7 +202,7 @@ def _cells(named: ViewRequest) -> LoadCells | None:
 
 
 def _virtual(named: ViewRequest) -> Any:
-    """A virtual board; by default an untouched one of the Skin, or a sheet around a forearm."""
+    """A virtual board, by default an untouched one."""
     if named.port is not None:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit

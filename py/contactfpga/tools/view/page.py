@@ -1,5 +1,6 @@
 """Changes of viser's page: its panel under the sheet on a phone, none of its own marks over the sheet; and a
-picture."""
+picture.
+"""
 
 from __future__ import annotations
 
@@ -66,13 +67,13 @@ SCRIPT = """
   };
 })();
 """
-"""Script that removes viser's drag arrow and rotation cross, and saves a picture of the view, in the page's colors,
-with lines of text below."""
+"""Script that removes viser's drag arrow and rotation cross, and saves a picture of the view, with lines of
+text below.
+"""
 
 
 def dress(server: viser.ViserServer) -> None:
-    """Apply the changes for all clients. viser has no setting for them, but sends a script where a part of the page
-    asks for one."""
+    """Apply the changes for all clients, by the scripts that parts of viser's page ask for."""
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.set_panel_label("contactfpga")
     server.gui.main_panel.dock_right()

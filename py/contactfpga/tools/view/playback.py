@@ -1,4 +1,4 @@
-"""Playback at a chosen speed from a chosen position; and of one board."""
+"""Playback at a chosen speed from a chosen position."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SPEEDS = {"1/1000": 0.001, "1/100": 0.01, "1/10": 0.1, "1/4": 0.25, "1": 1.0, "4
 """Recording seconds per second, by name in the panel."""
 
 BEFORE_S = 0.25
-"""Time before the chosen position that is read as well, which contains at least a keep-alive."""
+"""Time before the chosen position that is read as well, with at least a keep-alive."""
 
 
 class Playback(abc.ABC, Generic[Item]):
@@ -58,7 +58,6 @@ class Playback(abc.ABC, Generic[Item]):
             self.playing = True
 
     def pause(self) -> None:
-        """Stay at this moment."""
         self.playing = False
 
     def seek(self, seconds: float) -> None:
@@ -97,7 +96,6 @@ class Playback(abc.ABC, Generic[Item]):
                 break
 
     def close(self) -> None:
-        """Release the recording."""
         self._items = iter(())
 
 

@@ -39,7 +39,6 @@ def draw(recording: BoardRecording, path: Path) -> Path:
 
 
 def title(recording: BoardRecording, touches: Touches) -> str:
-    """Title of the picture."""
     sheet = touches.sheet
     name = recording.title.rpartition("/")[2]
     return f"{name}: {sheet.rows}x{sheet.columns} cells, {touches.frames:,} frames in {touches.duration_s:.1f} s"
@@ -111,7 +110,7 @@ LONGEST_S = 0.25
 
 
 class Touches:
-    """A recording of one sheet, gathered for a plot: a fixed number of time steps, and the sheet's cells."""
+    """A recording of one sheet in a fixed number of time steps."""
 
     def __init__(self, sheet: Sheet, duration_s: float, steps: int = STEPS):
         self.sheet, self.duration_s = sheet, max(duration_s, 1e-6)

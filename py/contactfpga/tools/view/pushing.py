@@ -30,8 +30,6 @@ ABREAST = Side(np.array([1.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]))
 
 
 class SimulatedView(RobotView):
-    """Shows a simulated robot."""
-
     def __init__(self, server: viser.ViserServer, source: SimulatedSource):
         self._server, self._source = server, source
         self._stages: list[RobotStage] = []
@@ -118,14 +116,12 @@ class SimulatedView(RobotView):
         return rows
 
     def _look_again(self) -> None:
-        """Let cameras hold all copies."""
         sides = self.cameras.sides
         sides[OVERVIEW] = ROBOT_SIDES[OVERVIEW] if len(self._drawn) == 1 else ABREAST
         for client in self._server.get_clients().values():
             self.cameras.show(client, OVERVIEW)
 
     def _draw(self, number: int) -> list[contacts.Row]:
-        """Draw one copy."""
         copy, robot, name = self._drawn[number], self._robots[number], self._names[number]
         robot.stage.place(copy.poses())
         several = len(self._drawn) > 1
@@ -145,7 +141,6 @@ class SimulatedView(RobotView):
     # ---- the panel
 
     def _add_pushing(self) -> None:
-        """Add controls of force, obstacle, reflex and restart, and felt forces."""
         source, gui = self._source, self._server.gui
         with gui.add_folder("Robot"):
             skin = gui.add_dropdown("skin", (*SKINS, ALL), initial_value=source.skin)

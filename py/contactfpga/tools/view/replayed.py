@@ -33,11 +33,12 @@ class BoardRecording(Protocol):
         """Duration of the recording."""
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """Seconds from its beginning and frame, in order, from ``start_s`` up to ``end_s``."""
+        """Seconds from the beginning and frame, in order, from ``start_s`` up to ``end_s``."""
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """Seconds from its beginning, and delay in s of bytes that ended a frame beyond the earliest. Empty without
-        arrival times in the file."""
+        """Seconds from the beginning and delay in s of bytes that ended a frame beyond the earliest; empty without
+        arrival times.
+        """
 
 
 Reading = Callable[[int, int], object]
@@ -171,11 +172,9 @@ class LinkRecording:
         return self.recording.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """:meth:`BoardRecording.frames` of the link."""
         return ((seconds, zones) for seconds, _, zones in self.recording.frames(start_s, end_s, self._link))
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """:meth:`BoardRecording.lateness` of the link."""
         conversation = Conversation(self.title, live=False)
         found = []
         for seconds, data in self.recording.raw_bytes(self._link):

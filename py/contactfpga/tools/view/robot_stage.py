@@ -32,7 +32,7 @@ BONE = rgb(picture_style.GRAY)
 MESHES = (*mesh_file.SUFFIXES, mesh_file.COLLADA)
 MAX_MESHES = 1000
 MAX_MESH_BYTES = 100_000_000
-"""Most bytes of all meshes of a robot; the triangle limit is that of a single mesh."""
+"""Most bytes of all meshes of a robot."""
 REST = "what is beyond the limit of all meshes"
 
 
@@ -77,7 +77,7 @@ def _path(name: str, folder: Path) -> Path | None:
 
 
 class RobotStage:
-    """Links as readable meshes, else as lines between joints; and a stage for each sheet."""
+    """Links as readable meshes, otherwise as lines between joints; and a stage for each sheet."""
 
     def __init__(self, server: viser.ViserServer, body: Body, solids: Sequence[Solid] = (), node: str = ROOT):
         """``solids``: drawn in place of the URDF's links."""
@@ -167,7 +167,6 @@ class RobotStage:
         self._bones.points = bones.astype(np.float32)
 
     def place(self, poses: Mapping[str, Pose]) -> None:
-        """Draw the links at these poses."""
         self._poses = poses
         orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
         for name, plan in self._body.links.items():

@@ -1,7 +1,4 @@
-"""viser's server behind a guard.
-
-Only a browser with the token may read and press, on a page of this server.
-"""
+"""viser's server behind a guard: only a browser with the token may read and press, on a page of this server."""
 
 from __future__ import annotations
 
@@ -51,7 +48,8 @@ class Guard:
 
     def check(self, path: str, headers: Mapping[str, str], port: int, upgrade: bool) -> Response | None:
         """A refusing answer; None: the request may pass. ``headers``: by name, in any case; ``upgrade``: it requests a
-        WebSocket, which carries all reading and pressing."""
+        WebSocket, which carries all reading and pressing.
+        """
         host = _one(headers, "Host")
         if not self._is_ours(host, port):
             return Response(403, f"Host {host!r} is not this server's name; use the address that it printed.\n")
@@ -106,7 +104,8 @@ class Guard:
 
     def _welcome(self, port: int) -> Response:
         """Lead the browser to the page without the token, by the page itself: a redirect from another site would
-        withhold the cookie."""
+        withhold the cookie.
+        """
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         dark = "matchMedia('(prefers-color-scheme: dark)').matches"
         page = (
@@ -242,6 +241,6 @@ def _forget_tunnel(server: viser.ViserServer) -> None:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End the server, which prints its own farewell."""
+    """End the server without viser's farewell."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()

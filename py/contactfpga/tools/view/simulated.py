@@ -30,8 +30,9 @@ NO_REFLEX = "none"
 BARE, LATE, KIT = SKINS = ("without skin", "6 ms late", "with the kit")
 ALL = "side by side"
 LATE_S = 6e-3
-"""Delay from the sheet's scan to the reflex: the paper's time for screening the sensors and computing (section IV
-A)."""
+"""Delay from the sheet's scan to the reflex: the paper's time for screening the sensors and computing (section
+IV A).
+"""
 SWEEP_S, SWEEP_STEPS = 0.1, 100
 """Duration and steps of a force sweep."""
 
@@ -107,8 +108,7 @@ class RobotCopy:
 
 
 class Sweep:
-    """The largest forces of each copy since a touch, restarted by the first touch after :data:`SWEEP_S`, like an
-    oscilloscope."""
+    """The largest forces of each copy since a touch, restarted by the first touch after :data:`SWEEP_S`."""
 
     def __init__(self, copies: int):
         self.forces_n = np.full((copies, SWEEP_STEPS), np.nan)
@@ -117,7 +117,6 @@ class Sweep:
         self._before = np.zeros(copies)
 
     def add(self, seconds: float, forces_n: Sequence[float]) -> None:
-        """Add the forces of all copies at a time."""
         forces = np.array(forces_n)
         ended = self._began_s is None or seconds - self._began_s >= SWEEP_S - 1e-9
         if ended and ((forces > 0) & (self._before == 0)).any():

@@ -36,18 +36,18 @@ class Solid:
 
 def solids_of(model: Any, worn: Collection[str]) -> list[Solid]:
     """All drawable geoms; ``worn``: names of those that wear a sheet. Raises :class:`~contactfpga.ContactFPGAError` for
-    a mesh with too many triangles."""
+    a mesh with too many triangles.
+    """
     found = [_solid(model, number, worn) for number in range(model.ngeom)]
     return [solid for solid in found if solid is not None]
 
 
 def named(model: Any, number: int) -> str:
-    """A body's name."""
     return str(model.body(number).name) or f"body{number}"
 
 
 def _solid(model: Any, number: int, worn: Collection[str]) -> Solid | None:
-    """A geom; None for kinds not drawn: height fields, distance fields."""
+    """A geom; None for height fields and distance fields."""
     import mujoco
 
     geom = model.geom(number)

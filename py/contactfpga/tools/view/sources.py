@@ -65,8 +65,7 @@ class SimulatedPace:
 
     @property
     def most_s(self) -> float:
-        """Seconds of time that this machine simulates within :data:`MOMENT_S`, so that slow machines show shorter
-        moments."""
+        """Seconds that this machine simulates within :data:`MOMENT_S`: slow machines show shorter moments."""
         return max(MOMENT_S * self._speed, LEAST_S)
 
     @property
@@ -100,7 +99,8 @@ class Moment:
     """(rows, columns) bool: closed switches of a virtual board."""
     felt: tuple[Contacts, Zones] | None = None
     """The newest known forces with their frame, some milliseconds older than :attr:`zones`, as later readings must
-    arrive first."""
+    arrive first.
+    """
     pushes: Sequence[tuple[Zone, float | None]] = ()
     """Zones of the measured frame with a place, each with the push in N if known."""
     arrows: np.ndarray | None = None
@@ -129,8 +129,9 @@ class Source(Protocol):
 
 
 class BoardSource:
-    """A board, or a virtual one whose simulated time passes like real time: with ``virtual`` one that can be touched
-    and knows its closed switches; else with ``simulated``."""
+    """A board, or a virtual one whose simulated time passes like real time: ``virtual`` can be touched and knows its
+    closed switches, ``simulated`` cannot.
+    """
 
     def __init__(
         self,
@@ -142,7 +143,6 @@ class BoardSource:
     ):
         self.title, self.sheet = title, board.sheet
         self.cells = cells
-        """Places of the pressure units, if known."""
         self._felt_in: Zones | None = None
         self.meter = Meter()
         self._board, self._virtual = board, virtual
@@ -302,7 +302,6 @@ class Meter:
 
     @property
     def strip(self) -> Strip:
-        """Data of the chart."""
         steps = np.array([step for step, _, _ in self._steps], float)
         seconds = (steps - steps[-1]) * CHART_STEP_S if len(steps) else steps
         kept = seconds > -CHART_S

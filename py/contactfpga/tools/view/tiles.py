@@ -10,7 +10,6 @@ from contactfpga import surfaces
 from contactfpga.skin.sheet import Sheet
 
 MM = 1e-3
-"""Meters per mm, as the scene is in m."""
 
 
 class Tiles:
