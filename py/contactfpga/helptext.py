@@ -1,4 +1,4 @@
-"""The text that `help()` shows of a class: its docstring, then its fields with their docstrings, which Python drops."""
+"""The text that `help()` shows of a class: its docstring, and its fields with theirs, which Python drops."""
 
 from __future__ import annotations
 

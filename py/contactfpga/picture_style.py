@@ -1,6 +1,6 @@
-"""The common style of all pictures: background card, palette, and letters legible on a page 720 pixels wide.
+"""The common style of all pictures: background, palette, and letters legible on a page 720 pixels wide.
 
-matplotlib is imported only where something is drawn with it.
+matplotlib is imported only for drawing.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CARD = "#f6f7f9"
-"""Background of every picture: nearly white on a white page, and without a rim on a dark one."""
+"""Background: nearly white on a white page, and without a rim on a dark one."""
 
 INK, SOFT, GRID = "#1d232b", "#545d68", "#d5d9df"
-"""Colors of words and axes, of secondary words, and of grid lines."""
+"""Colors of main words and axes, of secondary words, and of grid lines."""
 
 SHEET, PRESSED = "#e3e6eb", "#8fbcd4"
 """Colors of a sheet of switches, and of its pressed part."""
@@ -27,12 +27,12 @@ SHEET, PRESSED = "#e3e6eb", "#8fbcd4"
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GRAY, BROWN = PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c8c8c", "#7a4b1e"),
 )
-"""Colors that color-blind readers can tell apart, after Okabe and Ito, without their yellow, which is invisible on a
+"""Colors that color-blind readers can tell apart, after Okabe and Ito, without their yellow, which is too pale for a
 light card.
 """
 
 DASHES: tuple[Any, ...] = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
-"""Line styles for curves that may coincide: the lower curve shows in the gaps of the upper one."""
+"""Line styles for coinciding curves: the lower one shows in the gaps of the upper one."""
 
 DARK = {
     CARD: "#14181d",
@@ -56,16 +56,15 @@ DARK = {
     "#fbecc8": "#4d3d14",
     "#f4e1ec": "#4b2e42",
 }
-"""Replacement of each color on a dark page; the last entries are tints. Orange and purple are visible on both pages."""
+"""Colors on a dark page, by their light ones; the last are tints. Orange and purple are visible on both."""
 
 WIDTH_PX = 720
-"""Width of a picture, and of the page that shows it."""
 
 WIDTH_IN = WIDTH_PX / 96
-""":data:`WIDTH_PX` in inches for matplotlib, whose SVG has 72 points per inch where a browser has 96 pixels."""
+""":data:`WIDTH_PX` for matplotlib, whose SVG has 72 points per inch where a browser has 96 pixels."""
 
 SMALL, NORMAL, LARGE = 8.5, 9.0, 10.0
-"""Font sizes in points; the small one is 11 pixels high on the page."""
+"""Font sizes in points; the small one is 11 pixels high."""
 
 SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "contactfpga",
@@ -126,9 +125,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def numbered(svg: str) -> str:
-    """The SVG with ids numbered in order, because matplotlib's ids are hashes of coordinates that differ between
-    processors.
-    """
+    """The SVG with ids numbered in order; matplotlib's hash coordinates, which differ between processors."""
     names: dict[str, str] = {}
     return re.sub(
         r'(?<=[#"])[a-z][0-9a-f]{10}(?=[")])', lambda found: names.setdefault(found[0], f"i{len(names)}"), svg

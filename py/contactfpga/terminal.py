@@ -1,7 +1,6 @@
 """Abilities of the stream to which a command writes: width, characters, and rewriting.
 
-Every command uses these functions, so that all of them agree. Text for a file or a pipe is not wrapped. Characters that
-the encoding lacks are replaced.
+Text for a file or a pipe is not wrapped. Characters that the encoding lacks are replaced.
 """
 
 from __future__ import annotations
@@ -110,7 +109,7 @@ def prepare() -> None:
 
 
 def drop_unwritable() -> None:
-    """Discard output that standard output refused. Otherwise Python retries it at exit and ends with status 120."""
+    """Discard output that standard output refused; otherwise Python retries it at exit and ends with status 120."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -137,10 +136,8 @@ def _ascii(character: str) -> str:
 
 
 def wrapped(text: str, width: int, hang: int = 0) -> str:
-    """The text broken into lines of at most ``width`` characters, except for longer words; all but the first are
-    indented by ``hang``.
-
-    Line breaks of the text stay. Only its first line is broken, because the others are meant for copying.
+    """The text with its first line broken into lines of at most ``width`` characters, except for longer words; all but
+    the first are indented by ``hang``. Further lines of the text are for copying and stay whole.
     """
     first, *rest = text.split("\n")
     lines = textwrap.wrap(first, width, subsequent_indent=" " * hang, break_long_words=False, break_on_hyphens=False)
@@ -183,8 +180,8 @@ LIVE_S, LINES_S = 0.2, 10.0
 
 @contextlib.contextmanager
 def reading(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Context that shows on standard error how far a long file is read. It yields a function to be called now and then
-    with the bytes read and the file's size.
+    """Context that shows on standard error how far a long file is read. It yields a function of the bytes read and the
+    file's size.
     """
     live = of(sys.stderr).live
     due_s, said = time.monotonic() + SOON_S, False

@@ -230,7 +230,6 @@ class AsyncBoard(BoardFacts):
         return await _in_thread(lambda timeout: self.board.batch(max_s, timeout), timeout)
 
     async def __aiter__(self) -> AsyncIterator[Zones]:
-        """Every frame, until a recording ends."""
         async for zones in self._frames:
             yield zones
 
@@ -259,8 +258,6 @@ SLOT_BITS = 5000
 
 
 class _SlotListener:
-    """Waits for all slots of one test."""
-
     def __init__(self, link: Link, count: int, attempt_s: float):
         self.whole: tuple[SelfTestSlot, ...] | None = None
         self.attempt_s = attempt_s

@@ -32,12 +32,11 @@ BEGUN_US = 1 << 21
 class Timeline:
     """Frame counts and times since the board's power-up, from the few bits in frames, and from hellos.
 
-    No frame has a wrong time: one whose time is ambiguous is dropped, and so are others until the next hello.
+    A frame of unknown time is dropped, and so are all others until the next hello.
     """
 
     def __init__(self, stats: Stats, live: bool):
         self.before: Frame | None = None
-        """The last explained frame since power-up."""
         self._stats = stats
         self._live = live
         self._greeted = self._known = self._forgot = False
@@ -185,7 +184,7 @@ def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
 
 
 MOST_PPM, USUAL_PPM = 200.0, 50.0
-"""Largest and usual difference of the two clock rates, in ppm."""
+"""Largest and usual difference of the clock rates."""
 WINDOW_S = 60.0
 """Age beyond which arrivals do not count."""
 PIECE_S = 0.25
@@ -216,7 +215,7 @@ class ClockFit:
 
     Delays only add. A frame arrives after its sampling, so the least delayed arrivals, less the wire time of their
     bytes, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
-    which bounds it from below. The true line lies between these bounds, with a slope that crystals can have.
+    which bounds it from below. The true line lies between, with the slope of a crystal.
 
     Sums are formed in order and exponentials one by one, so that the same fit in C (c/clockfit.h) rounds alike.
     """
@@ -283,7 +282,6 @@ class ClockFit:
         return _Point(device_s, host_s - self._base_s - device_s)
 
     def _bound(self, device_s: float) -> float:
-        """Upper bound of the excess at a device time."""
         return self._height_s + self._slope * (device_s - self._fitted_s)
 
     def _fit(self) -> None:
@@ -311,8 +309,8 @@ class ClockFit:
         self._variance = _total(weights * ((middles - middle) ** 2 + gaps**2 / 12)) * CAUTION**2
 
     def _likely(self, widest: int, gap_s: float) -> np.ndarray:
-        """Likelihood of each slope from arrivals alone. Delays may hide a slope as far as they vary, and as the bounds
-        allow, because frame and bus times can beat slowly. ``widest``: index of the slope with the widest gap.
+        """Likelihood of each slope from arrivals alone. They tell no more than their scatter and the bounds' gap allow,
+        because frame and bus times can beat slowly. ``widest``: index of the slope with the widest gap.
         """
         device_s, excess_s = np.array(self._pieces).T
         heights = excess_s - _SLOPES[widest] * device_s
@@ -410,7 +408,6 @@ class HostClock:
 
     def __init__(self, fit: ClockFit | None):
         self.byte_s = 0.0
-        """Time of a byte on the wire in s."""
         self.fit = fit
         self._line: HostLine | None = None  # for the frames that come now
         self._latest: tuple[int, int] | None = None  # time and bytes of the last of them
@@ -447,7 +444,6 @@ class HostClock:
 
     @property
     def begun(self) -> bool:
-        """Whether :meth:`take_reads` may be called."""
         return self.fit is None or self.fit.begun
 
     def end(self, now: float) -> None:

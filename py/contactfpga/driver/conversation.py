@@ -57,7 +57,6 @@ class Steady(NamedTuple):
     """Arrival of :attr:`before`, on the host's clock."""
     fit: ClockFit
     byte_s: float
-    """Time of a byte on the wire."""
     sheet: Sheet
     faults: tuple[str, ...]
     history: UnitHistory | None
@@ -336,7 +335,6 @@ class Conversation:
         return event
 
     def _decoded(self, decoded: many.PacketTable, index: int, packet_bytes: int, now: float) -> Event | None:
-        """:meth:`_packet` for a decoded frame."""
         assert self._widths is not None
         start, end = decoded.starts[index], decoded.starts[index + 1]
         frame = frame_of(decoded.packets[index].item(), decoded.records[start:end], self._widths.sheet)

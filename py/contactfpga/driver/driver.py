@@ -24,7 +24,6 @@ from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
 READERS = ("native", "thread")
-"""Threads that can read a port."""
 
 
 def open(

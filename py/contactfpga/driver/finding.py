@@ -27,8 +27,6 @@ from contactfpga.wire.hello import Hello, describe
 
 @dataclasses.dataclass(frozen=True)
 class Usb:
-    """USB ids of a board's serial port."""
-
     vid: int
     pid: int
     interface: int | None
@@ -105,7 +103,6 @@ class Reply:
     problem: str
     """Reason for the missing hello; "" if there is one."""
     busy: bool = False
-    """Whether the port is open elsewhere."""
 
     def __str__(self) -> str:
         said = self.problem if self.hello is None else f"says hello: {describe(self.hello)}"

@@ -116,7 +116,6 @@ class FlexitacPort:
         self._time_us = self._greeted_us = 0
 
     def read(self, timeout_s: float) -> bytes:
-        """Packets of the frames that arrive within ``timeout_s``."""
         data = self._port.read(0.0 if self._out else timeout_s)
         frames = self._framer.take(data) if data else []
         now_us = int((self._port.clock() - self._begun_s) * 1e6)
@@ -144,7 +143,7 @@ class FlexitacPort:
             self._sent += 1
 
     def write(self, data: bytes) -> None:
-        """Take the host's requests; the sheet itself gets nothing."""
+        """The sheet itself gets nothing."""
         for packet in data.split(bytes([DELIMITER])):
             try:
                 plain = framing.unseal(packet, b"")

@@ -18,9 +18,7 @@ class FrameQueue:
     def __init__(self, maxsize: int, all_events: bool = False, came: int = 0):
         self.maxsize = maxsize
         self.all_events = all_events
-        """Whether the queue also takes events between frames."""
         self.dropped = 0
-        """Frames that were not taken in time."""
         self.shown = 0
         """Number of the last frame given by :meth:`show`; frames up to it are dropped."""
         self.others = 0
@@ -153,7 +151,6 @@ class FrameQueue:
             self._drop(self.shown - self._gone)
 
     def _unwrap(self) -> None:
-        """Remove the taken frames from the first run."""
         if self._taken:
             run = self._items[0]
             assert isinstance(run, Run)

@@ -40,21 +40,16 @@ at most twice per second except for faults. Silent unless the program configures
 LOG.addHandler(logging.NullHandler())
 
 READ_S = 0.05
-"""Interval of checks whether the board was closed."""
 
 ASK_S = 1.0
-"""Interval of requests by :meth:`Link.ask`."""
 
 SIMULATED_READ_S = 0.002
 """Longest simulated time of one read, which may delay :meth:`Link.close`."""
 
 Result = Zones | SideEvent | ContactFPGAError | Hello | bool
-"""Kinds of awaited results."""
 
 
 class _Waiter:
-    """A call of :meth:`Board.read` that waits for its frame."""
-
     def __init__(self, ticket: int):
         self.ticket = ticket
         self.found: Zones | ContactFPGAError | None = None
@@ -71,7 +66,6 @@ class Link:
     """
 
     fit: type[ClockFit] = ClockFit
-    """Type of the fit from the board's clock to the host's."""
 
     def __init__(self, transport: Transport, skin: Skin | None):
         self.transport = transport
@@ -82,7 +76,6 @@ class Link:
         self._queues: weakref.WeakSet[FrameQueue] = weakref.WeakSet()
         self.last: Zones | Run | None = None
         self.last_s = transport.clock()
-        """Arrival of :attr:`last`."""
         self._frames = 0  # that came
         self._last_bytes = 0  # that had come by then
         self._asked_s = -math.inf  # by :meth:`ask`
@@ -405,7 +398,7 @@ class Said(Protocol):
 
     @property
     def stats(self) -> Stats:
-        """Counters of the packets that came."""
+        """Counters of received packets."""
 
     @property
     def numbers(self) -> Collection[int]:

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9
-"""Bytes of a record's head: kind and length."""
 LARGEST = 1 << 25
 """Most bytes of a record in the file."""
 UNPACKED = 1 << 23
@@ -142,7 +141,6 @@ METADATA = "contactfpga"
 """Name of the metadata with each link's hello and Skin."""
 
 _BEGIN = struct.Struct("<4xiII")
-"""Seconds and nanoseconds, and the length of the link's name in bytes."""
 _COUNT = struct.Struct("<I")
 
 MAX_LINKS = 64
@@ -188,9 +186,7 @@ class McapPart:
                 f"{MAX_LINKS} and {MAX_NAME}"
             )
         self.topics: dict[str, str] = {name: channel.topic for name, channel in zip(names, found, strict=True)}
-        """Topic of each link's bytes."""
         self.start_ns: int = summary.statistics.message_start_time
-        """Beginning in ns since 1970."""
         self.end_ns: int = summary.statistics.message_end_time
 
     def texts(self, name: str) -> list[dict[str, str]]:
@@ -276,7 +272,6 @@ class Summary:
         self.channels: dict[int, Channel] = {}
         self.chunks: list[ChunkIndex] = []
         self.texts: list[tuple[int, int]] = []
-        """Position and size of each text."""
         counted: Statistics | None = None
         end = _file_bytes(file) - _FOOTER_BYTES
         file.seek(max(0, end))
@@ -337,7 +332,6 @@ def data_of(message: bytes) -> bytes:
 
 
 HELLO_NS = 600_000_000
-"""Longest interval of hellos, with a margin."""
 
 
 class McapBytes:
@@ -353,7 +347,6 @@ class McapBytes:
             raise RecordingError(f"{path} holds no bytes of a board; `contactfpga record` makes files that do")
         parts = [part for part in self._parts if part.topics]
         self.start_ns = min(part.start_ns for part in parts)
-        """Beginning in ns since 1970."""
         self.end_ns = max(part.end_ns for part in parts)
 
     @property

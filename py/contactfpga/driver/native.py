@@ -1,8 +1,8 @@
 """Python binding, by ctypes, of the C thread that reads ports (c/reader.c).
 
 A plain C library needs no build for each Python version; the installation compiles it if there is a C compiler
-(hatch_build.py). Waiting calls release the interpreter's lock, the others keep it. So a thread that has waited gets the
-newest frame at the time at which it continues.
+(hatch_build.py). Only waiting calls release the interpreter's lock, so a thread that has waited copies the newest frame
+of that time.
 """
 
 from __future__ import annotations
@@ -29,10 +29,8 @@ from contactfpga.zones.run import frame_of
 from contactfpga.zones.zone import HostLine
 
 LIBRARY = Path(__file__).with_name("_reader.so")
-"""File of the library, made by the installation."""
 
 CHUNK = 16_384
-"""Most bytes of a read."""
 
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
@@ -75,13 +73,10 @@ class Newest(NamedTuple):
     after_another: bool
     """Whether the frame before it, :meth:`Port.before`, came after :meth:`Port.settle`."""
     line: HostLine
-    """Map from the board's clock to the host's, with the arrival."""
     frame: Frame
 
 
 class Library:
-    """The functions of the library."""
-
     def __init__(self, path: Path):
         keeps, releases = ctypes.PyDLL(str(path)), ctypes.CDLL(str(path), use_errno=True)
         address, double, number = ctypes.c_void_p, ctypes.c_double, ctypes.c_uint64

@@ -1,8 +1,8 @@
 """A link whose port is read by a thread in C, so that frames wait for no other Python thread.
 
 The C thread notes arrivals and decodes frames (:mod:`contactfpga.driver.native`). Calling threads let the conversation
-interpret them, as in a :class:`~contactfpga.driver.link.Link`; without calls, a thread does so every two seconds. While
-frames continue one another, the newest is known before the others are taken.
+interpret them; without calls, a thread does so every two seconds. While frames continue one another, the newest is
+known before the others are taken.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 SERVE_S = 2.0
-"""Interval of taking data without calls, which delays logs; for a file of recorded bytes it is
+"""Interval in s of interpretation without calls, which delays logs; for a file of recorded bytes it is
 :data:`contactfpga.driver.link.READ_S`.
 """
 
@@ -82,7 +82,6 @@ class NativeLink(Link):
 
     @property
     def conversation(self) -> Conversation:
-        """The conversation after all received bytes."""
         self.catch_up()
         return self._said
 

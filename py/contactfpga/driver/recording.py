@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 
 _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
-"""Text that looks like unknown options."""
 
 
 class ByteFile(Protocol):

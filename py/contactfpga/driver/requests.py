@@ -11,8 +11,8 @@ from contactfpga.wire import protocol
 from contactfpga.wire.command import Command, encode_command
 
 MOST_APART = 5
-"""Largest lead of the last sent number over the last one in a frame that permits another request: frames on their way
-then have at most six numbers, and low bits distinguish seven.
+"""Most steps of the last sent number beyond the last one in a frame for another request: frames on their way then have
+at most six numbers, and low bits distinguish seven.
 """
 
 _LOWS = (1 << HEARD_BITS) - 1
@@ -84,7 +84,6 @@ class Requests:
         return self._tickets
 
     def end_command(self) -> None:
-        """Stop repeating the command."""
         self._command, self._in_flight = None, False
 
     def poll(self, now: float, hello: bool = False) -> None:

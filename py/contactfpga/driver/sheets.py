@@ -22,7 +22,6 @@ from contactfpga.wire.hello import Hello, HelloReader, begins_hello
 from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
 
 READ_S = 0.05
-"""Time in s for which one sheet reads for all."""
 
 MOST_WAIT = 16_384
 """Most packets that wait for a sheet; beyond that, the oldest are dropped."""
@@ -38,7 +37,6 @@ class Sorter:
         self.alone = False
         """Whether the last hello is of a board with one sheet, without number."""
         self.sheets: int | None = None
-        """Number of the board's sheets; None before a hello."""
         self._rest = b""
 
     def take(self, data: bytes) -> list[tuple[int | None, bytes]]:
@@ -174,7 +172,6 @@ class Greetings:
 
     def __init__(self, port: str):
         self.heard: dict[str, Hello] = {}
-        """Hellos by the port of the sheet."""
         self._port = port
         self._sorter = Sorter()
         self._conversations: dict[int, Conversation] = {}

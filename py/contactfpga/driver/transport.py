@@ -31,17 +31,14 @@ address, or for ``sim`` a :class:`SimulatedPort`.
 """
 
 OPENED_BY_NAME = {Replay: "replay", Net: "zenoh", Flexitac: "flexitac"}
-"""Scheme of each kind of address whose opener takes only the name."""
 
 CHUNK = 65_536
-"""Most bytes of one read."""
 
 
 class Transport(Protocol):
     """Bytes to and from a board."""
 
     name: str
-    """The user's name of the port."""
     live: bool
     """Whether the other end is a board that answers requests."""
     threaded: bool
@@ -142,7 +139,6 @@ class Named(Protocol):
 
 
 OPEN_PORTS: weakref.WeakSet[Named] = weakref.WeakSet()
-"""Serial ports open in this process, or on its behalf."""
 
 
 def user_of(name: str) -> str:

@@ -54,7 +54,6 @@ FIRST = {
     "zones": "see its contact zones, live",
     "build icebreaker --wiring": "see how to wire a sheet to a board",
 }
-"""First steps with their purposes, shown without a command."""
 
 RENAMED = {
     "chart": "study chart",
@@ -93,7 +92,7 @@ class TopicGroup(Protocol):
         """The default topic, and its place in the usage."""
 
     def run(self, topic: Callable[[], int]) -> int:
-        """Run a topic, with the handling of errors common to all topics."""
+        """Run a topic, with common handling of errors."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -157,7 +156,6 @@ def _parser() -> Parser:
 
 
 def _add_command(name: str, parser: Parser) -> None:
-    """Give a command's parser its topics or flags."""
     module = import_module(f"{commands.__name__}.{name}")
     if hasattr(module, "TOPICS"):
         _add_topics(module, module.__name__, parser)
@@ -187,8 +185,6 @@ def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Name
 
 
 class _Help(argparse.HelpFormatter):
-    """Formatter that does not break addresses."""
-
     def _split_lines(self, text: str, width: int) -> list[str]:
         return terminal.wrapped(" ".join(text.split()), width).split("\n")
 
@@ -229,7 +225,6 @@ class Parser(argparse.ArgumentParser):
         super().error(visible_lines(shortened(message)))
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """For an unknown command, suggest the intended one."""
         if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
             raise argparse.ArgumentError(action, f"{value!r} is none; {suggestion(value, action.choices)}")
         super()._check_value(action, value)

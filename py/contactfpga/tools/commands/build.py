@@ -118,7 +118,6 @@ def _changed(several: Several) -> list[dict[str, Any]]:
 
 
 def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> dict[str, Any]:
-    """Build the bitstream and print its resources; returns them for JSON."""
     from contactfpga_hdl.board import build
 
     folder = outputs.folder(args.output or default_folder(board, args.kit))
@@ -159,7 +158,6 @@ class WiringTable:
     circuit: Circuit | None
     """None: the Skin's file has no table ``[circuit]``, so resistors have no values."""
     sites: Sequence[str]
-    """FPGA pins of the wires."""
 
     def show(self) -> None:
         for sheet, skin in self._sheets:
@@ -233,7 +231,6 @@ class WiringTable:
 
 
 def _show(rows: Sequence[Sequence[str]]) -> None:
-    """Print the nonempty columns of rows, if any."""
     from contactfpga.tools.console import tables  # JSON needs no display
 
     if len(rows) > 1:

@@ -72,8 +72,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Report:
-    """The findings, printed at once unless ``silent``."""
-
     def __init__(self, silent: bool):
         self.stats: Stats | None = None
         self.lines: list[str] | None = None

@@ -163,7 +163,6 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
-    """Covers of the Skin's file, named ones, or defaults; none for recordings."""
     from contactfpga_sim.lab import covers
     from contactfpga_sim.lab.fit import faces
 
@@ -177,7 +176,6 @@ def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
 
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:
-    """Methods of the named labellers, or of ``cells``: the host labels them."""
     from contactfpga_sim.lab.fit.candidates import METHODS, by
 
     if not names:

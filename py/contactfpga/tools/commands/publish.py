@@ -31,7 +31,7 @@ PORTS = (
     "them publish several boards (default: the one supported board plugged in; with --skin, the one with that Skin)."
 )
 SHOWN_S = 0.2
-"""Interval of checks for lost boards. Boards lost within it, as all sheets of one FPGA, are reported together."""
+"""Interval of checks; boards lost within it, as all sheets of one FPGA, are reported together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -82,7 +82,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int]]:
-    """Device and baud rate of each board, by key."""
     found: dict[str, tuple[str, int]] = {}
     for port in args.ports or [None]:
         if port is not None and port.startswith(("replay:", NET)):
@@ -112,7 +111,6 @@ def _place(port: str) -> tuple[str, int | None]:
 
 
 def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
-    """Run one thread per publisher, each independent of lost boards."""
     stop = threading.Event()
     ended: queue.SimpleQueue[Exception] = queue.SimpleQueue()
     threads = [threading.Thread(target=_run, args=(*one, stop, ended), daemon=True) for one in publishers.items()]

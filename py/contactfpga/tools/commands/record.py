@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 EXTRA = "record"
 
 SHOWN_S = 0.5
-"""Interval of the progress display."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -139,8 +138,6 @@ def _pieces(count: int) -> str:
 
 
 class _Progress:
-    """A progress line, overwritten if possible, and the final message."""
-
     def __init__(self, session: Session) -> None:
         self._session = session
         self._live = terminal.of(sys.stderr).live

@@ -21,7 +21,6 @@ SCALES = (4, 2, 1)
 ACROSS, DOWN = 2, 4
 
 FREE, CELL, CIRCLE, CENTER, MASKED, SEEN, FLUTTERS, STUCK = range(8)
-"""Meanings of a character."""
 
 STYLES = {
     FREE: "dim",
@@ -153,7 +152,6 @@ def _cells(dots: np.ndarray, scale: int, full: str, unicode: bool) -> np.ndarray
 
 
 def _spread(cells: np.ndarray, scale: int) -> np.ndarray:
-    """Each cell as scale x scale dots."""
     spread: np.ndarray = cells.repeat(scale, axis=0).repeat(scale, axis=1)
     return spread
 

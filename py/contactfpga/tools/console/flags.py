@@ -101,7 +101,7 @@ def seconds(parser: argparse.ArgumentParser) -> None:
 
 
 def forces(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add forces from pressure units; ``what`` the command does with them."""
+    """Add forces from pressure units; ``what``: their use."""
     units = f"{what}, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
     friction = "Friction coefficient of what touches (default: 0.5); needs --units."

@@ -27,15 +27,14 @@ if TYPE_CHECKING:
 REFRESH_US = 66_667
 
 LISTED_S = 1.0
-"""Interval of frames listed below one another."""
 
 SILENT_S = 0.2
-"""Time without a frame, beyond the board's needs, that is displayed as silence."""
+"""Excess over the board's longest pause that is displayed as silence."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Room:
-    """Available space for a frame."""
+    """Space for a frame."""
 
     console: Console
     width: int
@@ -44,7 +43,6 @@ class Room:
     unicode: bool
 
     def without(self, lines: int) -> Room:
-        """The space left after this many lines."""
         return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
 
 
@@ -62,7 +60,7 @@ def show(
     board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: FrameSource | None = None
 ) -> int:
     """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends, or one per
-    second without redrawing. ``frames``: source of frames, by default the board.
+    second without redrawing.
     """
     console = terminal.console()
     frames = frames or board
@@ -97,7 +95,7 @@ def follow(
     board: Board, args: argparse.Namespace, take: Callable[[Zones], None], render: Render | None = None
 ) -> tuple[float, list[Finding]]:
     """Pass every frame to ``take`` for ``args.seconds`` of device time (None: no limit), until the frames end, or
-    Ctrl-C. If the terminal can redraw, it shows fifteen per second by ``render``.
+    Ctrl-C; show fifteen per second by ``render`` if the terminal can redraw.
 
     Returns the followed device time in s, and findings about its end and lost frames.
     """
@@ -172,9 +170,7 @@ def _list(
 def _paced(
     board: Board, frames: FrameSource, timeout: float, take: Take, tell_silence: bool = False
 ) -> Iterator[Zones | Silence]:
-    """One frame every REFRESH_US of device time, and the last of a recording. With ``tell_silence`` missing frames
-    yield a silence until the timeout.
-    """
+    """One frame every REFRESH_US of device time, and the last of a recording; with ``tell_silence``, also silences."""
     wait_s = min(timeout, SILENT_S + longest_pause_s(board.hello, None)) if tell_silence else timeout
     refresh = _Refresh()
     skipped = None
@@ -199,7 +195,7 @@ def _paced(
 
 
 class _Refresh:
-    """Selects frames: one every REFRESH_US of device time, and not faster in real time, as simulated boards and
+    """Selects one frame every REFRESH_US of device time, and not faster in real time, as simulated boards and
     recordings would be.
     """
 

@@ -70,7 +70,6 @@ SECONDS = number(0, 86_400, "s", above=True)
 BAUD = whole(limits.MIN_BAUD, limits.MAX_CLOCK_HZ // 2, "bits per second")
 PITCH_MM = number(limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
 CELL = number(-1e300, 1e300)
-"""A threshold for cells."""
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
 TURN = number(-7, 7, "rad", hint="angles are in rad, 90 degrees are 1.5708")

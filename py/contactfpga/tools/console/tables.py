@@ -15,7 +15,6 @@ from rich.table import Table
 from contactfpga import terminal
 
 GAP = 3
-"""Characters between columns."""
 
 FOLDED = 24
 """Least width of a column of sentences."""
@@ -77,7 +76,6 @@ def _widths(columns: Sequence[Sequence[str]], last_folds: bool) -> list[int]:
 
 
 def _folded(heading: str, width: int) -> str:
-    """The heading in lines of this width, or of its longest word."""
     longest = max(map(cell_len, heading.split()), default=1)
     return "\n".join(textwrap.wrap(heading, max(width, longest), break_on_hyphens=False)) or heading
 

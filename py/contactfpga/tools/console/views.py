@@ -21,18 +21,14 @@ from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.zone import Zones
 
 BESIDE = 3
-"""Characters between the sheet and the table."""
 
 LEGEND_LINES = 2
 
 TABLE_LINES = 6
-"""Lines of a table without rows."""
 
 SUSPECTED = 4
-"""Lines of current suspicions of a watch."""
 
 NAMED = 12
-"""Pressed cells listed by place."""
 
 
 def zones_view(
@@ -59,7 +55,7 @@ def zones_view(
 
 
 def watch_view(board: Board, watch: Watch, suspected: list[str], zones: Zones, room: Room) -> RenderableType:
-    """The sheet with a watch's knowledge of its switches, and the newest suspicions below."""
+    """The sheet with a watch's knowledge of its switches, and the newest suspicions."""
     count = f"{len(watch.never)} switches never pressed so far" if watch.seen is not None else "zones only"
     below = "\n".join([*suspected[-SUSPECTED:], count, status(board, zones, room.width)])
     below = "\n".join(terminal.wrapped(line, room.width, 2) for line in below.split("\n"))
@@ -95,7 +91,6 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
 
 
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
-    """The scale of the drawing, and whether the table is beside it."""
     for scale in drawn_sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
         if drawn_sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
             return scale, True
@@ -137,7 +132,6 @@ def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
 
 
 def _interval(contact: Contact) -> tuple[float | None, float | None]:
-    """The interval; unknown without its solver."""
     try:
         return contact.interval_n or (None, None)
     except MissingExtra:
@@ -150,7 +144,6 @@ def _names(track: Track) -> str:
 
 
 def _mask(board: Board) -> drawn_sheet.Mask:
-    """Absent switches by the board's Skin; none if only its hello is known."""
     try:
         return board.skin.mask
     except ContactFPGAError:

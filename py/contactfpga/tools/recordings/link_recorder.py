@@ -29,9 +29,8 @@ from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zone, Zones
 
 QUEUE = 1 << 16
-"""Frames that wait to be written as messages, after their bytes."""
+"""Most frames that wait to be written as messages."""
 POLL_S = 0.01
-"""Interval of writing bytes."""
 END_S = 1.0
 """Time for writing the remaining frames at the end."""
 AT_ONCE_S = 1e-6
@@ -43,7 +42,6 @@ class Buffer:
     """A tap with a buffer of bytes."""
 
     events: Events
-    """All events of the board, from the first byte on."""
 
     def __init__(self) -> None:
         self._pieces: collections.deque[tuple[bytes, float]] = collections.deque()
@@ -101,13 +99,10 @@ class LinkRecorder:
         self.board = board
         self.name = link.name
         self.frames = 0
-        """Frames read."""
         self.seconds = 0.0
         """Recorded time: on the board's clock, for a recording in device time."""
         self.notes: list[str] = []
-        """Messages for the user."""
         self.error: ContactFPGAError | None = None
-        """The error that ended it early."""
         self._events = events
         self._buffer = buffer
         self._link = link
@@ -205,7 +200,6 @@ class Mount:
     """A board's place on a robot, for messages with places in the frame of the robot's link."""
 
     frame: str
-    """Frame of the robot's link."""
     place: Place
 
     def zone(self, zone: Zone) -> Zone:
@@ -232,9 +226,7 @@ ZONES, TRACKS, CONTACTS = (f"{PACKAGE}/{name}" for name in ("Zones", "Tracks", "
 TRANSFORMS, MARKERS, WRENCH = "tf2_msgs/TFMessage", "visualization_msgs/MarkerArray", "geometry_msgs/WrenchStamped"
 
 DRAWN_S = 1 / 30
-"""Interval of messages for 3-D programs."""
 WORLD = "world"
-"""Frame of a board without a robot."""
 _ORIGIN = (0.0, 0.0, 0.0)
 
 

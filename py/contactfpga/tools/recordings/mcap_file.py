@@ -82,11 +82,10 @@ class WholeFile:
 
 CHUNK_BYTES = 1 << 16
 FLUSH_S = 0.1
-"""Most waiting bytes, and their longest wait: the loss if the program dies. Half of the promised loss, as the system
-may delay a write.
+"""Most waiting bytes, and their longest wait: half of the promised loss if the program dies, as the system may delay a
+write.
 """
 _MESSAGE_BYTES = 31
-"""Bytes of a message's record besides its data."""
 
 
 class McapFile:

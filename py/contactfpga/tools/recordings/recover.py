@@ -91,8 +91,6 @@ def _copy_all(file: BinaryIO, new: Path, found: RecoveryReport) -> None:
 
 
 class _Definitions:
-    """Schemas and channels of one recording, by number."""
-
     def __init__(self) -> None:
         self.schemas: dict[int, Any] = {}
         self.channels: dict[int, Any] = {}

@@ -25,8 +25,6 @@ from contactfpga.tools.recordings.recorder import Recorder, Split, link_name
 
 @dataclasses.dataclass(frozen=True)
 class _OpenLink:
-    """A link whose board is open."""
-
     name: str
     board: Board
     events: Events

@@ -49,7 +49,6 @@ ROBOT_SIDES = {
         "back": (-1.0, 0.0, 0.1),
     }.items()
 }
-"""Views of a robot that faces x, with z up."""
 
 
 class RobotSource(Protocol):
@@ -60,7 +59,6 @@ class RobotSource(Protocol):
     angles: dict[str, float]
     """Angles set by the sliders, in rad, in m for prismatic joints."""
     virtual: dict[str, Touchable]
-    """Virtual boards by link."""
 
     def states(self) -> dict[str, LinkState]:
         """Current states of all links."""
@@ -109,14 +107,9 @@ class DrawnRobot:
         arrows: np.ndarray | None = None,
         label: str | None = None,
     ) -> list[contacts.Row]:
-        """Draw a link's newest frame; returns its contacts.
-
-        Args:
-         name: of the link.
-         state: its state.
-         truth: (rows, columns) closed switches, if known.
-         arrows: (n, 2, 3) forces in m in the sheet's frame, replacing those that units measure.
-         label: the link's name in the contacts' rows.
+        """Draw a link's newest frame; returns its contacts. ``truth``: (rows, columns) closed switches, if known;
+        ``arrows``: (n, 2, 3) forces in m in the sheet's frame, replacing those that units measure; ``label``: the
+        link's name in the contacts' rows.
         """
         stage, plan = self.stage.stages[name], self._links[name]
         if state.zones is None:
@@ -142,10 +135,9 @@ class DrawnRobot:
 
 
 class RobotView(abc.ABC):
-    """A robot in a server's page: its picture, the table of its contacts, and further facts."""
+    """A robot in a server's page, with its contacts and further facts."""
 
     stage: RobotStage
-    """Stage of the robot, or of the first of several."""
 
     def __init__(self, server: viser.ViserServer, points: Callable[[], np.ndarray]):
         """``points``: (n, 3) in m, for cameras to hold."""

@@ -19,7 +19,6 @@ FOV_RAD = math.radians(32)
 ROOM = 1.04
 """Scale of the view for a free margin."""
 FIRST = 1.6
-"""Aspect ratio of a window of unknown size."""
 NEAR = 0.02
 """Nearest drawn depth over the distance."""
 
@@ -127,7 +126,6 @@ class Cameras:
         client.camera.on_update(self._resized)
 
     def _resized(self, camera: Any) -> None:
-        """Fit again if the window's size changed."""
         size = _size(camera)
         if self._sizes.get(camera.client.client_id) != size:
             self._sizes[camera.client.client_id] = size

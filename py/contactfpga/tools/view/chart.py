@@ -12,14 +12,11 @@ from contactfpga.tools.view.sources import CHART_S, Strip
 
 WIDTH, HEIGHT = 310, 150
 LEFT, RIGHT, TOP, BOTTOM = 26, 34, 24, 118
-"""Plot within the picture, in its units of about a pixel."""
 SECONDS = (-10, -8, -6, -4, -2, 0)
 AREA = "#2b8fd0"
-"""Color of areas, lighter than pressed cells for dark panels."""
 FORCES = ((picture_style.VERMILLION, ""), ("#d99000", "5 2"), (AREA, ""))
 """Colors and dashes of the curves of :func:`force_chart`."""
 LEGEND = 14
-"""Height of a line of the legend."""
 
 
 def chart(strip: Strip) -> str:
@@ -75,7 +72,6 @@ def top(values: np.ndarray, least: int, steps: Sequence[int] = (1, 2, 5, 10)) ->
 
 
 def _signed(number: float) -> str:
-    """A number with the minus sign of typography."""
     return f"{number:g}".replace("-", "−")
 
 
@@ -88,7 +84,6 @@ def _y(share: float) -> float:
 
 
 def _axis(most: int, x: float, anchor: str) -> Iterator[str]:
-    """Numbers at 0, half and the top, and horizontal lines."""
     for share in (0.0, 0.5, 1.0):
         y = _y(share)
         yield from _text(x, y + 3.5, f"{share * most:g}", anchor)
@@ -97,7 +92,6 @@ def _axis(most: int, x: float, anchor: str) -> Iterator[str]:
 
 
 def _times(marks: Iterable[tuple[float, str]], name: str) -> Iterator[str]:
-    """Numbers below shares of the plot's width, and their unit."""
     for share, mark in marks:
         yield from _text(_x(share), BOTTOM + 13, mark, "middle")
     yield from _text((LEFT + WIDTH - RIGHT) / 2, BOTTOM + 27, name, "middle")
@@ -108,7 +102,6 @@ def _text(x: float, y: float, text: str, anchor: str) -> Iterator[str]:
 
 
 def _line(across: np.ndarray, upward: np.ndarray, color: str, dashes: str = "") -> str:
-    """A line through shares of the plot's width and height."""
     points = " ".join(f"{_x(x):.1f},{_y(y):.1f}" for x, y in zip(across, upward))
     return f'<polyline points="{points}" fill="none" stroke-linejoin="round" {_stroke(color, dashes)}/>'
 

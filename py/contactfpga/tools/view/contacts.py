@@ -12,7 +12,7 @@ from contactfpga.tracking.tracks import Track
 from contactfpga.zones.zone import Zone
 
 MOST = 8
-"""Contacts with a full description; further ones have only ids."""
+"""Contacts with a full description."""
 
 
 @dataclasses.dataclass(frozen=True)

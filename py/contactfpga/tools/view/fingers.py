@@ -123,7 +123,6 @@ class Hand:
             self._tell()
 
     def _taken(self, who: object, x_mm: float, y_mm: float) -> Finger:
-        """The finger with which a drag begins."""
         for finger in self._down:
             if finger.covers(x_mm, y_mm, self._around_mm):
                 self._down.remove(finger)

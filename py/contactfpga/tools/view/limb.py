@@ -14,13 +14,10 @@ if TYPE_CHECKING:
 FOAM_MM = 5.0
 """Thickness of the drawn foam: the default of a Skin's `[cover]`."""
 UNDER_MM = 1.2
-"""Distance from the cells to their carrier."""
 LEFT_MM = 1.0
-"""Remaining foam over a closed cell."""
 REACH = 1.6
 """Distance from a closed cell to undented foam, in pitches."""
 SIDES = 72
-"""Sides of a solid of revolution."""
 
 CORE, COLLAR, JOINT, FOAM, PLATE = (52, 58, 67), (176, 183, 192), (96, 104, 115), (228, 234, 240), (52, 58, 67)
 
@@ -117,7 +114,6 @@ def revolved(profile: np.ndarray, sides: int = SIDES, first: float = 0.0) -> tup
 
 
 def _grid(rows: int, columns: int) -> np.ndarray:
-    """Two triangles per cell of a grid of vertices, row by row."""
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.stack([first, first + 1, first + columns + 1], -1)
     upper = np.stack([first, first + columns + 1, first + columns], -1)
@@ -130,7 +126,6 @@ def _ring(inner: float, outer: float, low: float, high: float, edge: float = 1.5
 
 
 def _rounded(radius: float, low: float, high: float, ball: float) -> np.ndarray:
-    """A shaft that ends in a ball below."""
     turn = np.linspace(-np.pi / 2, 0.35 * np.pi, 20)
     points = np.stack([ball * np.cos(turn), low + ball + ball * np.sin(turn)], -1)
     return np.concatenate([points, [(0.72 * radius, high - 14), (radius, high - 4), (radius, high)]])

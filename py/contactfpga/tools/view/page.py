@@ -1,6 +1,4 @@
-"""Changes of viser's page: its panel under the sheet on a phone, none of its own marks over the sheet; and a
-picture.
-"""
+"""Changes of viser's page, and a picture of it."""
 
 from __future__ import annotations
 
@@ -12,7 +10,6 @@ if TYPE_CHECKING:
     import viser
 
 PANEL_PX = 330
-"""Width of the panel beside the sheet."""
 
 STYLE = """
 @media (max-width: 36em) {
@@ -67,9 +64,7 @@ SCRIPT = """
   };
 })();
 """
-"""Script that removes viser's drag arrow and rotation cross, and saves a picture of the view, with lines of
-text below.
-"""
+"""Script that moves viser's panel on phones, removes its own marks, and saves a picture with lines of text."""
 
 
 def dress(server: viser.ViserServer) -> None:

@@ -40,7 +40,6 @@ TRUTH = (
 FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {picture.MM_PER_N:g} mm per newton")
 TITLE = 36
 MOST_N = 30.0
-"""Largest force of the mouse's finger."""
 
 
 class Panel:

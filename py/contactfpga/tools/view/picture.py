@@ -17,7 +17,6 @@ from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone, Zones
 
 SIDES = 48
-"""Sides of a circle."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -106,14 +105,13 @@ def _lifted(surface: Surface, x_mm: np.ndarray, y_mm: np.ndarray, lift_mm: float
 
 MM_PER_N = 4.0
 LEAST_N = 0.02
-"""Weakest force with an arrow."""
 
 
 def pushes(contacts: Contacts, zones: Zones, cells: LoadCells, surface: Surface) -> np.ndarray:
     """(n, 2, 3) arrows in m, one for each contact with a force, from outside to its zone's barycenter.
 
-    The units' surface has its own frame, and may be the outside of a foam: forces are resolved along its normal, rows
-    and columns, and drawn along those of the sheet.
+    Forces are resolved along the normal, rows and columns of the units' surface, which may be the outside of a foam,
+    and drawn along those of the sheet.
     """
     placed = [zone for zone in zones if zone.x_mm is not None]
     arrows = []

@@ -20,13 +20,10 @@ if TYPE_CHECKING:
     import viser
 
 PUSH_N = 5.0
-"""Initial force of the mouse's finger."""
 APART = 2.3
 """Distance of copies, in radii of a robot at its start."""
 ABOVE = 0.1
-"""Height of a copy's name above it, in these radii."""
 ABREAST = Side(np.array([1.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]))
-"""Viewing direction for several copies."""
 
 
 class SimulatedView(RobotView):
@@ -54,7 +51,6 @@ class SimulatedView(RobotView):
         return np.concatenate([robot.stage.points_m() for robot in self._robots])
 
     def _arrange(self) -> None:
-        """Make adjacent stages for new copies."""
         self._drawn = copies = self._source.copies
         while len(self._stages) < len(copies):
             self._add_stage()

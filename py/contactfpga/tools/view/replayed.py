@@ -30,7 +30,7 @@ class BoardRecording(Protocol):
 
     @property
     def duration_s(self) -> float:
-        """Duration of the recording."""
+        """Duration in s."""
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
         """Seconds from the beginning and frame, in order, from ``start_s`` up to ``end_s``."""
@@ -98,8 +98,6 @@ class Clock:
 
 @dataclasses.dataclass(frozen=True)
 class _Piece:
-    """Result of one read of the file."""
-
     frames: int
     last_s: float
 
@@ -129,7 +127,6 @@ class ByteRecording:
 
     @property
     def count(self) -> int:
-        """Total number of frames."""
         return sum(piece.frames for piece in self._pieces)
 
     def lateness(self) -> Iterator[tuple[float, float]]:

@@ -84,13 +84,12 @@ class RobotStage:
         self._server, self._body, self._node = server, body, node
         self._root = server.scene.add_frame(node, show_axes=False)
         self.at_m = np.zeros(3)
-        """Drawn position of the robot's base."""
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
         """Kinds of unreadable mesh files."""
         self._meshes = self._mesh_bytes = self._triangles = 0
         self._corners: list[tuple[str, np.ndarray]] = []
-        """Links with the corners of a box around a mesh, (8, 3) in m in the link's frame."""
+        """Corners of a box around each link's mesh, (8, 3) in m in the link's frame."""
         self._poses: Mapping[str, Pose] = {}
         self._hidden: set[str] = set()
         scene = server.scene

@@ -14,11 +14,8 @@ if TYPE_CHECKING:
     import viser
 
 BEYOND = 1.1
-"""Distance from the outermost cells to the numbers, in pitches."""
 MARKS = 4
-"""Approximate count of numbers along an edge."""
 AXIS = 2.5
-"""Length of an axis, in pitches."""
 
 
 @dataclasses.dataclass(frozen=True)

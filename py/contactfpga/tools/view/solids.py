@@ -17,7 +17,6 @@ from contactfpga.tools.view.limb import revolved
 UNDER = 0.96
 """Scale of the geom under a sheet, so that the cells are visible."""
 PLANE_M = 1.0
-"""Half a side of an infinite plane."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +46,6 @@ def named(model: Any, number: int) -> str:
 
 
 def _solid(model: Any, number: int, worn: Collection[str]) -> Solid | None:
-    """A geom; None for height fields and distance fields."""
     import mujoco
 
     geom = model.geom(number)
@@ -73,7 +71,6 @@ def _mesh(model: Any, number: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _form(kind: int, size: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices in m and faces of MuJoCo's primitives."""
     from mujoco import mjtGeom
 
     turn = np.linspace(-np.pi / 2, np.pi / 2, 17)

@@ -26,12 +26,10 @@ MAX_LAG_S = 0.1
 """Largest lag of a board that is caught up; beyond it, time slips."""
 
 MOMENT_S = 0.04
-"""Computing time of one moment."""
 LEAST_S = 0.0005
 SMOOTHING = 0.2
 
 WINDOW_S = 2.0
-"""Window of the reported share of real time."""
 
 
 class SimulatedPace:
@@ -76,16 +74,13 @@ class SimulatedPace:
 
 
 STEP_S = 0.02
-"""Duration of a shown moment."""
 
 SILENT_S = 0.5
 """Silence that is reported; a working board sends a frame at least every 0.1 s."""
 
 KEEPS_UP = 0.97
-"""Share of real time that counts as keeping up."""
 
 WAITING = 65_536
-"""Most frames that wait for a moment's end."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +88,6 @@ class Moment:
     """Content of a drawing."""
 
     zones: Zones
-    """The newest frame."""
     tracks: Tracks
     truth: np.ndarray | None = None
     """(rows, columns) bool: closed switches of a virtual board."""
@@ -104,7 +98,7 @@ class Moment:
     pushes: Sequence[tuple[Zone, float | None]] = ()
     """Zones of the measured frame with a place, each with the push in N if known."""
     arrows: np.ndarray | None = None
-    """(n, 2, 3) in m, in the sheet's frame: pushes on a robot's link, whose units use the link's frame."""
+    """(n, 2, 3) in m, in the sheet's frame: pushes on a robot's link."""
 
 
 class Source(Protocol):
@@ -160,7 +154,6 @@ class BoardSource:
         return Moment(zones, self._tracker.update(zones), truth, felt, () if felt is None else pushes(*felt))
 
     def _felt(self, newest: Zones) -> tuple[Contacts, Zones] | None:
-        """The forces of the previously newest frame."""
         before, self._felt_in = self._felt_in, newest
         if self.cells is None or before is None or before.units is None:
             return None
@@ -168,7 +161,6 @@ class BoardSource:
         return None if found is None else (found, before)
 
     def _wait(self) -> bool:
-        """Whether frames came."""
         seconds = STEP_S
         if self._pace is not None:
             due = self._pace.due(self._board.clock())
@@ -216,7 +208,7 @@ def pushes(contacts: Contacts, zones: Zones) -> list[tuple[Zone, float | None]]:
 
 
 AT_REST = 15.0
-"""Frame rate of an unchanged board that sends changes and keep-alives, at least one each 0.1 s."""
+"""Frame rate of an untouched board with ``send = "on_change"``."""
 
 
 def paced(frames_per_s: float) -> str:
@@ -243,12 +235,11 @@ class Strip:
 
 
 class Meter:
-    """Frame counters over the last second, and the lines of the strip chart, in device time."""
+    """Frame counters over the last second, and the data of the strip chart, in device time."""
 
     def __init__(self) -> None:
         self.stats = Stats()
         self.dropped = 0
-        """Frames that arrived faster than they could be shown."""
         self._times_us: collections.deque[tuple[int, int]] = collections.deque()
         self._late_s: collections.deque[float] = collections.deque(maxlen=50)
         self._steps: collections.deque[tuple[int, int, float]] = collections.deque(maxlen=int(CHART_S / CHART_STEP_S))
@@ -280,7 +271,7 @@ class Meter:
             self._steps.append((int(step), int(count), float(area)))
 
     def take_latency(self, batch: Batch, virtual: bool) -> None:
-        """Add their latencies; ``virtual``: the board's clock is that of arrivals, without estimation."""
+        """Add their latencies; ``virtual``: device times and arrivals share one clock."""
         frames = batch.frames
         sampled_s = frames["time_us"] / 1e6 if virtual else frames["host_time_s"]
         late_s = frames["arrived_s"] - sampled_s

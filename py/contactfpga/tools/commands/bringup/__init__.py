@@ -41,11 +41,10 @@ SECONDS = 300.0
 COUNTED_S = 2.0
 """Time for counting frames of an untouched sheet."""
 STUCK_S, REST_S = 10.0, 1.0
-"""Times of a :class:`Person`."""
 REHEARSAL = "sim://"
 """Port of a virtual kit with a simulated hand."""
 REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
-"""Simulated times: longest constant action of the hand, and counting of frames."""
+"""Simulated times in s: longest constant action of the hand, and counting."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -208,8 +207,6 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
 
 
 class _Hand:
-    """A person's stand-in on a virtual board."""
-
     stuck_s, rest_s = 0.1, 0.02
 
     def __init__(self, hand: object):

@@ -14,7 +14,7 @@ from contactfpga.skin import Skin
 
 
 class Person(Protocol):
-    """The person or hand that touches the sheet."""
+    """Whoever touches the sheet."""
 
     stuck_s: float
     """Time for which a switch stays pressed, while others change, to count as stuck."""
@@ -52,7 +52,6 @@ class Bench:
     skin: Skin
     person: Person
     stated: Circuit | None = None
-    """The circuit that the kit states."""
     seconds: float = 1.0
     """Time for counting frames."""
     timeout: float = 1.0

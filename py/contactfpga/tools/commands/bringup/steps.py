@@ -23,7 +23,6 @@ from contactfpga.zones.zone import Zones
 READS = 50
 """Requests for the response time."""
 MOST_LOST = 0.1
-"""Share of lost frames that prevents other measurements."""
 RULER = "Press a ruler's edge along each column, one after the other, half a second each."
 WATCHED_S = 0.1
 """Least time in s for the untouched sheet."""

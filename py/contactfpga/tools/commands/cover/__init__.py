@@ -75,7 +75,6 @@ def notes(found: list[str]) -> int:
 
 LENGTH, LENGTH_FROM_0 = numbers.length(MAX_LENGTH_M), numbers.length(MAX_LENGTH_M, 0.0)
 ALONG = numbers.length(10.0)
-"""Places along an arm."""
 KG = numbers.number(1e-6, 1e6, "kg")
 SPEED = numbers.number(0, 1000, "m/s")
 TORQUE = numbers.number(-1e6, 1e6, "Nm")

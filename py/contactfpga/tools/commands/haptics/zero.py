@@ -19,7 +19,6 @@ from contactfpga.tools.console.forces import cells_of
 EXTRA = "haptics"
 
 LEAST = 10
-"""Least number of readings."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -75,7 +75,6 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
 
 
 def _own(args: argparse.Namespace) -> dict[str, Method]:
-    """The methods of added labellers."""
     from contactfpga_sim.lab.chart.methods import by
 
     return {name: method for one in args.labeller or () for name, method in by(labellers.find(one)).items()}

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 STEPS = 10
-"""Digits of the drawing."""
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
