@@ -125,7 +125,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def numbered(svg: str) -> str:
-    """The SVG with ids numbered in order; matplotlib's hash coordinates, which differ between processors."""
+    """The SVG with ids numbered in order; matplotlib's ids hash coordinates that differ between processors."""
     names: dict[str, str] = {}
     return re.sub(
         r'(?<=[#"])[a-z][0-9a-f]{10}(?=[")])', lambda found: names.setdefault(found[0], f"i{len(names)}"), svg

@@ -153,8 +153,8 @@ class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
     'Zones'
 
     It gives each :class:`Zones`; :class:`Faults`, first the present ones and then each change, even without a frame;
-    the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline
-    :class:`Silence`, each time that it passes without a frame.
+    the slots of a self-test; each sweep of pressure units as :class:`UnitSamples`; and :class:`Silence`, each time that
+    a deadline passes without a frame.
 
     At most ``maxsize`` items wait; beyond that, the oldest are dropped, and frames among them counted in
     :attr:`dropped`.
@@ -262,14 +262,14 @@ def checked_item(found: object) -> object:
 
 
 def checked(timeout: float) -> float:
-    """A timeout in seconds; raises ValueError unless it is positive and finite."""
+    """A timeout in seconds; raises ValueError unless positive and finite."""
     if not is_finite(timeout) or timeout <= 0:
         raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
     return float(timeout)
 
 
 def checked_span(max_s: float) -> float:
-    """The seconds of a batch; raises ValueError unless they are finite and not below 0."""
+    """The seconds of a batch; raises ValueError unless finite and not below 0."""
     if not is_finite(max_s) or max_s < 0:
         raise ValueError(f"max_s is {max_s!r}; it must be a number of seconds, 0 or more")
     return float(max_s)

@@ -192,7 +192,6 @@ def _share(percent: float | None) -> float | None:
 
 
 def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
-    """Print the results so far; returns a sentence about them."""
     from contactfpga_sim.lab.fit import show
 
     again = "run the same command again to go on from there"

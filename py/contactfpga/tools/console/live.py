@@ -147,7 +147,6 @@ def room(console: Console, endless: bool = False) -> Room:
 def _list(
     board: Board, frames: FrameSource, args: argparse.Namespace, console: Console, render: Render, take: Take
 ) -> None:
-    """Show one frame per second below the other: the first, and finally the last one."""
     waits: Zones | None = None  # the last one, while it is not shown
     due_s = -math.inf
 

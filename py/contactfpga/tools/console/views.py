@@ -139,7 +139,6 @@ def _interval(contact: Contact) -> tuple[float | None, float | None]:
 
 
 def _names(track: Track) -> str:
-    """The ids of a zone, the main one first."""
     return "+".join(map(str, (track.id, *track.merged)))
 
 

@@ -178,7 +178,6 @@ def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
 
 
 def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
-    """The steps, up to one that the port's loss ends."""
     try:
         yield from found
     except ContactFPGAError as error:
@@ -232,7 +231,6 @@ class _Reader:
 
 
 def _add(args: argparse.Namespace, report: BringUpReport, step: Step, port: str) -> None:
-    """Record and show a step, without the port's name."""
     if not args.json:
         terminal.say(f"{len(report.steps) + 1}. {step.name}")
         for finding in step.findings:

@@ -217,7 +217,6 @@ def bounce(bench: Bench) -> Step:
 
 
 def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: Callable[[], bool]) -> None:
-    """Pass frames on for this device time, until Ctrl-C, or until all is seen."""
     zones = bench.board.latest(bench.timeout)
     first_us = rest_us = zones.time_us
     with interrupt.usual_end():

@@ -81,7 +81,6 @@ def _own(args: argparse.Namespace) -> dict[str, Method]:
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
-    """Save the finished points beside an earlier whole chart; returns the place."""
     from contactfpga_sim.lab.chart import numbers as table
 
     again = "run the same command again to go on from there"
