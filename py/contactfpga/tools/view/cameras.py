@@ -68,7 +68,7 @@ def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_R
 
 
 def sides_of(tiles: Tiles) -> dict[str, Side]:
-    """Views of a sheet: oblique, frontal, along it, and from behind. A sheet around a limb lies, with row 0 on the
+    """Views of a sheet: oblique, frontal, along it, and from the back. A sheet around a limb lies, with row 0 on the
     left.
     """
     if tiles.sheet.radius_mm is None:

@@ -1,4 +1,4 @@
-"""viser's server behind a guard: only a browser with the token may read and press, on a page of this server."""
+"""viser's server with a guard: only a browser with the token may read and press, on a page of this server."""
 
 from __future__ import annotations
 
