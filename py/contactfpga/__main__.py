@@ -1,4 +1,4 @@
-"""The entry point of the command `contactfpga`, also as ``python -m contactfpga``."""
+"""Entry point of the command ``contactfpga`` and of ``python -m contactfpga``."""
 
 from typing import NoReturn
 
@@ -6,7 +6,7 @@ from contactfpga.tools.console import signals
 
 
 def main() -> NoReturn:
-    """Run the command; a signal ends it quietly also while it is still being loaded."""
+    """Run the command; a signal ends it quietly even while modules load."""
     signals.end_all_at_once()
     from contactfpga.tools import cli
     from contactfpga.tools.console import interrupt

@@ -1,4 +1,4 @@
-"""Everything this package raises on purpose. Each message names what was met and the next step."""
+"""Errors of this package; each message names the cause and the next step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 UNSOLVED = 3
-"""Exit status of a command whose answer is that there is no solution."""
+"""Exit status of a command that finds no solution."""
 
 
 class ContactFPGAError(Exception):
@@ -27,19 +27,19 @@ class SkinError(ContactFPGAError, ValueError):
 
 
 class AddressError(ContactFPGAError):
-    """A port's name that names no port, such as one with an option or a scene that does not exist."""
+    """A port's name is invalid, for instance by an unknown option or scene."""
 
 
 class PortNotFound(ContactFPGAError):
-    """No port, or no single one, could be chosen or opened."""
+    """No port, or more than one, fits; or the port cannot be opened."""
 
 
 class PortBusy(ContactFPGAError):
-    """The port is there, and open in this program or another one."""
+    """The port is open already, in this program or another one."""
 
 
 class PortLost(ContactFPGAError):
-    """The port was there and is gone: unplugged, or its other end closed it."""
+    """An open port is gone: unplugged, or closed by its other end."""
 
 
 class BoardClosed(ContactFPGAError):
@@ -51,49 +51,49 @@ class ReadTimeout(ContactFPGAError, TimeoutError):
 
 
 class NoData(ReadTimeout):
-    """No frame came for longer than the reader allows; ``silence`` says how long, and what came last."""
+    """No frame came for longer than the reader allows."""
 
     def __init__(self, message: str, silence: Any):
         super().__init__(message)
         self.silence = silence
-        """A :class:`~contactfpga.Silence`."""
+        """Duration and last data, a :class:`~contactfpga.Silence`."""
 
 
 class BoardSilent(ReadTimeout):
-    """Not one byte came in time."""
+    """No byte came in time."""
 
 
 class OnlyNoise(ReadTimeout):
-    """Bytes came, and not one valid packet among them."""
+    """Bytes came in time, but no valid packet."""
 
 
 class NoSuchCommand(ContactFPGAError):
-    """The board does not take this command."""
+    """The board does not accept this command."""
 
 
 class ReplayEnded(ContactFPGAError, EOFError):
-    """A recording holds no further frame."""
+    """A recording has no further frame."""
 
 
 class SkinMismatch(ContactFPGAError):
-    """The board was built from another Skin than the one given or the one it had before."""
+    """The board was built from another Skin than expected."""
 
 
 class VersionMismatch(ContactFPGAError):
-    """The board speaks another version of the protocol."""
+    """The board uses another version of the protocol."""
 
 
 class MissingExtra(ContactFPGAError, ImportError):
-    """A command needs a part of contactfpga that is not installed."""
+    """An optional part of contactfpga is not installed."""
 
     def __init__(self, what: str, extra: str):
         self.what = what
-        """What needs it."""
+        """The function or command that needs the part."""
         super().__init__(f"{what} needs more than is installed; install it with: {pip_install(extra)}")
 
 
 def pip_install(extra: str) -> str:
-    """The command that adds an extra to what is installed for this Python, from a wheel or from a source tree."""
+    """The command line that installs an extra for this Python, from a wheel or a source tree."""
     quote = '"' if sys.platform == "win32" else "'"
     python = sys.executable or "python"
     if os.sep in (inside := python.removeprefix(os.getcwd() + os.sep)):

@@ -1,4 +1,4 @@
-"""Quantities derived from a Skin or its sheet: widths in bits, sizes in bytes, clocks and depths."""
+"""Quantities derived from a Skin or its sheet: bits, bytes, clocks and depths."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ CHECK_BYTES = 3
 TIME_BITS = 24
 SEQUENCE_BITS = 8
 HEARD_BITS = 3
-"""Bits of a request's number in each frame."""
+"""Bits of a request's number that each frame repeats."""
 
 MIN_OVERWRITTEN_BITS = 4
 
 HELLO_PERIOD_US = 500_000
-"""Interval of hellos, short enough to wait for a frame and still have one every second."""
+"""Interval of hellos: a hello may wait for a frame and still comes every second."""
 
 HELLO_BIT = 19
-"""Bit of the us clock whose toggles, every 0.52 s, make a hello of a scan that waits due."""
+"""Bit of the us clock that toggles every 0.52 s, which makes a hello of a waiting scan due."""
 KEEP_ALIVE_BIT = 10
-"""Bit of the us clock whose toggles, every 1.024 ms, count a keep-alive."""
+"""Bit of the us clock that toggles every 1.024 ms, which counts toward a keep-alive."""
 
 EPOCH_BITS = 22
-"""Bits of an epoch: the board counts periods of 2^22 us beside a frame's time, less than half of its range."""
+"""Log2 of an epoch in us; an epoch is less than half of the range of a frame's time."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
 """Largest value of the stuck-line counter."""
@@ -43,7 +43,7 @@ STUCK_MAX = (1 << STUCK_BITS) - 1
 SELF_TEST = 1
 """Number of the command that tests all lines (docs/protocol.md)."""
 SAMPLE_AT = 2
-"""Number of the command that samples the columns at another clock of a row."""
+"""Number of the command that sets the clock of a row at which the columns are sampled."""
 
 
 class Widths:
@@ -82,11 +82,11 @@ class Widths:
 
     @functools.cached_property
     def record_bits(self) -> tuple[int, ...]:
-        """Bits of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter; for a sheet whose ends
-        meet, then the cells past the seam.
+        """Bits of a zone's fields on the wire: area, then sum x and sum y, or x and y of the barycenter; on a sheet
+        whose ends meet, also the cells past the seam.
 
-        With a barycenter the area is never 0. So if the sheet's cells are a power of two, all of them are sent as 0,
-        which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
+        Divided areas are never 0, so an area of all cells is sent as 0. If the cells are a power of two, this saves a
+        bit.
         """
         if not self.report.divided:
             past = (self.area_bits,) if self.sheet.closed else ()
@@ -109,12 +109,12 @@ class Widths:
 
     @functools.cached_property
     def trailer_bytes(self) -> int:
-        """Bytes of a frame's end, including its kind byte."""
+        """Bytes of a frame's trailer, including its kind byte."""
         return math.ceil((self._counted_bits + MIN_OVERWRITTEN_BITS) / 8) + 1
 
     @functools.cached_property
     def overwritten_bits(self) -> int:
-        """Bits that the other fields leave in the trailer, at least four."""
+        """Bits of the trailer's count of overwritten frames, at least four."""
         return 8 * (self.trailer_bytes - 1) - self._counted_bits
 
     @property
@@ -123,7 +123,7 @@ class Widths:
 
     @functools.cached_property
     def item_bytes(self) -> int:
-        """Bytes of one item of a frame: a zone or a bitmap row."""
+        """Bytes of one zone, or of one bitmap row."""
         return self.record_bytes if self.report.zones else self.bitmap_row_bytes
 
     @functools.cached_property
@@ -132,13 +132,13 @@ class Widths:
 
     @functools.cached_property
     def max_stored_bytes(self) -> int:
-        """The longest stored frame: items and trailer, stuffed."""
+        """Bytes of the longest stored frame: items and trailer, stuffed."""
         plain = self.max_items * self.item_bytes + self.trailer_bytes
         return plain + math.ceil(plain / 254)
 
     @functools.cached_property
     def max_frame_bytes(self) -> int:
-        """The longest frame on the wire, with check bytes and delimiter."""
+        """Bytes of the longest frame on the wire, with check bytes and delimiter."""
         return self.max_stored_bytes + CHECK_BYTES + 1
 
 
@@ -161,7 +161,7 @@ LONGEST_PACKET = Widths(
 
 
 SAMPLED_BIT_CLOCKS = 4
-"""Clocks per bit from which a receiver can sample near the middle of each bit."""
+"""Least clocks per bit with which a receiver can sample near the middle of each bit."""
 
 
 def bit_clocks(clock_hz: int, baud: int) -> int:
@@ -170,12 +170,12 @@ def bit_clocks(clock_hz: int, baud: int) -> int:
 
 
 def pulsed(clock_hz: int, baud: int) -> bool:
-    """Whether the board needs pulses instead of bytes (docs/protocol.md): it has too few clocks per bit to sample."""
+    """Whether the board has too few clocks per bit to sample, and needs requests as pulses (docs/protocol.md)."""
     return bit_clocks(clock_hz, baud) < SAMPLED_BIT_CLOCKS
 
 
 class Derived(Widths):
-    """Clocks, widths and depths of a :class:`~contactfpga.Skin`, its ``derived``."""
+    """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
 
     def __init__(self, skin: Skin):
         super().__init__(skin.sheet)
@@ -202,7 +202,7 @@ class Derived(Widths):
 
     @functools.cached_property
     def units(self) -> Units:
-        """Quantities of its pressure units."""
+        """Quantities of the pressure units."""
         return Units(self.skin)
 
     # ---- clocks in which lines are driven and read, and those of a bit on the link
@@ -212,26 +212,27 @@ class Derived(Widths):
         return self.skin.clock_hz // 1_000_000
 
     def clocks(self, us: float) -> int:
-        """Clocks that last at least this many microseconds."""
+        """The least clocks that last this many microseconds."""
         return whole(us * self.clocks_per_us)
 
     @property
     def settle_clocks(self) -> int:
-        """Time for which a row is driven: as requested, but at least until the previous slot's columns and the next row
-        are shifted."""
+        """Clocks for which a row is driven: at least until the previous slot's columns and the next row are shifted."""
         row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
         return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
 
     @property
     def first_sample_clocks(self) -> int:
-        """The least value of the command "sample at": with shift registers the previous slot's columns are complete by
-        then."""
+        """Least value of the command "sample at"; with shift registers the previous slot's columns are complete by
+        then.
+        """
         return max(2, self.column_load_clocks + self.column_shift_clocks)
 
     @property
     def release_clocks(self) -> int:
-        """Time without a driven row: as requested, but at least until the columns are shifted, and the next row is
-        latched, or chosen and then shifted."""
+        """Clocks without a driven row: at least until the columns are shifted, and the next row is chosen, shifted and
+        latched.
+        """
         column = self.column_load_clocks + self.column_shift_clocks
         row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
         precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
@@ -239,12 +240,12 @@ class Derived(Widths):
 
     @property
     def precharge_clocks(self) -> int:
-        """Least time for which columns are driven before a row; 0: never."""
+        """Least clocks for which columns are driven before a row; 0: never."""
         return self.clocks(self.skin.precharge_us)
 
     @property
     def project_clocks(self) -> int:
-        """Time for which all columns are driven and rows released before these are sampled."""
+        """Clocks for which all columns are driven, and rows released, before the rows are sampled."""
         return self.clocks(self.skin.project_us)
 
     @property
@@ -253,27 +254,27 @@ class Derived(Widths):
 
     @property
     def shift_clocks(self) -> int:
-        """A bit on a chain of shift registers; at least two, for both levels of its clock."""
+        """Clocks per bit of a shift-register chain; at least two, for both levels of the shift clock."""
         return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
 
     @property
     def row_latch_clocks(self) -> int:
-        """The pulse that latches a shifted row pattern; 0 with direct rows."""
+        """Clocks of the pulse that latches a shifted row pattern; 0 with direct rows."""
         return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
 
     @property
     def row_shift_clocks(self) -> int:
-        """From the order to shift a row pattern until it can be driven; 0 with direct rows."""
+        """Clocks from the order to shift a row pattern until it can be driven; 0 with direct rows."""
         return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
 
     @property
     def column_load_clocks(self) -> int:
-        """The pulse that loads all columns, sampled in its last clock; 0 with direct columns."""
+        """Clocks of the pulse that loads all columns, sampled in its last clock; 0 with direct columns."""
         return self.shift_clocks if self.skin.column_read == "74hc165" else 0
 
     @property
     def column_shift_clocks(self) -> int:
-        """Delay of a sample's columns against direct ones; 0 with direct columns."""
+        """Latency in clocks of a sample's columns against direct ones; 0 with direct columns."""
         return self.column_chain_lines * self.column_load_clocks
 
     @property
@@ -283,7 +284,7 @@ class Derived(Widths):
 
     @property
     def choice_clocks(self) -> int:
-        """From a strobe until the scan can drive its next rows; 0 if it knows them beforehand."""
+        """Clocks from a strobe until the scan can drive its next rows; 0 if it knows them beforehand."""
         return self.scan.choice_clocks(self)
 
     @property
@@ -296,7 +297,7 @@ class Derived(Widths):
 
     @property
     def frame_clocks(self) -> int:
-        """One scan period: every row once, including a guard row. Frames of an adaptive scan vary."""
+        """Clocks in which every row, including a guard row, is driven once. Frames of an adaptive scan vary."""
         return self.row_clocks * self.skin.row_lines
 
     @property
@@ -305,7 +306,7 @@ class Derived(Widths):
 
     @property
     def pulsed(self) -> bool:
-        """Whether requests come as pulses: a bit is too short to sample."""
+        """Whether requests come as pulses; see :func:`pulsed`."""
         return pulsed(self.skin.clock_hz, self.skin.baud)
 
     # ---- times, in clocks unless named otherwise
@@ -322,27 +323,30 @@ class Derived(Widths):
 
     @property
     def skips(self) -> bool:
-        """Whether undriven rows are not passed on, except an empty one where zones must end."""
+        """Whether undriven rows are not passed on, except an empty row where zones must end."""
         return self.scan.waits and self.report.zones
 
     @property
     def min_row_clocks(self) -> int:
-        """The least clocks of a row, for debounce and labeller to finish the one before it, end mark included; and for
-        a frame to last until the one before it is packed, as the scanner's tag is kept no longer."""
+        """Least clocks of a row, in which debounce and labeller finish the row before, end mark included, and a frame
+        lasts until the frame before is packed.
+        """
         return self.scan.min_row_clocks(self)
 
     @property
     def debounce_clocks(self) -> int:
-        """Delay of a row in the debounce."""
+        """Latency of a row in the debounce, in clocks."""
         return self.skin.columns + 3 if self.debounced else 0
 
     @property
     def packed_clocks(self) -> int:
-        """From the offer of a frame's last row to the end of its packing, without the bytes packed meanwhile."""
+        """Clocks from the offer of a frame's last row to the end of its packing, without the bytes packed meanwhile."""
         return 1 + self.debounce_clocks + self.label_clocks + 2 + 4
 
     def items_clocks(self, items: int) -> int:
-        """For a frame's items and trailer: a byte per clock, or the longer division of items."""
+        """Clocks to pack a frame's items and trailer: one per byte, or those of the items' divisions if these take
+        longer.
+        """
         plain = items * self.item_bytes + self.trailer_bytes
         stuffing = math.ceil(plain / 254)
         if not self.report.divided:
@@ -351,7 +355,7 @@ class Derived(Widths):
 
     @property
     def keep_alive_frames(self) -> int:
-        """Scans, or for frames of varying length row times, within which a frame is sent."""
+        """Scans within which a frame is sent; row times for frames of varying length."""
         clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
         if self.scan.even:
             return math.floor(clocks / self.frame_clocks + 1e-9)
@@ -359,13 +363,12 @@ class Derived(Widths):
 
     @property
     def keep_alive_toggles(self) -> int:
-        """Toggles of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame, which uses the
-        remaining time."""
+        """Toggles of ``KEEP_ALIVE_BIT`` after which a waiting scan sends a frame in the remaining time."""
         return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_toggles
 
     @property
     def min_keep_alive_ms(self) -> float:
-        """Least keep-alive time of a scan that waits."""
+        """Least keep-alive time of a waiting scan, in ms."""
         return (self._spare_toggles + 1) * (1 << KEEP_ALIVE_BIT) / 1000
 
     @property
@@ -374,28 +377,28 @@ class Derived(Widths):
 
     @property
     def hello_frames(self) -> int:
-        """Scans, or for frames of varying length row times, after which a hello is due."""
+        """Scans after which a hello is due; row times for frames of varying length."""
         periods = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
         return periods if self.scan.even else periods * self.skin.rows
 
     @property
     def press_scans(self) -> int:
-        """Scan periods that last at least debounce_press_us."""
+        """The least scans that last ``debounce_press_us``."""
         return whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def release_scans(self) -> int:
-        """Scan periods that last at least debounce_release_us."""
+        """The least scans that last ``debounce_release_us``."""
         return whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def press_ticks(self) -> int:
-        """Ticks after which a press has lasted: row times, or us of a scan that waits; docs/timing.md."""
+        """Ticks of ``debounce_press_us``: row times, or us with a waiting scan (docs/timing.md)."""
         return self._debounce_ticks(self.skin.debounce_press_us, self.press_scans)
 
     @property
     def release_ticks(self) -> int:
-        """Ticks after which a release has lasted: row times, or us of a scan that waits."""
+        """Ticks of ``debounce_release_us``, as in :attr:`press_ticks`."""
         return self._debounce_ticks(self.skin.debounce_release_us, self.release_scans)
 
     def _debounce_ticks(self, us: float, scans: int) -> int:
@@ -407,7 +410,7 @@ class Derived(Widths):
 
     @functools.cached_property
     def tick_bits(self) -> int:
-        """Bits of a counter for a debounce time and two frames more."""
+        """Bits of a counter of ticks for a debounce time and two frames."""
         longest = max(self.press_ticks, self.release_ticks)
         if self.scan.waits:
             frame = self.max_frame_clocks + self.packed_clocks + self.items_clocks(self.max_items)
@@ -421,7 +424,7 @@ class Derived(Widths):
 
     @property
     def quotient_bits(self) -> int:
-        """Bits of a barycenter before rounding: one more fraction bit. One is computed per clock."""
+        """Bits of a barycenter before rounding, with one more fraction bit; one is computed per clock."""
         return self.cell_bits + self.skin.barycenter_bits + 1
 
     @property
@@ -444,23 +447,22 @@ class Derived(Widths):
 
     @property
     def label_row_clocks(self) -> int:
-        """The most clocks from a row to the next one that the labeller, or its replacement, can take."""
+        """The most clocks that the labeller, or its replacement, needs from a row to the next."""
         return self.labeller.row_clocks(self) if self.report.zones else 1
 
     @property
     def label_empty_row_clocks(self) -> int:
-        """The most clocks from an empty row below an empty row to the next one."""
+        """The most clocks that the labeller needs from an empty row below an empty row to the next."""
         return self.labeller.empty_row_clocks(self) if self.report.zones else 1
 
     @functools.cached_property
     def backlog(self) -> int:
-        """Capacity of the queue before the packer.
+        """Items that the queue before the packer holds.
 
-        Two rows close at most ``open_zones`` zones, which may come in one burst; if packing them is slower than two
-        rows, the rest accumulates, over at most the capacity of two frames. Bitmap rows are packed before the next one.
-        An adaptive scan omits empty rows, so that every row may close as many zones, and bitmap rows of two frames may
-        wait. A scan that waits has at most one frame under way, and its first item is taken before its end mark; a
-        power of two needs less logic.
+        Two rows close at most ``open_zones`` zones, in one burst. If packing these takes longer than two rows, the rest
+        accumulates, over at most two frames. Even scans pack each bitmap row before the next. An adaptive scan omits
+        empty rows, so every row may close as many zones, and bitmap rows of two frames may wait. A waiting scan has one
+        frame under way; its depth is a power of two, which needs less logic.
         """
         if self.scan.waits:
             return max(8, 1 << (self.max_items - 1).bit_length())
@@ -472,5 +474,5 @@ class Derived(Widths):
 
 
 def whole(value: float) -> int:
-    """The next integer upward, ignoring float rounding."""
+    """The next integer upward; ignores float rounding below 1e-9."""
     return math.ceil(value - 1e-9)
