@@ -1,4 +1,4 @@
-"""From a Skin to a bitstream for a board, with tools from PyPI."""
+"""Build of a bitstream with tools from PyPI."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TOOLS = {
 _NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"
 
 LIMIT_S = 900
-"""Timeout: for some seeds the router never ends; successful builds need up to two minutes."""
+"""Timeout: for some seeds the router never ends; successful builds take up to two minutes."""
 
 LOG = f"{NAME}.tim"
 """Log file of nextpnr."""
@@ -39,10 +39,10 @@ CROWDED = 0.8
 
 
 def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
-    """Build the bitstream of one or several sheets in ``folder``; raises BitstreamFailed if it does not fit or misses
-    its timing.
+    """Build the bitstream of one or several sheets in ``folder``. Raises BitstreamFailed if the design does not fit or
+    misses its timing.
 
-    ``seed`` is the start of place and route; the same one gives the same bitstream.
+    ``seed``: start of place and route; equal seeds give equal bitstreams.
     """
     plan = plan_for(board, skin, seed)
     folder = folder.resolve()

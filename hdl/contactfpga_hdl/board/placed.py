@@ -20,7 +20,7 @@ class Report:
     flip_flops: int
     block_rams: tuple[int, int]
     logic_cells: tuple[int, int] | None
-    """iCE40 only: cells of one LUT and one flip-flop, used and available; the limiting resource."""
+    """Cells of one LUT and one flip-flop, used and available, the limiting resource of an iCE40; otherwise None."""
     fmax_mhz: float
     needed_mhz: float
 
@@ -39,7 +39,7 @@ class Report:
 
 
 def read(folder: Path, log: str) -> Report:
-    """The results of nextpnr in ``folder``: its report, and for an iCE40 its log of that name."""
+    """Results of nextpnr in ``folder``: its report, and for an iCE40 its log."""
     figures = json.loads((folder / FILE).read_text(encoding="utf-8"))
     cells = {name: (cell["used"], cell["available"]) for name, cell in figures["utilization"].items()}
     clock = min(figures["fmax"].values(), key=lambda clock: clock["achieved"] / clock["constraint"])

@@ -1,12 +1,11 @@
-"""Commands of yosys and nextpnr, common to bitstreams, simulated netlists and figures."""
+"""Commands of yosys and nextpnr for bitstreams, simulated netlists and figures."""
 
 import dataclasses
 
 NO_COLLISIONS = "setparam -set COLLISION_X_MASK 1'1 t:$memrd_v2"
 """Option for memories whose words are never used from a clock in which they are written.
 
-Amaranth promises the word before the write, an FPGA's memory does not: the promise would need an address comparison and
-two registers per bit.
+Amaranth promises the word before the write; on an FPGA this takes an address comparison and two registers per bit.
 """
 
 _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'
@@ -19,7 +18,7 @@ class Family:
     command: str
     options: str
     before: tuple[str, ...]
-    """Yosys commands that precede it."""
+    """Yosys commands before synthesis."""
     route: str = ""
     """Options of nextpnr."""
 

@@ -2,11 +2,11 @@
 
 Columns count on past the seam, over two adjacent turns. A zone's runs, from left to right, are on one turn, or from
 some run on a turn back, because their path to the first one crosses the seam: one bit tells which. The same holds for
-clusters of a group. If two paths disagree by a turn, the zone goes round the cylinder, as a ring.
+clusters of a group. If two paths disagree by a turn, the zone is a ring around the cylinder.
 
 A group's cells are on the turn of its first cluster and on an adjacent one, the next or the one *back*; ``turned``
-counts those on the upper one of the two. When groups merge, their counts move to the turn where they are now. A group
-that needs a third turn is ``wound``.
+counts the cells on the upper one. When groups merge, their counts move to their present turns. A group that needs a
+third turn is ``wound``.
 """
 
 from typing import Protocol
@@ -21,8 +21,8 @@ from contactfpga_hdl.label.steps import kept_layout, nesting, over_the_seam, tur
 class Turns:
     """The turn of the walked cluster.
 
-    It follows from the zone of a previous row's run that has an earlier one, and at the seam: the first cluster is the
-    neighbor of the last, which therefore is a turn back.
+    It follows from the zone of a run of the row before that has an earlier run, and at the seam: the first cluster is
+    the neighbor of the last, which therefore is a turn back.
     """
 
     def __init__(self, derived: Derived):
@@ -35,11 +35,9 @@ class Turns:
     def find(self, m: Module, turn: Value, goes_on: Value, pop: Value, apart: Value, linked: Value) -> None:
         """Determine the turn.
 
-        turn: as known so far.
-        goes_on: a previous row's run has an earlier one of its zone, and is a turn further back than that if
-            ``linked``.
-        pop: what it or the seam joins was waiting.
-        apart: the run does not touch the cluster before it, though the group continues.
+        turn: the turn as known so far. goes_on: a run of the row before has an earlier one of its zone; ``linked``: it
+        is a turn further back than that one. pop: the run or the seam joins a waiting group. apart: the run does not
+        touch the cluster before it, though the group continues.
         """
         m.d.comb += [
             self.turn.eq(turn),
@@ -52,7 +50,7 @@ class Turns:
             m.d.comb += self.turn.eq(self._zones[0] | linked)
 
     def keep(self, m: Module, passes: Value, earlier: Value, later: Value) -> None:
-        """Store the turn for the zone of a previous row's run that ``passes``."""
+        """Store the turn for the zone of a run of the row before that ``passes``."""
         with m.If(passes):
             kept = Mux(earlier, self._zones >> 1, self._zones)
             m.d.sync += self._zones.eq(Mux(later, Cat(self.turn, kept), kept))
@@ -61,11 +59,10 @@ class Turns:
 class Unwrap(Elaboratable):
     """The turns of a group while cells and found groups are added.
 
-    kept, down (in): the group so far, and whether all of it is now known to be a turn back.
-    found, joins, zone (in): what joins it, if anything: a zone of the row before, or a waiting group, which gives the
-        group its first cluster; all zeros for none.
-    turn, cells (in): turn of the walked cluster, and number of its new cells.
-    ring (in): this makes the group a ring.
+    kept, down (in): the group so far, and whether all of it is now known to be a turn back. found, joins, zone (in):
+    the group that joins, if any: a zone of the row before, or a waiting group, whose first cluster
+        becomes the group's; all zeros for none.
+    turn, cells (in): turn of the walked cluster, and number of its new cells. ring (in): the group becomes a ring.
     group (out): the resulting group.
     """
 
@@ -137,7 +134,7 @@ class SerialTurns:
     """Turns of the labeller ``serial``: registers and memory for the walked group.
 
     The seam is one more zone of the row before: it begins before the first column, outermost in its group, and ends
-    after the last column, in two clocks like every run of the row before. Turns are determined as in ``run``.
+    after the last column, in two clocks like every run of the row before.
     """
 
     def __init__(self, derived: Derived):
@@ -181,7 +178,7 @@ class SerialTurns:
 
     def link(self, has_run: Value, starts: Value, found: data.View) -> Value:
         """Whether a run is a turn further back than its earlier one: the run that ``starts``, or the group's first as
-        ``found`` joins it."""
+        ``found`` joins."""
         onto = has_run & self.turn & ~self.last_turn
         return Mux(starts, onto, (self.first_turn | self.turns.down) & ~found.last_turn)
 

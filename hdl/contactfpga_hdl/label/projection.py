@@ -1,8 +1,8 @@
 """Zones from their shadows on the two axes: small, and wrong where shadows cross.
 
-Rows with a pressed cell form *bands* of adjacent rows. Within a band the columns with a pressed cell, its shadow, form
-runs; the cells above one run are one zone. So two contacts in one band whose shadows touch are merged, and a ring
-includes its interior. A connected contact is never split, and the moments of a zone so defined are exact.
+Adjacent rows with a pressed cell form a *band*. Within a band the columns with a pressed cell, its shadow, form runs;
+the cells above one run are one zone. So two contacts in one band whose shadows touch are merged, and a ring includes
+its interior. A connected contact is never split; the moments of these zones are exact.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -18,13 +18,10 @@ def _step_layout() -> data.StructLayout:
 
 
 class ProjectionLabeller(wiring.Component):
-    """Rows in, zone records out; one column per clock.
+    """Rows in, zone records out, one column per clock; ports as in :func:`~contactfpga_hdl.payloads.labeller_ports`.
 
-    A row of C columns needs C + 1 clocks, an empty one outside a band one. A band closes with the empty row after it or
+    A row of C columns takes C + 1 clocks, an empty row outside a band one. A band closes with the empty row after it or
     with the frame's last row, handed over in clock h; the zone whose shadow ends in column x leaves in clock h + x + 3.
-
-    rows (in): a frame's rows in ascending order.
-    records (out): its zones, then an end mark.
     """
 
     def __init__(self, skin: Skin):

@@ -1,5 +1,4 @@
-"""Packets that the link sends unrequested: a hello every half second for frames of uneven times, and a frame after a
-long pause."""
+"""Unrequested packets: a hello every half second for frames of uneven times, and a frame after a long pause."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -20,7 +19,7 @@ def hello_period(m: Module, link: wiring.Component) -> Value:
 
 
 def keep_alive(m: Module, link: wiring.Component) -> None:
-    """Set ``link.due``: a frame is to be sent though nothing has changed."""
+    """Set ``link.due``: a frame is to be sent although nothing has changed."""
     decide, sends = link.frames.decide, link.frames.verdict.send
     if link.derived.scan.waits:
         most = link.derived.keep_alive_toggles
@@ -47,7 +46,7 @@ def _toggles(m: Module, link: wiring.Component, bit: int) -> Value:
 
 
 def _wait(link: wiring.Component, waited: Value, limit: int) -> tuple[Value, Value]:
-    """A waiting time including this frame's, and whether it is ``limit``: in scans, adaptive ones in row times."""
+    """A waiting time with this frame's, and whether it has reached ``limit``; in scans, of adaptive scans in row times."""
     if link.derived.scan.even:
         return waited + 1, waited == limit - 1
     longer = waited + link.tag.slots

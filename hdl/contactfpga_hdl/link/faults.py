@@ -1,4 +1,4 @@
-"""Packets about the lines, byte by byte: fault reports, and slots of the self-test (docs/protocol.md)."""
+"""Fault reports and slots of the self-test, byte by byte (docs/protocol.md)."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import memory, stream, wiring
@@ -11,21 +11,17 @@ from contactfpga_hdl.payloads import faults_layout, slots_layout
 
 
 class Reporter(wiring.Component):
-    """The packets of kind 9 without their check. A report is due after each hello, and when it would differ from the
-    last one sent: while none is on the wire, a byte is compared in each clock.
+    """Packets of kind 9 without their check. A report is due after each hello, and when it would differ from the last
+    report: while none is on the wire, a byte is compared in each clock.
 
-    Each digit is read in the clock before its byte is offered, so a report may mix the word before and after a change;
+    Each digit is read in the clock before its byte is offered. So a report may mix the words before and after a change;
     then it differs from the current word, and another follows.
 
-    word (in): the scan's fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`.
-    slots (in): with ``self_test``, slots to be sent; ``ready`` in the clock after the last byte of one was taken.
-    greeted (in): high for a clock when a hello is sent.
-    taken (in): high for a clock when the packet that is ``due`` is sent.
-    sends (in): high from the next clock on until the wire is idle again.
-    place (in), fetches (in): of the byte offered from the next clock on; at its end ``place`` is ``length``.
-    due (out): a packet waits.
-    length (out): length of the packet that is due.
-    byte (out): the offered byte.
+    word (in): fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`. slots (in): with ``self_test``, slots to
+    be sent; ``ready`` in the clock after a slot's last byte was taken. greeted (in): high for a clock when a hello is
+    sent. taken (in): high for a clock when the packet that is ``due`` is sent. sends (in): high from the next clock
+    until the wire is idle again. place, fetches (in): place of the byte offered from the next clock; at the end
+    ``place`` is ``length``. due (out): a packet waits. length (out): length of that packet. byte (out): offered byte.
     """
 
     def __init__(self, skin: Skin):
@@ -109,7 +105,7 @@ def _digits(word: Value) -> list[Value]:
 
 
 def report_of(bits: int, word: int) -> bytes:
-    """A report of faults, stuffed."""
+    """A stuffed fault report."""
     return cobs_encode(faults.encode_faults(word, bits))
 
 

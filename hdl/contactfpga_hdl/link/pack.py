@@ -1,4 +1,4 @@
-"""Items to the bytes of a frame: items and trailer, COBS-stuffed while written."""
+"""Items to the bytes of a frame, with trailer and COBS stuffing."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
@@ -21,11 +21,10 @@ def verdict_layout(derived: Derived) -> data.StructLayout:
 def frames_signature(derived: Derived, offset_bits: int) -> wiring.Signature:
     """Frames from the packer, the initiator, to the link.
 
-    write: a byte and its offset in the region of this frame.
-    decide: high for the clock in which an end mark is taken.
-    verdict (in): in that clock, and its numbers until ``commit``, the link's decision on this frame.
-    commit: high for the clock in which the frame's last byte is written.
-    end: in that clock the offset after its last byte. Later writes belong to another frame.
+    write: a byte and its offset in the frame's region. decide: high for the clock in which an end mark is taken.
+    verdict (in): the link's decision in that clock, with its numbers until ``commit``. commit: high for the clock in
+    which the frame's last byte is written; later writes belong to another frame. end: in that clock, the offset after
+    the last byte.
     """
     return wiring.Signature(
         {
@@ -57,15 +56,14 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
 
 
 class Packer(wiring.Component):
-    """Writes each frame, stuffed, into a region of a memory, from offset 0 on; one byte per clock.
+    """Writes each frame, stuffed, into a region of a memory from offset 0, one byte per clock.
 
-    An item is taken with its last byte. COBS writes a block's length in front of it. Every zero byte is the place of
-    the next length, so a byte needs one write: itself, or, for a zero, the length of the block that it ends. Only a
+    An item is taken with its last byte. COBS writes a block's length in front of it. A zero byte is the place of the
+    next length, so each byte needs one write: itself, or, for a zero, the length of the block that it ends. Only a
     block of 254 bytes without a zero needs one more.
 
-    items (in): a frame's items and its end mark.
-    tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
-    frames (out): see :func:`frames_signature`.
+    items (in): a frame's items and its end mark. tag, summary (in): describe the frame from ``frames.decide`` to
+    ``frames.commit``. frames (out): see :func:`frames_signature`.
     """
 
     def __init__(self, skin: Skin, offset_bits: int):
@@ -89,7 +87,7 @@ class Packer(wiring.Component):
         return m
 
     def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
-        """Sequence items as they come, each taken with its last byte, then the trailer."""
+        """Put the bytes of items, each taken with its last byte, then of the trailer."""
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
         decide, send = self.frames.decide, self.frames.verdict.send
         index = Signal(range(max(item_bytes, trailer_bytes + 1)))

@@ -1,4 +1,4 @@
-"""Drives one row after the other and samples all columns of it at once."""
+"""Raster scan: drives one row after the other and samples all its columns at once."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -51,23 +51,18 @@ class _Sample:
 
 
 class Scanner(wiring.Component):
-    """Raster scan: each row for the settle time, then no row for the release time.
+    """Raster scan: each row is driven for the settle time, then no row for the release time.
 
-    A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchronizer
-    stages and the row register), plus the shift time of columns on shift registers. With ``guard`` a frame begins with
-    the guard row, which is not offered.
+    A row's columns are sampled in the last clock in which the row is driven. The row is offered three clocks later (two
+    synchronizer stages and the row register), plus the shift time of columns on shift registers. With ``guard`` a frame
+    begins with the guard row, which is not offered. The command "sample at" moves the samples of rows, except the guard
+    row, to an earlier clock; they do not check the guard column then.
 
-    The command "sample at" moves the samples of rows earlier, and nothing else. The guard row's is not moved, and the
-    others then do not check the guard column.
+    The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`:
 
-    pins: those of the row driver and of the column reader.
-    rows (out): rows in ascending order.
-    tag (out): of the frame whose last row was offered; complete one clock after that, until the next frame's last row.
-    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
-    heard (in): copied into that tag.
-    epoch (out): high for a clock every 2^22 us.
-    faults (out): with ``guard``; a row's bit one clock after its sample is available, those of all columns one clock
-        after the guard row's, and of stuck columns one clock after the last row's.
+    tag (out): complete one clock after the offer of the frame's last row, until the next frame's last row. faults
+    (out): a row's bit changes one clock after its sample is available, those of all columns one clock after the
+        guard row's, and those of stuck columns one clock after the last row's.
     contact (out): rises with the offer of the first row with a pressed switch, and falls with the last row of a scan
         without one.
     """
@@ -139,7 +134,7 @@ class Scanner(wiring.Component):
         ]
 
     def _sample_columns(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """A slot has two samples: in the last clock its row is driven, and in the last one without a row. Returns the
+        """Sample each slot twice: in the last clock of its row, and in the last clock without a row. Returns the
         sampled levels."""
         derived = self.derived
         lead = derived.column_load_clocks + 1
@@ -165,7 +160,7 @@ class Scanner(wiring.Component):
         return reader.levels
 
     def _sample_clock(self, m: Module, slots: _Slots, sample: _Sample) -> Value | int:
-        """Sample clock of the next row, counted from 1."""
+        """Sample clock of the next row, from 1."""
         if not moves_sample(self.derived):
             return self.derived.settle_clocks
         from contactfpga_hdl.scan.sample_at import SampleAt
@@ -186,7 +181,7 @@ class Scanner(wiring.Component):
         return Mux(reader.done, reader.levels, kept)
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
-        """Drive columns while no row is driven, except for a clock after the last one and a clock before the next."""
+        """Drive columns while no row is driven, except for a clock after the last row and a clock before the next."""
         from contactfpga_hdl.scan.precharge import Precharge
 
         m.submodules.precharge = precharge = Precharge(self.skin)
@@ -255,7 +250,7 @@ class Scanner(wiring.Component):
             ]
 
     def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> FrameClock:
-        """The frame clock. The tag takes its data of the frame, and its time, with the last row's strobe."""
+        """The frame clock; the tag takes its values with the last row's strobe."""
         late = self.derived.column_shift_clocks
         # The time starts with the first slot of the last row, so that at this row's strobe it gives the time of row
         # 0's sample: no register has to keep that.

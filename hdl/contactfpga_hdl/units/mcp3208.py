@@ -17,10 +17,9 @@ LEVELS = 40
 
 
 class Mcp3208(wiring.Component):
-    """Sweeps the units without a pause, SPI mode 0,0; see :func:`~contactfpga_hdl.units.ports.converter_ports`.
+    """Sweeps the units without a pause, SPI mode 0,0; ports as in :func:`~contactfpga_hdl.units.ports.converter_ports`.
 
-    The converter gives a bit at a falling edge, read at the next rising one. A reading is available three clocks after
-    that.
+    A bit changes at a falling edge and is read at the next rising one. A reading is available three clocks after that.
     """
 
     def __init__(self, skin: Skin):
