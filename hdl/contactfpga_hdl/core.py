@@ -17,7 +17,6 @@ BYTES, RECORDS = "m_axis", "m_axis_records"
 
 
 def _stream(name: str, bits: int) -> dict[str, wiring.Member]:
-    """Ports of an AXI4-Stream."""
     return {f"{name}_tdata": Out(bits), f"{name}_tvalid": Out(1), f"{name}_tready": In(1), f"{name}_tlast": Out(1)}
 
 

@@ -61,7 +61,6 @@ class Dual(wiring.Component):
             m.d.comb += [inside.eq(outside), getattr(self.second, name).eq(later)]
 
     def _compare(self, m: Module) -> Value:
-        """High in the clock after one in which the copies' outputs differ."""
         names = [name for name, member in self.second.signature.members.items() if member.flow == Out]
         said = Cat(getattr(self.first, name) for name in names)
         before = Signal(len(said))

@@ -56,7 +56,6 @@ class SeveralTop(wiring.Component):
         return m
 
     def _outside(self):
-        """(number, name, member) of each external port of a sheet."""
         for number, sheet in enumerate(self.sheets):
             for name, member in sheet.signature.members.items():
                 if name not in _INSIDE:

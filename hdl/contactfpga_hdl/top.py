@@ -124,7 +124,6 @@ class Top(wiring.Component):
         connect_lines(m, self.skin, scan.pins, self)
 
     def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
-        """Add the request reader, and the UART unless it is shared."""
         if self.place is None:
             m.submodules.transmitter = transmitter = Transmitter(self.derived.bit_clocks)
             receiver = self._put(m, "receiver", receiver_of(self.derived))
@@ -154,7 +153,6 @@ class Top(wiring.Component):
         return units
 
     def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: wiring.Component | None) -> None:
-        """Connect faults to the pins, and the units."""
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
@@ -189,7 +187,6 @@ class Top(wiring.Component):
         return m
 
     def _debounced(self, m: Module, scan: Any) -> stream.Interface:
-        """The scanner's rows, debounced if the Skin has a debounce."""
         if not self.derived.debounced:
             return scan.rows
         even = self.derived.scan.even
@@ -213,7 +210,6 @@ class Top(wiring.Component):
         ]
 
     def _zones(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
-        """Items of a frame's zones, and its summary."""
         label = self._put(m, "label", self.derived.labeller.load_gateware()(self.skin))
         audit = self._put(m, "audit", Audit(self.skin))
         backlog = self._put(m, "backlog", Backlog(self.skin))
@@ -236,7 +232,6 @@ class Top(wiring.Component):
         return divide.items
 
     def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
-        """Items of a frame's rows, and its summary."""
         from contactfpga_hdl.report.bitmap import Bitmap
 
         bitmap = self._put(m, "bitmap", Bitmap(self.skin))

@@ -96,6 +96,5 @@ def _assigned(body: list[ast.stmt]) -> Iterator[Field]:
 
 
 def _text(statement: ast.stmt) -> str:
-    """The docstring in a statement; "" if there is none."""
     value = statement.value if isinstance(statement, ast.Expr) else None
     return value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""

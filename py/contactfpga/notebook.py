@@ -60,7 +60,6 @@ def sheet(
 
 
 def _box(x: float, y: float, columns: int, rows: int, pitch_mm: tuple[float, float], color: str) -> str:
-    """A rectangle of cells; ``x`` and ``y``: its lower left corner in cells."""
     pitch_x, pitch_y = pitch_mm
     place = f'x="{x * pitch_x:g}" y="{y * pitch_y:g}"'
     return f'<rect {place} width="{columns * pitch_x:g}" height="{rows * pitch_y:g}" fill="{color}"/>'

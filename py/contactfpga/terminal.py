@@ -84,7 +84,6 @@ def of(stream: IO[str] | None = None) -> Terminal:
 
 
 def _size(stream: IO[str]) -> os.terminal_size | None:
-    """Size of a terminal; None for another stream."""
     try:
         return os.get_terminal_size(stream.fileno()) if stream.isatty() else None
     except (OSError, ValueError):

@@ -104,7 +104,6 @@ class BoardTop(Elaboratable):
             m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
 
     def _pulls(self, name: str) -> Mapping[str, object]:
-        """Pulls: columns to the released level, rows that are read to the other."""
         up = self.skin.selects_low == (name == "columns")
         needs = name == "columns" or f"{name}_read" in self._sheet
         return self.board.pulls["col2row" if up else "row2col"] if needs else {}

@@ -32,7 +32,6 @@ LIMIT_S = 900
 """Timeout: for some seeds the router never ends; successful builds take up to two minutes."""
 
 LOG = f"{NAME}.tim"
-"""Log file of nextpnr."""
 
 CROWDED = 0.8
 """Used share of a resource above which it is blamed for a failed placement."""
@@ -73,7 +72,6 @@ def plan_for(board: BoardSpec, skin: Skin | Several, seed: int = 1) -> BuildPlan
 
 
 def _described(skin: Skin | Several) -> dict[str, str]:
-    """Sources of the bitstream, by file."""
     if isinstance(skin, Skin):
         return {"skin.toml": skin.to_toml()}
     files = {f"sheet-{number}.toml": one.to_toml() for number, one in enumerate(skin.skins)}
@@ -106,7 +104,6 @@ def _run(folder: Path, board: BoardSpec, seed: int) -> None:
 
 
 def _stop(run: subprocess.Popen) -> None:
-    """Stop the script and its children."""
     if os.name == "nt":
         run.kill()
     else:

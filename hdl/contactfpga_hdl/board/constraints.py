@@ -46,7 +46,6 @@ def _named(ports: Iterable[str]) -> str:
 
 
 def _listed(labels: Sequence[str]) -> str:
-    """Each connector once, and the numbers of its pins."""
     groups = itertools.groupby((label.rpartition(" ")[::2] for label in labels), key=lambda found: found[0])
     return "; ".join(f"{connector} {', '.join(number for _, number in group)}" for connector, group in groups)
 

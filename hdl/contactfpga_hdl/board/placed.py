@@ -29,7 +29,6 @@ class Report:
         return self.fmax_mhz >= self.needed_mhz
 
     def lines(self) -> list[str]:
-        """The report as a table."""
         rows = [("LUT4", f"{self.luts[0]} of {self.luts[1]}"), ("flip-flops", str(self.flip_flops))]
         if self.logic_cells is not None:
             rows.append(("logic cells", f"{self.logic_cells[0]} of {self.logic_cells[1]}"))
@@ -62,5 +61,4 @@ def read(folder: Path, log: str) -> Report:
 
 
 def _packed(log: str, kind: str) -> int:
-    """LUTs or flip-flops, from nextpnr's packing lines."""
     return sum(int(count) for count, kinds in re.findall(r"(\d+) LCs used as (.*)", log) if kind in kinds)

@@ -35,7 +35,6 @@ def _marks_layout(derived: Derived) -> data.StructLayout:
 
 
 def _runs(derived: Derived) -> int:
-    """The most runs of a row."""
     return max(1, math.ceil(derived.skin.columns / 2))
 
 
@@ -192,7 +191,6 @@ class Join(wiring.Component):
     def _take_in(
         self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: "Turns | None"
     ) -> data.View:
-        """The current group, merged with the one on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
         with m.If(pop):
@@ -237,7 +235,6 @@ class Join(wiring.Component):
         number: Value,
         turns: "Turns | None",
     ) -> Value:
-        """The new row's runs that the step finds to be one zone."""
         layout = _marks_layout(self.derived)
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
         follows = self.step.has_run & joined.has_run  # the new run follows one of its zone

@@ -13,7 +13,6 @@ from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
 def _step_layout() -> data.StructLayout:
-    """A column of a row, or the end mark after a frame's last row."""
     return data.StructLayout({"valid": 1, "cell": 1, "shadow": 1, "stop": 1, "closes": 1, "end": 1})
 
 
@@ -38,7 +37,6 @@ class ProjectionLabeller(wiring.Component):
         return m
 
     def _walk_columns(self, m: Module, enable: Value) -> tuple[data.View, Value, Value]:
-        """Step through the columns of a row; returns the step, its column and its row."""
         step = Signal(_step_layout())
         column = Signal(range(max(2, self.derived.skin.columns)))
         y = Signal(range(max(2, self.derived.skin.rows)))
@@ -106,7 +104,6 @@ class ProjectionLabeller(wiring.Component):
         return added, total
 
     def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
-        """Add up the columns of a run in a closing band, one clock after their sums."""
         kept, zone = Signal.like(total), Signal.like(total)
         closes = step.valid & step.closes
         leaves = closes & (step.cell | step.shadow) & step.stop

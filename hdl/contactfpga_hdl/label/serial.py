@@ -44,8 +44,6 @@ class _Columns:
 
 
 class _Step:
-    """Actions of this clock."""
-
     def __init__(self) -> None:
         self.enable = Signal()  # anything at all: no record waits
         self.advance = Signal()  # it is the last one of the column
@@ -58,8 +56,6 @@ class _Step:
 
 
 class _Group:
-    """The group of the walked cluster."""
-
     def __init__(self, derived: Derived, place_bits: int):
         self.whole = Signal(init=1)  # none of its zones has runs of the row before to come
         self.has_run = Signal()  # in the new row
@@ -70,7 +66,6 @@ class _Group:
 
 
 def _stored_layout(derived: Derived, place_bits: int) -> data.StructLayout:
-    """A waiting group, or a zone of the row before; ``below``: place of the next waiting group."""
     places = {"first": place_bits, "end": place_bits, "below": place_bits}
     turns = stored_turns() if derived.skin.closed else {}
     return data.StructLayout({"moments": kept_layout(derived), "has_run": 1, **places, **turns})
@@ -272,7 +267,6 @@ class SerialLabeller(wiring.Component):
         earlier: Value,
         around: SerialTurns,
     ) -> None:
-        """Update the turns of group, runs and cells."""
         over = acts.closes | ~walk.active
         joins, zone = acts.joins & (~earlier | group.whole), acts.joins & ~earlier
         unwrapped = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)

@@ -77,14 +77,12 @@ def place_of(derived: Derived, column: Value) -> Value:
 
 
 def _without_lowest(m: Module, bits: Value) -> Value:
-    """All bits but the lowest one that is set."""
     others = Signal.like(bits, name_suffix="_others")
     m.d.comb += others.eq(bits & (bits - 1))
     return others
 
 
 def _index(one_hot: Value, width: int) -> Value:
-    """Number of the set bit."""
     return Cat(
         Cat(one_hot[i] for i in range(len(one_hot)) if i >> bit & 1).any() if len(one_hot) > 1 else Const(0, 1)
         for bit in range(width)

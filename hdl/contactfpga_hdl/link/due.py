@@ -39,7 +39,6 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
 
 
 def _toggles(m: Module, link: wiring.Component, bit: int) -> Value:
-    """High for a clock every 2^bit us."""
     before = Signal(name=f"time_{bit}")
     m.d.sync += before.eq(link.time[bit])
     return link.time[bit] ^ before

@@ -65,7 +65,6 @@ class Reporter(wiring.Component):
         return m
 
     def _compare(self, m: Module, at: Value, is_slot: Value) -> Value:
-        """Whether a byte of a report differs from the one sent last."""
         init = [*self._report, *[0] * ((1 << len(at)) - len(self._report))]
         m.submodules.sent = sent = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = sent.read_port(), sent.write_port()
@@ -76,7 +75,6 @@ class Reporter(wiring.Component):
         return watched & ~self.sends & (read.data != self.byte)
 
     def _put_slots(self, m: Module, is_slot: Value, report_due: Value, report: Value) -> Value:
-        """Send slots while no report is due; returns the byte of either."""
         slot = self.slots.payload
         m.d.comb += self.due.eq(report_due | self.slots.valid)
         with m.If(~report_due):
@@ -89,7 +87,6 @@ class Reporter(wiring.Component):
 
 
 def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value:
-    """The byte at a place of ``empty`` with these digits inserted."""
     found = Signal(8)
     with m.Switch(place):
         for index, value in enumerate([Const(empty[0], 8), *digits, Const(empty[-1], 8)]):
@@ -99,7 +96,6 @@ def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value
 
 
 def _digits(word: Value) -> list[Value]:
-    """Bits of the word, seven in each byte, lowest first."""
     cut = [word[start : start + DIGIT_BITS] for start in range(0, len(word), DIGIT_BITS)]
     return [Cat(bits, Const(0, DIGIT_BITS - len(bits)), Const(1, 1)) for bits in cut]
 

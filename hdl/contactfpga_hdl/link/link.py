@@ -25,8 +25,6 @@ STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
 
 class _Wire:
-    """The packet on the wire, and the choice of the next one."""
-
     def __init__(self, offset_bits: int):
         self.idle = Signal()  # there is none
         self.take_frame = Signal()  # the frame that waits is next
@@ -39,8 +37,6 @@ class _Wire:
 
 
 class _Regions:
-    """The memory's regions of the frames being written, waiting, and on the wire."""
-
     def __init__(self, offset_bits: int):
         self.filling = Signal(2, init=0)
         self.waiting = Signal(2, init=1)
@@ -138,7 +134,6 @@ class Link(wiring.Component):
         return m
 
     def _others(self, m: Module, wire: _Wire) -> "list[Reports | Readings]":
-        """Other packets than frames and hellos: reports before readings."""
         if not self._optional_ports():
             return []
         from contactfpga_hdl.link.between import Readings, Reports
@@ -184,7 +179,6 @@ class Link(wiring.Component):
         return frames_sent
 
     def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
-        """The offered byte, from the memory or, in a hello's state, from the counters."""
         init = [0] * (HELLO_REGION << self._offset_bits) + list(self._hello)
         m.submodules.store = store = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = store.read_port(), store.write_port()
@@ -268,8 +262,7 @@ class Link(wiring.Component):
             m.d.comb += self.holds.eq(~ends & (~wire.idle | either))
 
     def _closing(self, crc: Value) -> list[Value]:
-        """The bytes after the stuffed ones: the sheet's number, if any, then the CRC in pieces of seven bits, so that
-        no byte is zero."""
+        """The sheet's number, if any, and the CRC in pieces of seven bits, so that no byte is zero."""
         number = b"" if self.place is None else numbered.closing(self.place.number)
         return [
             *(Const(byte, 8) for byte in number),

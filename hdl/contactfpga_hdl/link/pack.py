@@ -87,7 +87,6 @@ class Packer(wiring.Component):
         return m
 
     def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
-        """Put the bytes of items, each taken with its last byte, then of the trailer."""
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
         decide, send = self.frames.decide, self.frames.verdict.send
         index = Signal(range(max(item_bytes, trailer_bytes + 1)))

@@ -94,7 +94,6 @@ class Records(wiring.Component):
         return m
 
     def _read(self, m: Module, read: memory.ReadPort, half: Value, reads: Signal, hands: Value, end: Value) -> None:
-        """Offer the words of the half that is read."""
         words = self.words
         place, last = Signal.like(end), Signal.like(end)
         closes = Signal()  # the word that is offered

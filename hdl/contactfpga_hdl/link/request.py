@@ -79,7 +79,6 @@ class RequestReader(wiring.Component):
         return m
 
     def _read_code(self, m: Module, place: Value, bit: Value) -> Value:
-        """Whether the packet is as long as a command."""
         if not self.commands:
             return Const(0, 1)
         is_command = Signal()
@@ -130,6 +129,5 @@ class RequestReader(wiring.Component):
         m.d.comb += self.number.eq(number & whole.replicate(len(number)))
 
     def _keep(self, m: Module, kept: Value, first: int, end: int, place: Value, bit: Value, *also: Any) -> None:
-        """Shift the digits' bits at these places into a register."""
         with m.If(self.bits.bit & (place >= first) & (place < end) & (bit != 7)):
             m.d.sync += [kept.eq(kept >> 1), kept[-1].eq(self.bits.level), *also]

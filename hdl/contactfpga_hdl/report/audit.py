@@ -142,7 +142,6 @@ class Tally(wiring.Component):
 
 
 def _count_offsets(bits: Value) -> Value:
-    """The sum of the numbers of the set bits, counted for each bit of the numbers."""
     return sum(
         popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place
         for place in range((len(bits) - 1).bit_length())

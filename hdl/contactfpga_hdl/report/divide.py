@@ -94,6 +94,5 @@ class Divider(wiring.Component):
         return Cat(fits, bits)
 
     def _rounded(self, m: Module, quotients: data.View) -> Value:
-        """The bits of x and y on the wire."""
         layout = barycenter_layout(self.derived)
         return Cat(((quotients[name] + 1) >> 1)[: layout[name].width] for name in ("x", "y"))

@@ -14,8 +14,6 @@ from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
 
 
 class _Reading:
-    """The columns in this clock, and their meaning."""
-
     def __init__(self, derived: Derived):
         self.read = Signal(derived.skin.columns)  # columns that read pressed
         self.pressed = Signal(derived.skin.columns)  # and are not masked in the row that is driven alone
@@ -150,7 +148,6 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += [alone.eq(seek.pattern), cells.eq(sample.pressed), self.sampled.eq(slot)]
 
     def _keep_listed(self, m: Module, seek: Seek) -> None:
-        """Keep a row on the list if it or a switch state in it was pressed."""
         if self.skin.debounce != "none":
             m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
             return
@@ -172,7 +169,6 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += self.contact.eq(0)
 
     def _tag_frame(self, m: Module, seek: Seek, driver: wiring.Component) -> None:
-        """Tag a frame from its first strobe, with the number of slots up to the last."""
         m.submodules.frame_clock = clock = FrameClock(self.skin)
         slots = Signal.like(self.tag.slots)
         m.d.comb += [

@@ -28,13 +28,10 @@ class _Slots:
 
     @property
     def begins_rows(self) -> Value:
-        """High in the first clock of row 0."""
         return self.following[1 % len(self.following)] & (self.clock == 0)
 
 
 class _Sample:
-    """The sampled columns, and their row."""
-
     def __init__(self, derived: Derived):
         self.begins = Signal()  # the next one, of a row
         self.early = Const(0)  # before the settle time is over
@@ -160,7 +157,6 @@ class Scanner(wiring.Component):
         return reader.levels
 
     def _sample_clock(self, m: Module, slots: _Slots, sample: _Sample) -> Value | int:
-        """Sample clock of the next row, from 1."""
         if not moves_sample(self.derived):
             return self.derived.settle_clocks
         from contactfpga_hdl.scan.sample_at import SampleAt
@@ -170,7 +166,6 @@ class Scanner(wiring.Component):
         return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
 
     def _keep_sample(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """Hold an early sample until its usual time."""
         derived = self.derived
         counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks
         due, kept = Signal(name="sample_due"), Signal.like(reader.levels)
@@ -181,7 +176,7 @@ class Scanner(wiring.Component):
         return Mux(reader.done, reader.levels, kept)
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
-        """Drive columns while no row is driven, except for a clock after the last row and a clock before the next."""
+        """Drive columns while no row is driven, except for a clock at either end."""
         from contactfpga_hdl.scan.precharge import Precharge
 
         m.submodules.precharge = precharge = Precharge(self.skin)

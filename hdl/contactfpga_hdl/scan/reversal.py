@@ -86,7 +86,6 @@ class ReversalScanner(wiring.Component):
         return m
 
     def _read_sheet(self, m: Module, pressed: Signal) -> Value:
-        """Read the sheet; returns rows that read touched, including fully masked ones."""
         skin = self.skin
         rows = Signal(skin.rows)
         at_pins = self.pins.rows_read[: skin.rows]
@@ -132,7 +131,6 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _mask(self, m: Module, cycle: ReversalCycle, pressed: Value) -> Value:
-        """Columns that read pressed and are unmasked in the row."""
         masked = Signal(self.skin.columns)
         m.d.comb += masked.eq(pressed)
         with m.Switch(cycle.y):
@@ -173,7 +171,6 @@ class ReversalScanner(wiring.Component):
     def _drive_sheet(
         self, m: Module, cycle: ReversalCycle, precharge: Precharge, pressed: Value, test: SelfTest | None
     ) -> None:
-        """Drive all pins from registers; none is driven at power-up."""
         skin = self.skin
         begun = Signal()
         m.d.sync += begun.eq(cycle.begins)
@@ -228,7 +225,6 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _test_lines(self, m: Module, cycle: ReversalCycle, test: SelfTest, read: Value, pressed: Value) -> None:
-        """Connect the self-test, whose slots delay a wanted frame."""
         m.submodules.test = test
         wiring.connect(m, test.slots, wiring.flipped(self.slots))
         m.d.comb += [

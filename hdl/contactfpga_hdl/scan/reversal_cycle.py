@@ -161,11 +161,9 @@ class ReversalCycle(wiring.Component):
 
     @property
     def _check_clocks(self) -> int:
-        """Clocks of a check of the rows after a frame."""
         return max(self.derived.project_clocks, self._settle)
 
     def _check(self, m: Module, columns_from: str) -> None:
-        """Begin the next check; a check of columns begins in the given state."""
         m.d.comb += self.check_starts.eq(1)
         m.d.sync += self._selects.eq(~self.of_rows)
         with m.If(self.of_rows):

@@ -12,8 +12,6 @@ HITS = 2
 
 
 class _Plan:
-    """Remaining work of a frame."""
-
     def __init__(self, derived: Derived):
         rows, levels = derived.skin.rows, derived.row_levels
         self.on_list = Signal(rows)  # to be driven alone in the next frame
@@ -84,7 +82,6 @@ class Seek(wiring.Component):
         return m
 
     def _keep_list(self, m: Module, plan: _Plan) -> None:
-        """The rows to drive alone in the next frame, and their number."""
         with m.If(self.strobe & self.alone):
             was = (plan.on_list & self.pattern).any()
             stays = self.hit | self.busy

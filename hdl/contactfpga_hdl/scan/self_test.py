@@ -104,7 +104,6 @@ class SelfTest(wiring.Component):
         return judges
 
     def _count(self, m: Module, judges: Value, number: Signal, last: int) -> None:
-        """Number of the next slot, constant until the slot is sent."""
         waits = self.slots.valid
         wanted = Signal()
         tells = Signal()  # slots go out

@@ -67,13 +67,11 @@ class Ads131m08(wiring.Component):
         return m
 
     def _pace(self, m: Module) -> None:
-        """The converter's own clock."""
         count = Signal(range(self.pace_clocks))
         toggles = count == self.pace_clocks - 1
         m.d.sync += [count.eq(Mux(toggles, 0, count + 1)), self.pins.spi_pace.eq(self.pins.spi_pace ^ toggles)]
 
     def _take(self, m: Module, falls: Value, counts: Value) -> None:
-        """Read the pin, two synchronizer clocks after ``falls``."""
         bit = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, bit)
         place = Signal(range(BITS))

@@ -51,7 +51,6 @@ class Mcp3208(wiring.Component):
         return m
 
     def _take(self, m: Module, rises: Value, last_bit: Value, unit: Value, last_unit: Value) -> None:
-        """Read the pin, two synchronizer clocks after ``rises``."""
         level = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, level)
         takes = Signal(2)

@@ -116,7 +116,6 @@ class Settings(wiring.Component):
         return m
 
     def _registers(self, m: Module, name: str, what: int, count: int, bits: int) -> tuple[Array, Array]:
-        """Values set by commands, and whether each is not 0."""
         values = [Signal(bits, name=f"{name}_{index}") for index in range(count)]
         given = [Signal(name=f"{name}_{index}_given") for index in range(count)]
         index, number = self.value[:INDEX_BITS], self.value[INDEX_BITS:]

@@ -45,7 +45,6 @@ class Stack(Elaboratable):
         return m
 
     def _shift(self, m: Module, deeper: Value, shallower: Value) -> Value:
-        """Keep the entries below the top in registers; returns the next one."""
         entries = [self.top, *(Signal(self.entry.shape(), name=f"below_{i}") for i in range(1, self.depth))]
         for index in range(1, self.depth):
             with m.If(deeper):

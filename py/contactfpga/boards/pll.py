@@ -47,7 +47,6 @@ def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
 
 @functools.cache
 def _clocks(cell: str, crystal_hz: int) -> dict[int, Dividers]:
-    """Dividers by clock, for all whole MHz."""
     clocks: dict[int, Dividers] = {}
     for made, found in _SETTINGS[cell](crystal_hz):
         if made % MHZ == 0:

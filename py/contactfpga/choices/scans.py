@@ -94,7 +94,6 @@ def _adaptive_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_packing_clocks(derived: Any, pressed: int) -> int:
-    """Packing time while the next frame drives the same rows again."""
     skin = derived.skin
     if not derived.report.zones:
         items = skin.rows

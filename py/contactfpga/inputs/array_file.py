@@ -63,7 +63,6 @@ def _arrays(archive: zipfile.ZipFile, names: Sequence[str], path: str, most: int
 
 
 def _array(file: BinaryIO, size: int, what: str, most: int) -> np.ndarray:
-    """The array that begins here; ``size``: bytes including its header."""
     file.seek(0)
     version = npy.read_magic(file)
     header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0

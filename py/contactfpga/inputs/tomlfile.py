@@ -75,7 +75,6 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
 
 
 def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:
-    """Check the size of integers and the depth of tables, iteratively."""
     todo: list[tuple[str, Any, int]] = [(name, value, 1) for name, value in values.items()]
     while todo:
         name, value, depth = todo.pop()

@@ -38,7 +38,6 @@ class _Elements(ElementTree.TreeBuilder):
         raise _Doctype
 
     def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
-        """Count an element, then build it."""
         self._count += 1
         if self._count > MAX_ELEMENTS:
             raise _TooMany

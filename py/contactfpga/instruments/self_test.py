@@ -68,7 +68,6 @@ class SelfTest:
         return self.slots[1 + self.rows + column]
 
     def _rows_after(self, row: int) -> set[int]:
-        """Other rows that rise with a row, but not by themselves."""
         return set(self._of_row(row).rows) - {row, *self.slots[0].rows}
 
     def _columns_after_row(self, row: int) -> set[int]:
@@ -78,7 +77,6 @@ class SelfTest:
         return set(self._of_column(column).columns) - {column, *self.slots[0].columns}
 
     def _tested(self, column: bool) -> set[int]:
-        """Lines that are driven: those not fully masked."""
         masked = self.mask or frozenset()
         lines, others = (self.columns, self.rows) if column else (self.rows, self.columns)
         return {
@@ -164,7 +162,6 @@ class SelfTest:
 
 
 def _groups(after: Callable[[int], set[int]], lines: int) -> list[list[int]]:
-    """Groups of two or more lines that rise with each other."""
     groups: list[set[int]] = []
     for line in range(lines):
         both = {line} | {other for other in after(line) if line in after(other)}

@@ -35,12 +35,10 @@ class _Search:
 
     @property
     def open(self) -> np.ndarray:
-        """Places of unknown time."""
         return np.asarray(self.enough - self.too_few > 1)
 
     @property
     def middle(self) -> np.ndarray:
-        """The next clock to try at each place."""
         return np.asarray((self.enough + self.too_few) // 2)
 
     def vote(self, clocks: int, counts: np.ndarray, enough: np.ndarray) -> None:

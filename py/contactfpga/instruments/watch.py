@@ -122,11 +122,9 @@ class CellHistory:
 
     @property
     def flutters(self) -> set[Cell]:
-        """Cells reported to flutter."""
         return set(places(self._flutters))
 
     def take(self, zones: Zones) -> None:
-        """Add a frame."""
         assert zones.cells is not None
         cells, time_us = zones.cells, zones.time_us
         changed = cells != self._cells
@@ -143,7 +141,6 @@ class CellHistory:
         self._cells = cells.copy()
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
-        """New suspicions."""
         yield from self._unchanged(time_us)
         if time_us - self._count_from_us >= SECOND_US:
             yield from self._fluttering(time_us)
@@ -183,7 +180,6 @@ class CellHistory:
         return Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _middle(self, group: np.ndarray) -> str:
-        """Row and column of the barycenter in words; for a group around a closed sheet the row alone."""
         if self._sheet.closed:
             records = around.label(group, 8)[1]
             area, x, y = around.flat(records, self._sheet.columns)[0].tolist()
@@ -238,7 +234,6 @@ class ZoneHistory:
     """Always empty: zones do not show which cells change."""
 
     def take(self, zones: Zones) -> None:
-        """Add a frame."""
         keys, time_us = _keys(zones), zones.time_us
         if keys == self._since_us.keys():
             return
@@ -251,7 +246,6 @@ class ZoneHistory:
         self._told = {key: cells for key, cells in self._told.items() if key in keys or self._may_have_joined(key)}
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
-        """New suspicions."""
         for key, since_us in self._since_us.items():
             if key in self._told or since_us > time_us - self._limits.stuck_us:
                 continue
@@ -291,7 +285,6 @@ class ZoneHistory:
         return [(row, each) for each in range(self._sheet.columns)] if key[3] else [(row, column)]
 
     def _cell(self, key: Key) -> Cell:
-        """The cell of the barycenter; without an x only the row counts."""
         x, y = self._place(key)
         column = round(x) % self._sheet.columns if self._sheet.closed else min(round(x), self._sheet.columns - 1)
         return min(round(y), self._sheet.rows - 1), column

@@ -43,7 +43,6 @@ def check_types(skin: Skin) -> dict[str, Any]:
 
 @functools.cache
 def _type_checks(fields: tuple[dataclasses.Field[Any], ...]) -> list[tuple[str, Callable[[str, Any], Any]]]:
-    """Type checks by field name, in the order in which they run."""
     types = {field.name: field.type for field in fields}
     types["connectivity"] = Literal[4, 8]  # int in the class, as callers compute it
     return [
@@ -275,7 +274,6 @@ def _check_keep_alive(skin: Skin, derived: Derived) -> None:
 
 
 def _left_out(skin: Skin, name: str, instead: str) -> None:
-    """Check that an unused field has its default."""
     if (value := getattr(skin, name)) != getattr(type(skin), name):
         raise SkinError(f"{name} is {shown(value)}; leave it out, or {instead}")
 

@@ -283,7 +283,6 @@ class Skin:
 
 
 def _suggesting(init: Callable[..., None]) -> Callable[..., None]:
-    """Wrap ``Skin.__init__`` to suggest the most similar name for an unknown field."""
     known = [field.name for field in dataclasses.fields(Skin)]
 
     @functools.wraps(init)

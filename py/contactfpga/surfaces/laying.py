@@ -161,7 +161,6 @@ class Placement:
         return np.asarray(np.interp(np.arange(self.rows) * self.pitch_y_mm, ways, fine[:end]))
 
     def _seen(self, mesh: Triangles, angles: Floats, heights: Floats) -> tuple[Floats, Floats]:
-        """Hits from outside toward the axis."""
         out = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
         far = 2 * mesh.size_mm
         starts = self._placed(far * out + heights[:, None] * np.array([0.0, 0.0, 1.0]))

@@ -155,7 +155,6 @@ class Mesh:
         return np.asarray((1 - up) * bottom + up * top)
 
     def _slopes(self, u: Any, v: Any) -> tuple[Floats, Floats]:
-        """Derivatives of the point by u and v."""
         low, high, left, right, across, up = self._around(u, v)
         p = self.points_mm
         along_u = (1 - up) * (p[low, right] - p[low, left]) + up * (p[high, right] - p[high, left])

@@ -25,7 +25,6 @@ def assign(costs: Costs, alone: float) -> list[int | None]:
 
 
 def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns connected by finite costs; small groups are faster."""
     groups: list[tuple[list[int], set[int]]] = []
     for row, line in enumerate(costs):
         rows, columns = [row], {column for column, cost in enumerate(line) if cost < math.inf}

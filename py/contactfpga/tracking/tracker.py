@@ -147,7 +147,6 @@ class Tracker:
         return math.hypot(across(zone_x - x, self._around_mm), zone_y - y)
 
     def _apart(self, spot: Spot, zone: Zone) -> float:
-        """Distance from a spot's expected place to a zone, in mm."""
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _expects(self, spot: Spot, zone: Zone) -> bool:
@@ -188,7 +187,6 @@ class Tracker:
         return False
 
     def _forget(self, spot: Spot) -> None:
-        """End a contact for which its zone has been too small for too long."""
         spare = spot.spare()
         if spare is None:
             spot.small_us = None
@@ -339,7 +337,6 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
 
 
 def _rank(member: Member) -> tuple[float, int]:
-    """Sort key of a zone's contacts, the largest first."""
     return -member.area_mm2, member.id
 
 

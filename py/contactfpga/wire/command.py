@@ -104,7 +104,6 @@ def request_kind(data: bytes) -> RequestKind:
 
 
 def _without_pulses(data: bytes) -> bytes:
-    """Undo :func:`contactfpga.wire.framing.pulses` between two marks."""
     if len(data) % 8 or set(data) - {_ONE, _ZERO}:
         raise PacketError("framing", "pulses that are no bits")
     eights = (data[start : start + 8] for start in range(0, len(data), 8))

@@ -37,7 +37,6 @@ class Faults:
     """The faults in words, sorted, as in :attr:`Zones.faults`."""
 
     def __bool__(self) -> bool:
-        """Whether there is a fault."""
         return bool(self.rows_open or self.columns_open or self.columns_stuck or self.joined)
 
     def named(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> Faults:

@@ -130,7 +130,6 @@ def _unstuff(stuffed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked(data: np.ndarray, before: bytes) -> np.ndarray:
-    """Whether the check bytes of each packet are correct."""
     table, constant = _crc_table(data.shape[1] - CHECK_BYTES), _constant(data.shape[1] - CHECK_BYTES, before)
     crc = np.bitwise_xor.reduce(np.take(table, data[:, :-CHECK_BYTES] + _row_starts(data.shape[1])), axis=1) ^ constant
     right: np.ndarray = data[:, -1] == 0x80 | crc >> 14
@@ -161,13 +160,11 @@ def _crc_table(length: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=256)
 def _constant(length: int, before: bytes) -> int:
-    """The CRC of ``length`` zero bytes after ``before``."""
     low, middle, high = (byte & 0x7F for byte in check_bytes(bytes(length), before))
     return low | middle << 7 | high << 14
 
 
 def _words(data: np.ndarray) -> np.ndarray:
-    """int64 words of the last axis's bytes, lowest first."""
     padded = np.zeros((*data.shape[:-1], 8), np.uint8)
     padded[..., : data.shape[-1]] = data
     return padded.view("<i8")[..., 0]
@@ -189,7 +186,6 @@ def _agrees(fields: np.ndarray, items: int, widths: Widths) -> np.ndarray:
 
 
 def _possible(fields: np.ndarray, records: np.ndarray, widths: Widths) -> np.ndarray:
-    """Whether zones and cells are possible for one sheet."""
     area, x, y = (records[..., column] for column in range(3))
     scale = 1 << widths.sheet.barycenter_bits if widths.report.divided else area
     inside = (x <= (widths.sheet.columns - 1) * scale) & (y <= (widths.sheet.rows - 1) * scale) & (area > 0)

@@ -71,7 +71,6 @@ def _numbered_request(packet: bytes, pulsed: bool, number: int) -> bytes:
 
 
 def _requests(data: bytes) -> Iterator[tuple[bytes, bool]]:
-    """Each packet without delimiters, and whether it came as pulses."""
     while data:
         pulsed = data[0] != DELIMITER
         end = data.index(data[0], 1)
@@ -80,7 +79,6 @@ def _requests(data: bytes) -> Iterator[tuple[bytes, bool]]:
 
 
 def _of_pulses(bits: bytes) -> bytes:
-    """Undo :func:`contactfpga.wire.framing.pulses` for bytes without delimiters."""
     levels = [bit & 1 for bit in bits]
     return bytes(sum(levels[at + place] << place for place in range(8)) for at in range(0, len(levels), 8))
 
@@ -107,7 +105,6 @@ def _on(crc: int, byte: int) -> int:
 
 
 def _back(crc: int, byte: int) -> int:
-    """The CRC before its last byte."""
     for _ in range(8):
         fed = crc >> 15
         crc = (crc ^ _POLYNOMIAL * fed) << 1 | fed

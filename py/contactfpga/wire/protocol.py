@@ -199,7 +199,6 @@ FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1
 
 
 def _check_sums(frame: Frame, widths: Widths) -> None:
-    """Raise :class:`PacketError` for zones and cells that are impossible for one sheet."""
     sheet = widths.sheet
     if frame.bitmap is not None:
         carried = int(frame.bitmap.sum())
@@ -224,7 +223,6 @@ def _check_sums(frame: Frame, widths: Widths) -> None:
 
 
 def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    """(zones, 3) or (zones, 4) int64 fields of zone records."""
     if not zones:
         return no_records(widths.sheet)
     size = widths.record_bytes

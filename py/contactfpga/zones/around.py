@@ -64,7 +64,6 @@ def _runs(cells: np.ndarray) -> list[Run]:
 
 
 def _neighbors(runs: list[Run], columns: int, connectivity: int) -> list[list[tuple[int, int]]]:
-    """For each run the runs that touch it, with their offsets in turns."""
     reach = 1 if connectivity == 8 else 0
     found: list[list[tuple[int, int]]] = [[] for _ in runs]
     of_row: dict[int, list[int]] = {}

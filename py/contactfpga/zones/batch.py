@@ -66,7 +66,6 @@ class Batch:
     """:attr:`Zones.faults` of each frame."""
 
     def __len__(self) -> int:
-        """Number of frames."""
         return len(self.frames)
 
     def __repr__(self) -> str:
@@ -127,7 +126,6 @@ _FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT, "motion": 
 
 
 def _describe(run: Run, out: np.ndarray) -> None:
-    """Fill rows of :data:`FRAME_DTYPE` from a run."""
     out["time_us"] = run.times_us
     line = run.line
     out["host_time_s"] = math.nan if line is None else line.at(run.times_us)

@@ -71,7 +71,6 @@ def labelled(frame: Frame, before: Frame | None, numbers: np.ndarray) -> list[bo
 
 
 def _as_moments(frame: Frame, parts: np.ndarray | None = None) -> Frame:
-    """The frame with moments of the 4-connected zones of its bitmap."""
     if frame.bitmap is None:
         return frame
     return dataclasses.replace(frame, moments=labels.moments(labels.label(frame.bitmap, 4) if parts is None else parts))
@@ -87,11 +86,9 @@ def spread(frame: Frame, before: Frame | None = None) -> bool:
 
 
 def _middles(moments: list[list[int]]) -> list[Counter[tuple[int, int]]]:
-    """Number of zones by x, and by y."""
     return [Counter(_reduced(sums[axis], sums[0]) for sums in moments) for axis in (1, 2)]
 
 
 def _reduced(total: int, area: int) -> tuple[int, int]:
-    """total / area as a reduced fraction, to be compared exactly."""
     shared = math.gcd(total, area)
     return total // shared, area // shared

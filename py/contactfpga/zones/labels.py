@@ -51,6 +51,5 @@ def _root(parents: list[int], run: int) -> int:
 
 
 def _join(parents: list[int], one: int, other: int) -> None:
-    """Join two zones; the first run becomes the root."""
     first, second = sorted((_root(parents, one), _root(parents, other)))
     parents[second] = first

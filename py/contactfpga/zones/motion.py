@@ -49,6 +49,5 @@ def _around(records: np.ndarray, sheet: Sheet) -> tuple[Places, Places]:
 
 
 def _places(records: np.ndarray, sheet: Sheet) -> Places:
-    """x and y of zones in pitches; zones without cells are left out."""
     steps = 1 << sheet.barycenter_bits if sheet.report == "barycenter" else None
     return [(x / (steps or area), y / (steps or area)) for area, x, y in records.tolist() if area]

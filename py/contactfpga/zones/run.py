@@ -79,7 +79,6 @@ class Run:
 
     @functools.cached_property
     def _plain(self) -> tuple[list[tuple[int, ...]], list[int], list[int]]:
-        """All fields as Python's numbers, converted at once for speed."""
         return self.packets.tolist(), self.starts.tolist(), self.times_us.tolist()
 
 

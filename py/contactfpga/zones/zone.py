@@ -250,7 +250,6 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def _labels(self) -> np.ndarray:
-        """(rows, columns) int with ``report = "cells"``: zone of each cell, from 1."""
         assert self.frame.bitmap is not None
         if self.sheet.closed:
             return around.label(self.frame.bitmap, self.sheet.connectivity)[0]
