@@ -1,5 +1,5 @@
 """Gateware: from switch samples to bytes on a serial line.
 
 Parts that only some Skins have are imported in the method that adds them, so that a default board is understood without
-guard lines, units, self-test, shift registers or a second copy.
+them. In lists of ports a *pulse* is a level that is high for one clock.
 """

@@ -54,16 +54,14 @@ class StreamTop(Top):
 class Core(wiring.Component):
     """A Skin's gateware between the pins of the sheet and two streams, in one clock domain.
 
-    The pins of the sheet, ``rx``, ``contact`` and the pins of options are those of :class:`Top`. A Skin with ``dual``
-    has no core: its two copies are compared at the transmit pin.
+    Other pins are those of :class:`Top`. A Skin with ``dual`` has no core: its copies are compared at the transmit pin.
 
-    rx (in): requests and commands; while it stays high, the board sends unrequested packets. m_axis_tdata,
-    m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): packets of docs/protocol.md as an AXI4-Stream of
-        bytes; ``m_axis_tlast`` is high with a packet's last byte, the delimiter. A new frame replaces a waiting one, so a
-        slow reader gets the newest.
+    rx (in): requests and commands; while it stays high, the board sends unrequested packets.
+    m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): packets as an AXI4-Stream of bytes;
+        ``m_axis_tlast`` is high with the delimiter. A new frame replaces a waiting one, so a slow reader gets the
+        newest.
     m_axis_records_tdata, m_axis_records_tvalid, m_axis_records_tlast (out), m_axis_records_tready (in): the same frames
-    as
-        an AXI4-Stream of words, see :class:`~contactfpga_hdl.link.records.Records`.
+        as an AXI4-Stream of words, see :class:`~contactfpga_hdl.link.records.Records`.
     """
 
     def __init__(self, skin: Skin):

@@ -15,12 +15,12 @@ class Dual(wiring.Component):
 
     ``second`` starts and gets each input a clock later, so that no two registers are equal by construction and merged
     in synthesis. The outputs are those of ``first`` in the same clock; ``contact`` with ``fail_safe`` comes a clock
-    later, as copies give it without a register. At most two clocks after the first difference ``tx`` is low for longer
-    than a byte, so that the packet on the line ends without its check. Then ``tx`` rests, both copies start from reset,
-    and the host sees a restarted board. With ``fail_safe`` the pin ``contact`` is high from the difference until a scan
+    later, as copies give it without a register. From at most two clocks after the first difference ``tx`` is low for
+    longer than a byte, so that the packet on the line ends without its check. Then ``tx`` rests, both copies start from
+    reset, and the host sees a restarted board. With ``fail_safe`` ``contact`` is high from the difference until a scan
     after the restart.
 
-    The only state here is the restart's counter, which always ends, and the register at ``contact``, written in every
+    The only state here is the restart's counter, which always ends, and the register at ``contact``, written every
     clock.
 
     first (component): may have probes, which are passed on. second (component): the same without probes.

@@ -16,7 +16,6 @@ def row_layout(derived: Derived) -> data.StructLayout:
 
 
 def row_bits(derived: Derived) -> int:
-    """Bits of a row number."""
     return max(1, (derived.skin.rows - 1).bit_length())
 
 

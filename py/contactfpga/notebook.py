@@ -102,6 +102,5 @@ def _row(cells: Sequence[str], tag: str) -> str:
 
 
 def beside(pictures: Iterable[tuple[str, str]]) -> str:
-    """HTML of titled pictures side by side, as far as there is room."""
     shown = (f"<figure><figcaption>{html.escape(title)}</figcaption>{svg}</figure>" for title, svg in pictures)
     return f'<div style="display:flex;flex-wrap:wrap">{"".join(shown)}</div>'

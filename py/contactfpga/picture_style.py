@@ -57,7 +57,6 @@ DARK = {
 """Color on a dark page by color; the last ones are tints. Orange and purple need no other."""
 
 WIDTH_PX = 720
-"""Width of a picture, and of its page, in pixels."""
 
 WIDTH_IN = WIDTH_PX / 96
 """:data:`WIDTH_PX` in inches for matplotlib, whose SVG has 72 points per inch where browsers have 96 pixels."""

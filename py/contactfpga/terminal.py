@@ -1,7 +1,4 @@
-"""Abilities of an output stream: width, characters, and whether lines can be rewritten.
-
-Text to a file or pipe is not wrapped. Characters that the encoding lacks are replaced.
-"""
+"""Abilities of an output stream: width, characters, and whether lines can be rewritten."""
 
 from __future__ import annotations
 
@@ -173,7 +170,6 @@ def console(stream: TextIO | None = None) -> Console:
 
 
 SOON_S = 1.0
-"""Seconds after which progress is shown."""
 LIVE_S, LINES_S = 0.2, 10.0
 """Seconds between reports of progress on a live terminal, and as lines."""
 

@@ -1,1 +1,1 @@
-"""Bitstreams of a Skin for a board (contactfpga.boards)."""
+"""Bitstreams for boards."""

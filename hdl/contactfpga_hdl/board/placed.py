@@ -8,13 +8,10 @@ import re
 from pathlib import Path
 
 FILE = "report.json"
-"""Output of ``nextpnr --report``."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """FPGA resources and maximum clock of a design."""
-
     luts: tuple[int, int]
     """4-input look-up tables, used and available."""
     flip_flops: int

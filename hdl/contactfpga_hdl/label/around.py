@@ -19,11 +19,8 @@ from contactfpga_hdl.label.steps import kept_layout, nesting, over_the_seam, tur
 
 
 class Turns:
-    """The turn of the walked cluster.
-
-    It follows from the zone of a run of the row before that has an earlier run, and at the seam: the first cluster is
-    the neighbor of the last, which therefore is a turn back.
-    """
+    """The turn of the walked cluster: from the zone of a run of the row before that has an earlier run, and at the
+    seam, where the last cluster is a turn back from the first."""
 
     def __init__(self, derived: Derived):
         self.seam = Signal(name="joins_seam")  # the last cluster is joined with the first one
@@ -60,8 +57,8 @@ class Unwrap(Elaboratable):
     """The turns of a group while cells and found groups are added.
 
     kept, down (in): the group so far, and whether all of it is now known to be a turn back. found, joins, zone (in):
-    the group that joins, if any: a zone of the row before, or a waiting group, whose first cluster
-        becomes the group's; all zeros for none.
+    the group that joins, or zeros: a zone of the row before, or a waiting group, whose first
+        cluster becomes the group's.
     turn, cells (in): turn of the walked cluster, and number of its new cells. ring (in): the group becomes a ring.
     group (out): the resulting group.
     """
@@ -99,7 +96,6 @@ class Unwrap(Elaboratable):
 
 
 def stored_turns() -> dict[str, int]:
-    """Fields of a waiting group: the turns of its first and its last run."""
     return {"first_turn": 1, "last_turn": 1}
 
 
@@ -133,8 +129,7 @@ class Acts(Protocol):
 class SerialTurns:
     """Turns of the labeller ``serial``: registers and memory for the walked group.
 
-    The seam is one more zone of the row before: it begins before the first column, outermost in its group, and ends
-    after the last column, in two clocks like every run of the row before.
+    The seam is one more zone of the row before, which begins before the first column and ends after the last column.
     """
 
     def __init__(self, derived: Derived):
@@ -149,7 +144,6 @@ class SerialTurns:
         self.linked_runs = memory.Memory(shape=1, depth=derived.open_zones, init=[])
 
     def walk(self, m: Module, handed: Value, row: Value, before: Value, last_column: Value, advance: Value) -> None:
-        """Walk the seam in the clocks after the last column."""
         m.d.comb += self.begins.eq(handed & over_the_seam(self.derived, row, before))
         with m.If(handed):
             m.d.sync += self.meets.eq(self.begins)
@@ -183,7 +177,6 @@ class SerialTurns:
         return Mux(starts, onto, (self.first_turn | self.turns.down) & ~found.last_turn)
 
     def unwrap(self, m: Module, kept: data.View, found: data.View, joins: Value, zone: Value, adds: Value) -> data.View:
-        """The turns of the group after this clock."""
         m.submodules.unwrap = unwrap = Unwrap(self.derived)
         m.d.comb += [
             unwrap.kept.eq(kept),

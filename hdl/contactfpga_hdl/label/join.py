@@ -41,7 +41,7 @@ def _runs(derived: Derived) -> int:
 class Brackets(wiring.Component):
     """Whether runs of a row have an earlier or a later run of their zone in this row.
 
-    enable (in): nothing changes without it. marks (in): marks of a step, all zeros for none; they count from the next
+    enable (in): nothing changes without it. marks (in): marks of a step, zeros for none; they count from the next
     clock. passes (in): the run of the row before is passed. earlier, later (out): that run has an earlier, or a later,
     run of its zone in its row. turned (out): on a sheet whose ends meet, the run is a turn further back than the
     earlier one.

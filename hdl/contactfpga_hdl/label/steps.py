@@ -96,7 +96,6 @@ def kept_layout(derived: Derived) -> data.StructLayout:
 
 
 def zone_of(derived: Derived, group: data.View) -> Value:
-    """The zone record of a complete group."""
     moments = Cat(group[name] for name in moments_layout(derived).members)
     if not derived.skin.closed:
         return moments
@@ -105,7 +104,6 @@ def zone_of(derived: Derived, group: data.View) -> Value:
 
 
 def turned_layout(derived: Derived) -> dict[str, int]:
-    """Turns of a group's cells."""
     return {
         "turned": derived.area_bits,  # cells on the upper of two turns
         "two": 1,  # there are cells on two turns

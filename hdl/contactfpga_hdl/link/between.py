@@ -31,7 +31,7 @@ class Wire(Protocol):
 class Reports:
     """Fault reports, and slots of a self-test, among a link's packets.
 
-    sent: whether the last packet taken is one of these. byte: offered byte of the packet.
+    sent: whether the last packet taken is one of these. byte: offered byte.
     """
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
@@ -58,15 +58,11 @@ class Reports:
         return taken
 
     def begin(self, end: Signal) -> list:
-        """Assignments when a report is taken; ``end``: offset after its last byte."""
         return [end.eq(self._reporter.length)]
 
 
 class Readings:
-    """Readings of units, a packet per sweep, among a link's packets.
-
-    sent: whether the last packet taken is one of these. byte: offered byte of the packet.
-    """
+    """Readings of units, a packet per sweep, among a link's packets; ``sent`` and ``byte`` as in :class:`Reports`."""
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
         self._wire = wire
@@ -88,5 +84,4 @@ class Readings:
         return taken
 
     def begin(self, end: Signal) -> list:
-        """Assignments when readings are taken; ``end``: offset after the last byte."""
         return [self._frames.eq(0), end.eq(self._length)]

@@ -7,7 +7,7 @@ from contactfpga.skin.derived import HELLO_BIT, KEEP_ALIVE_BIT
 
 
 def hello_period(m: Module, link: wiring.Component) -> Value:
-    """High for a clock every half second."""
+    """Pulse every half second."""
     if link.derived.scan.waits:
         return _toggles(m, link, HELLO_BIT)
     period = link.derived.hello_frames
@@ -45,7 +45,8 @@ def _toggles(m: Module, link: wiring.Component, bit: int) -> Value:
 
 
 def _wait(link: wiring.Component, waited: Value, limit: int) -> tuple[Value, Value]:
-    """A waiting time with this frame's, and whether it has reached ``limit``; in scans, of adaptive scans in row times."""
+    """A waiting time with this frame's, and whether it has reached ``limit``: in scans, or in row times of uneven
+    scans."""
     if link.derived.scan.even:
         return waited + 1, waited == limit - 1
     longer = waited + link.tag.slots

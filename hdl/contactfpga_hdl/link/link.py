@@ -48,21 +48,20 @@ class _Regions:
 class Link(wiring.Component):
     """Keeps one frame on the wire, the newest complete one waiting, and one being written.
 
-    Three regions of one memory rotate among the three frames; a fourth holds the hello. A new frame drops and counts a
-    waiting one in the clock in which its end mark is packed, and waits in its place when complete. Nothing here blocks
-    the stages before. The hello is fixed except for the digits of its state, each read in the clock before its byte is
-    offered.
+    Three regions of one memory rotate among the three frames; a fourth holds the hello. As its end mark is packed, a
+    new frame drops and counts a waiting one, whose place it takes when complete. Nothing here blocks the stages before.
+    The hello is fixed except for the digits of its state, each read in the clock before its byte is offered.
     :mod:`contactfpga_hdl.link.between` has the order of packets.
 
-    frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`. tag, summary (in): describe
-    the frame from ``frames.decide`` to ``frames.commit``. asked (in): high for a clock when a hello is wanted. epoch
-    (in): high for a clock every 2^22 us. time (in): device time in us, of a scan that waits. due (out): a frame is to
-    be sent although nothing has changed. number (in): number of the last request. faults, slots (in): with ``guard`` or
-    ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`. units (in): with units, see
+    frames (in): see :func:`~contactfpga_hdl.link.pack.frames_signature`. tag, summary (in): describe the frame from
+    ``frames.decide`` to ``frames.commit``. asked (in): pulse when a hello is wanted. epoch (in): pulse every 2^22 us.
+    time (in): device time in us, of a scan that waits. due (out): a frame is to be sent although nothing has changed.
+    number (in): number of the last request. faults, slots (in): with ``guard`` or ``self_test``, see
+    :class:`~contactfpga_hdl.link.faults.Reporter`. units (in): with units, see
     :func:`~contactfpga_hdl.units.pack.packet_signature`. bytes (out): stuffed packets; a byte is offered two clocks
     after the one before was taken. upset (out): high while two frames share a region because a bit of its number
-    flipped by itself, so that a frame is
-        overwritten while it is sent; never with ``dual``, which finds more.
+    flipped by itself; never with ``dual``,
+        which finds more.
     grant (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
         packets then include the sheet's number.
     """
@@ -159,10 +158,7 @@ class Link(wiring.Component):
             ]
 
     def _decide(self, m: Module, wire: _Wire, regions: _Regions) -> Value:
-        """Decide whether a frame is sent, and its numbers; it goes next, so its sequence number is known.
-
-        Returns the number of sent frames, in the digits that are not the odometer's.
-        """
+        """Decide whether a frame is sent, and its numbers. Returns the count of sent frames in its low digits."""
         verdict, decide = self.frames.verdict, self.frames.decide
         frames_sent = Signal(LIVE_DIGITS * protocol.DIGIT_BITS)
         overwritten = Signal(self.derived.overwritten_bits)

@@ -21,10 +21,9 @@ def verdict_layout(derived: Derived) -> data.StructLayout:
 def frames_signature(derived: Derived, offset_bits: int) -> wiring.Signature:
     """Frames from the packer, the initiator, to the link.
 
-    write: a byte and its offset in the frame's region. decide: high for the clock in which an end mark is taken.
-    verdict (in): the link's decision in that clock, with its numbers until ``commit``. commit: high for the clock in
-    which the frame's last byte is written; later writes belong to another frame. end: in that clock, the offset after
-    the last byte.
+    write: a byte and its offset in the frame's region. decide: pulse as an end mark is taken. verdict (in): the link's
+    decision in that clock, with its numbers until ``commit``. commit: pulse as the frame's last byte is written; later
+    writes belong to another frame. end: in that clock, the offset after the last byte.
     """
     return wiring.Signature(
         {
@@ -58,9 +57,9 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
 class Packer(wiring.Component):
     """Writes each frame, stuffed, into a region of a memory from offset 0, one byte per clock.
 
-    An item is taken with its last byte. COBS writes a block's length in front of it. A zero byte is the place of the
-    next length, so each byte needs one write: itself, or, for a zero, the length of the block that it ends. Only a
-    block of 254 bytes without a zero needs one more.
+    An item is taken with its last byte. A zero byte is the place of the next COBS block's length, so each byte needs
+    one write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero
+    needs one more.
 
     items (in): a frame's items and its end mark. tag, summary (in): describe the frame from ``frames.decide`` to
     ``frames.commit``. frames (out): see :func:`frames_signature`.

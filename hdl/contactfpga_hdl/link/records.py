@@ -33,10 +33,9 @@ class Records(wiring.Component):
     """Offers whole frames: records, then a closing word (:func:`closing_layout`).
 
     One half of a memory is filled while the other is read. A whole frame waits until the reader has the one before; if
-    the next frame's first record comes earlier, it replaces the frame that waits. So a slow reader holds up nothing,
-    and keeps the frame that it was offered. With ``send = "on_change"`` the frame after a replaced one counts as
-    changed, so that the newest cells always arrive. A bit of its registers or memory that flips may spoil a frame or
-    two unnoticed.
+    the next frame's first record comes earlier, it replaces the frame that waits, so a slow reader holds up nothing.
+    With ``send = "on_change"`` the frame after a replaced one counts as changed, so that the newest cells always
+    arrive. A bit of registers or memory that flips may spoil a frame or two unnoticed.
 
     item (in), taken (in): a frame's items and its end mark, and the clocks in which the packer takes them. send (in):
     with the end mark, whether the frame is sent. tag, summary (in): describe the frame in that clock. restart (in):

@@ -42,8 +42,8 @@ class Transmitter(wiring.Component):
 
 
 LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "index": Out(3), "good": Out(1), "bad": Out(1)})
-"""Output of a receiver: ``bit`` is high for a clock in each data bit, with its ``level`` and its ``index`` in the byte;
-``good`` or ``bad`` is high for a clock after the last bit."""
+"""Output of a receiver: ``bit`` is a pulse in each data bit, with its ``level`` and its ``index`` in the byte; ``good``
+or ``bad`` is a pulse after the last bit."""
 
 
 class Receiver(wiring.Component):

@@ -1,1 +1,1 @@
-"""Contents of frames: checked summaries, and barycenters."""
+"""Contents of frames."""

@@ -88,9 +88,9 @@ class Audit(wiring.Component):
 class Tally(wiring.Component):
     """Moments of each row, one group of columns per clock; an empty row has no group, others up to :data:`GROUPS`.
 
-    taken (in): high for the clock in which ``row`` (in) is taken; only empty rows may be taken while ``busy``. moments
-    (out): a group's share in each clock without ``hold``, from two clocks after ``taken``; otherwise zero. hold (in):
-    no group is counted. busy (out): falls after the last group.
+    taken (in): pulse as ``row`` (in) is taken; only empty rows may be taken while ``busy``. moments (out): a group's
+    share in each clock without ``hold``, from two clocks after ``taken``; otherwise zero. hold (in): no group is
+    counted. busy (out): falls after the last group.
     """
 
     def __init__(self, skin: Skin):

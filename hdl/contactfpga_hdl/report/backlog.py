@@ -11,8 +11,8 @@ from contactfpga_hdl.payloads import passed_layout
 class Queue(wiring.Component):
     """Queue of ``depth`` items, a power of two.
 
-    The queue is empty when the places of the next item in and the next out are equal. There is no other count, so after
-    a flip in one of them items are lost or repeated until the places meet.
+    The queue is empty when the places of the next item in and the next out are equal. There is no other count, so a
+    flip in one of them loses or repeats items until the places meet.
 
     items (in): taken unless all places are. waiting (out): the items in order; each is offered two clocks later at the
     earliest.

@@ -1,4 +1,4 @@
-"""Adaptive scan: drives rows together while nothing is touched, one by one where something is."""
+"""Adaptive scan: drives untouched rows together."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -25,16 +25,15 @@ class AdaptiveScanner(wiring.Component):
     """Adaptive scan: with a diode at each switch the columns are the OR of the driven rows.
 
     Rows are offered in ascending order, each when all up to it are known: a row driven alone three clocks after its
-    sample, rows that a probe found empty in the clocks after that, one per clock. Untouched, all rows are driven
-    continuously and the columns are read in each clock; the slots after a touch find its rows.
+    sample, rows that a probe found empty in the clocks after that, one per clock. Untouched, all rows are driven and
+    the columns read in each clock; the slots after a touch find its rows.
 
     The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`, and:
 
-    tag (out): complete three clocks after the frame's last strobe, until the next frame's last strobe. contact (out):
-    rises three clocks after a touch, and falls two clocks after the last strobe of a frame without a pressed
-        switch.
-    alone (out): the offered row was driven alone. sampled (out): slot of the offered row, counted from power-up. busy
-    (in): with debounce, a bit per row that must stay on the list.
+    tag (out): complete from three clocks after a frame's last strobe to the next frame's. contact (out): rises three
+    clocks after a touch, and falls two clocks after the last strobe of an empty frame. alone (out): the offered row was
+    driven alone. sampled (out): slot of the offered row, counted from power-up. busy (in): with debounce, a bit per row
+    that must stay on the list.
     """
 
     def __init__(self, skin: Skin):

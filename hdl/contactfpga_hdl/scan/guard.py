@@ -19,12 +19,12 @@ def checked_rows(skin: Skin) -> int:
 
 class LineFaults(wiring.Component):
     """Holds reported lines. A faulty line is reported from the next clock until a check in the first whole round after
-    ``retry`` toggles finds it good, so that an intermittent fault changes the report at most twice per toggle. Fully
-    masked lines are not reported.
+    ``retry`` toggles finds it good, so an intermittent fault changes the report at most twice per toggle. Fully masked
+    lines are not reported.
 
     rows, columns, stuck (in): lines that a check finds faulty in this clock. checks_rows, checks_columns, checks_stuck
-    (in): lines checked in this clock; columns all or none. round (in): high for a clock in which a round of checks
-    ends, with its last check or later. retry (in): bit ``RETRY_BIT`` of a clock in us. faults (out): reported lines.
+    (in): lines checked in this clock; columns all or none. round (in): pulse as a round of checks ends, with its last
+    check or later. retry (in): bit ``RETRY_BIT`` of a clock in us. faults (out): reported lines.
     """
 
     def __init__(self, skin: Skin):

@@ -1,4 +1,4 @@
-"""Rows and columns in the order of their soldered lines, if these have another order."""
+"""Rows and columns in the order of their soldered lines."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from contactfpga.skin import Skin
 
 
 def connect_lines(m: Module, skin: Skin, scan: wiring.PureInterface, lines: wiring.PureInterface) -> None:
-    """Connect a scanner's pins to those of the same names at the lines, each row and column to its own line."""
+    """Connect a scanner's pins to those at the lines."""
     for name, member in scan.signature.members.items():
         inside, outside = getattr(scan, name), getattr(lines, name)
         order = line_order(skin, name)
@@ -28,7 +28,7 @@ def line_order(skin: Skin, name: str) -> tuple[int, ...]:
 
 
 def on_lines(word: Value, order: Sequence[int]) -> Value:
-    """A word of rows or columns in line order; () leaves the word unchanged."""
+    """A word of rows or columns in line order."""
     return word if _in_order(order) else Cat(word[order.index(line)] for line in range(len(order)))
 
 

@@ -1,8 +1,6 @@
 """Pins between scanner and sheet, and drivers for one pin per row and per column.
 
-A scanner and its direct pins are in the sheet's order, guard lines last;
-:func:`~contactfpga_hdl.scan.lines.connect_lines` maps them to the soldered lines. Pins of shift registers are in line
-order.
+A scanner and its direct pins are in the sheet's order, guard lines last; pins of shift registers are in line order.
 """
 
 from amaranth.hdl import Module, Signal
@@ -20,11 +18,8 @@ from contactfpga_hdl.util.upset import upset
 
 
 def row_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that drive the rows: one per row, or those of the shift registers with one ``row_data`` per chain.
-
-    A scan that reads the rows drives each bit of ``rows`` while that bit of ``rows_drive`` is high, and reads
-    ``rows_read``.
-    """
+    """Pins that drive the rows: one per row, or those of shift registers with one ``row_data`` per chain. A scan that
+    reads the rows drives each bit of ``rows`` while that of ``rows_drive`` is high, and reads ``rows_read``."""
     if skin.reads_rows:
         return {"rows": Out(skin.row_lines), "rows_drive": Out(skin.row_lines), "rows_read": In(skin.row_lines)}
     if skin.row_drive == "direct":
@@ -33,12 +28,11 @@ def row_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def column_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
-    chain.
+    """Pins that read the columns: one per column, or those of shift registers with one ``column_data`` per chain.
 
-    With precharge each column is driven to the released level while its bit of ``columns_drive`` is high. A scan that
-    reads the rows and has guard lines or a self-test drives columns to ``columns_level``, and the guard column, the
-    last one, to the other level.
+    With precharge a column is driven to the released level while its bit of ``columns_drive`` is high. A scan that
+    reads rows and has guard lines or a self-test drives columns to ``columns_level``, and the last one, the guard
+    column, to the other level.
     """
     if skin.precharge_us:
         level = {"columns_level": Out(1, init=int(skin.selects_low))} if drives_columns_both_ways(skin) else {}
@@ -70,13 +64,14 @@ def first_row(skin: Skin) -> int:
 
 
 def row_driver(skin: Skin) -> wiring.Signature:
-    """Interface of a row driver to the scanner. At power-up direct rows drive the first row; in an adaptive scan, all
+    """Interface of a row driver to the scanner. Direct rows drive the first row at power-up; in an adaptive scan, all
     rows.
 
     pins (out): pins at the sheet. pattern (in): rows of the next slot as ones, stable from ``shift`` until ``drive``.
-    shift (in): high for a clock, ``Derived.row_shift_clocks`` before the slot; unused by direct rows. A pattern that is
-        already driven may be shifted again.
-    drive (in): high in the last clock before the slot. release (in): high in the last clock in which rows are driven.
+    shift (in): pulse ``Derived.row_shift_clocks`` before the slot, unused by direct rows. A driven pattern may be
+    shifted
+        again.
+    drive (in): pulse in the last clock before the slot. release (in): pulse in the last clock in which rows are driven.
     upset (out): see :func:`scan_ports`.
     """
     return wiring.Signature(
@@ -94,9 +89,9 @@ def row_driver(skin: Skin) -> wiring.Signature:
 def column_reader(skin: Skin) -> wiring.Signature:
     """Interface of a column reader to the scanner.
 
-    pins (out): pins at the sheet. begin (in): high for a clock; the columns are sampled ``Derived.column_load_clocks``
-    later. levels (out): levels of the columns while ``done``. done (out): high for a clock, ``2 +
-    Derived.column_shift_clocks`` after the sample.
+    pins (out): pins at the sheet. begin (in): pulse ``Derived.column_load_clocks`` before the columns are sampled.
+    levels (out): levels of the columns while ``done``. done (out): pulse ``2 + Derived.column_shift_clocks`` after the
+    sample.
     """
     return wiring.Signature(
         {
@@ -155,11 +150,11 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of every scan to the sheet, the stages that take its rows, and the link.
 
     pins: pins of row driver and column reader. rows (out): rows in ascending order. tag (out): data of the frame whose
-    last row had a strobe; each scan states when the tag is complete. request (in): high for a clock; the tag of the
-    next frame to start answers with ``requested``. heard (in): copied into that tag. epoch (out): high for a clock
-    every 2^22 us. faults (out): fault word, with ``guard`` or ``self_test``. upset (out): high for a clock when a
-    register flipped by itself (:mod:`contactfpga_hdl.util.upset`); never with
-        ``dual``, which finds more.
+    last row had a strobe; each scan states when the tag is complete. request (in): pulse that the tag of the next frame
+    to start answers with ``requested``. heard (in): copied into that tag. epoch (out): pulse every 2^22 us. faults
+    (out): fault word, with ``guard`` or ``self_test``. upset (out): pulse when a register flipped by itself
+    (:mod:`contactfpga_hdl.util.upset`); never with ``dual``, which
+        finds more.
     contact (out): high while any switch reads pressed; each scan states when it rises and falls.
     """
     skin = derived.skin
@@ -186,6 +181,6 @@ def moves_sample(derived: Derived) -> bool:
 def sample_at_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of a scan that obeys the command "sample at".
 
-    moves (in): high for a clock with each command. clocks (in): value of the command, in that clock.
+    moves (in): pulse with each command. clocks (in): value of the command, in that clock.
     """
     return {"moves": In(1), "clocks": In(DIGIT_BITS * VALUE_DIGITS)} if moves_sample(derived) else {}

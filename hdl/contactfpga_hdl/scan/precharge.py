@@ -1,4 +1,4 @@
-"""Precharge: drives the columns to the released level, except those held by something else."""
+"""Precharge of columns to the released level."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -14,16 +14,16 @@ LEAST_BITS = 4
 
 
 class Precharge(wiring.Component):
-    """Drives columns, except stuck columns and those masked in every row. A column is *stuck* if it reads pressed
-    throughout a window of :data:`LOOKS` separated samples and all samples between them. Two of the :data:`LOOKS` are
-    ``2 ** apart_bits`` clocks apart, longer than driving a column to its level, and longer than a projection. In the
-    first window after ``retry`` toggles a stuck column is driven and judged again.
+    """Drives columns, except stuck ones and those masked in every row. A column is *stuck* if it reads pressed
+    throughout a window of :data:`LOOKS` separated samples and all samples between. Two of the :data:`LOOKS` are ``2 **
+    apart_bits`` clocks apart, longer than driving a column to its level, and than a projection. In the first window
+    after ``retry`` toggles a stuck column is driven and judged again.
 
-    drive (in): in the next clock the columns are driven. columns (in): columns that read pressed. looks (in): high for
-    a clock in which ``columns`` is a sample, with all columns that are not stuck driven before. retry (in): bit
-    ``RETRY_BIT`` of a clock in us. guard_pressed (in): of a scan that reads the rows: high for a clock in which the
-    guard column is found stuck, until
-        ``retry`` toggles. Other scans treat the guard column as any column.
+    drive (in): in the next clock the columns are driven. columns (in): columns that read pressed. looks (in): pulse
+    with a sample in ``columns``; all columns that are not stuck were driven before. retry (in): bit ``RETRY_BIT`` of a
+    clock in us. guard_pressed (in): of a scan that reads rows: pulse when the guard column is found stuck, until
+    ``retry`` toggles;
+        other scans treat it as any column.
     others (in): with a self-test, columns driven in the next clock whatever they read. held (out): stuck columns, from
     the clock after a window. pins (out): driven columns, from registers.
     """

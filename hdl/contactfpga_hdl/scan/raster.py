@@ -1,4 +1,4 @@
-"""Raster scan: drives one row after the other and samples all its columns at once."""
+"""Raster scan."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -48,20 +48,19 @@ class _Sample:
 
 
 class Scanner(wiring.Component):
-    """Raster scan: each row is driven for the settle time, then no row for the release time.
+    """Raster scan: each row in turn is driven for the settle time, then no row for the release time.
 
     A row's columns are sampled in the last clock in which the row is driven. The row is offered three clocks later (two
     synchronizer stages and the row register), plus the shift time of columns on shift registers. With ``guard`` a frame
-    begins with the guard row, which is not offered. The command "sample at" moves the samples of rows, except the guard
-    row, to an earlier clock; they do not check the guard column then.
+    begins with the guard row, which is not offered. The command "sample at" moves the samples of all other rows to an
+    earlier clock; these then do not check the guard column.
 
     The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`:
 
-    tag (out): complete one clock after the offer of the frame's last row, until the next frame's last row. faults
-    (out): a row's bit changes one clock after its sample is available, those of all columns one clock after the
-        guard row's, and those of stuck columns one clock after the last row's.
-    contact (out): rises with the offer of the first row with a pressed switch, and falls with the last row of a scan
-        without one.
+    tag (out): complete from one clock after the offer of a frame's last row to the next frame's. faults (out): changes
+    one clock after a row's sample is available, for columns after the guard row's sample, for stuck
+        columns after the last row's.
+    contact (out): rises with the first row with a pressed switch, and falls with the last row of a scan without one.
     """
 
     def __init__(self, skin: Skin):
@@ -131,8 +130,7 @@ class Scanner(wiring.Component):
         ]
 
     def _sample_columns(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """Sample each slot twice: in the last clock of its row, and in the last clock without a row. Returns the
-        sampled levels."""
+        """Sample in the last clock of a row, and in the last clock without a row; returns the sampled levels."""
         derived = self.derived
         lead = derived.column_load_clocks + 1
         begins_released = Signal()
@@ -191,8 +189,8 @@ class Scanner(wiring.Component):
         ]
 
     def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
-        """Check lines: a whole row reads the guard column, the guard row all columns. Returns whether a fault was
-        reported as the frame ended, valid with the number of stuck columns."""
+        """Check lines. Returns whether a fault was reported as the frame ended, valid with the number of stuck
+        columns."""
         from contactfpga_hdl.scan.guard import LineFaults
 
         skin = self.skin

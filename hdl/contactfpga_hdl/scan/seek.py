@@ -31,14 +31,14 @@ class Seek(wiring.Component):
 
     A slot drives one row alone, or it *probes* several. A frame begins with a probe of all rows that are not on the
     list; if that hits, a search halves them (docs/timing.md). Rows are driven alone in ascending order. A row stays on
-    the list while it hits, or while ``busy`` at its strobe. Outputs except ``known`` and ``ends`` are valid from
+    the list while it hits, or while ``busy``. Outputs except ``known`` and ``ends`` are valid from
     ``Derived.choice_clocks`` after the strobe until the next one.
 
-    strobe (in): high for a clock at the end of a slot. hit (in): in that clock, whether any column read pressed. busy
-    (in): in that clock, whether the row driven alone must stay on the list. clear (in): clears ``known`` before the
-    next frame's first strobe. pattern (out): rows of the next slot. alone (out): the slot is one row, not a probe. idle
-    (out): the slot is a probe of all rows. first (out): the slot is the frame's first. known (out): rows whose cells in
-    this frame are known, one clock after the strobe. ends (out): high in the clock after a frame's last strobe.
+    strobe (in): pulse at the end of a slot. hit (in): in that clock, whether any column read pressed. busy (in): in
+    that clock, whether the row driven alone must stay on the list. clear (in): clears ``known`` before the next frame's
+    first strobe. pattern (out): rows of the next slot. alone (out): the slot is one row, not a probe. idle (out): the
+    slot is a probe of all rows. first (out): the slot is the frame's first. known (out): rows whose cells in this frame
+    are known, one clock after the strobe. ends (out): pulse in the clock after a frame's last strobe.
     """
 
     def __init__(self, skin: Skin):

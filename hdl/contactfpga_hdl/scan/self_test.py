@@ -1,8 +1,8 @@
 """Self-test of a scan by line reversal: one line at a time is driven, and the lines that follow are found.
 
 A slot begins with all lines at the selecting level. Then all are released, and at most one is driven to the released
-level, so that pins oppose each other no longer than that. Current may flow from a column through pressed switches to
-rows, in the direction of the diodes; no other line may follow.
+level; pins oppose each other no longer. Current may flow from a column through pressed switches to rows, in the
+direction of the diodes; no other line may follow.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
@@ -25,11 +25,11 @@ class SelfTest(wiring.Component):
     A column that rises in slot 0 is ignored in other slots; a row that rises without a column is joined with the
     supply. Fully masked lines are not driven.
 
-    command (in): high for a clock; slots are sent from then on, and a test under way starts again after its slot. asks
-    (out): a slot is wanted. begin (in): high for a clock in which a slot begins; the scan drives nothing from the
-    second clock after. ends (out): high in the last clock of a slot. rows, columns (in): lines that read released, from
-    synchronizers; fully masked rows never do. discharges (out): in the next clock all lines are driven to the selecting
-    level; from the third clock after ``begin``
+    command (in): pulse from which slots are sent; a test under way starts again after its slot. asks (out): a slot is
+    wanted. begin (in): pulse when a slot begins; the scan drives nothing from the second clock after. ends (out): pulse
+    in the last clock of a slot. rows, columns (in): lines that read released, from synchronizers; fully masked rows
+    never do. discharges (out): in the next clock all lines are driven to the selecting level; from the third clock
+    after ``begin``
         for the projection time.
     alone (out): rows, then columns: the line driven to the released level in the next clock, after a gap of a clock,
     for
@@ -143,7 +143,7 @@ class SelfTest(wiring.Component):
                 m.d.sync += rises.eq(Cat(rows, columns))
 
     def drives(self) -> tuple[Value, Value]:
-        """Rows and columns driven in the next clock. A guard row is discharged; its switches discharge a guard column."""
+        """Rows and columns driven in the next clock; a guard column is discharged by its switches."""
         rows, columns = self.skin.rows, self.skin.columns
         guard = 1 << rows if self.skin.guard else 0
         discharged = self.discharges.replicate(rows + 1) & (checked_rows(self.skin) | guard)

@@ -18,9 +18,8 @@ class RowChain(wiring.Component):
     """Rows on chains of 74HC595. A pattern is loaded ``Derived.row_shift_clocks`` clocks after ``shift``; the enable
     pin follows ``drive`` and ``release`` by one clock.
 
-    A whole pattern, highest line of each chain first, is shifted while the one before is driven, so a random state is
-    gone with the next pattern. The latch rises while no row, or the same rows, are driven; the enable pin begins and
-    ends a row.
+    A whole pattern, highest line of each chain first, is shifted while the one before is driven, so a random state
+    lasts one pattern. The latch rises while no row, or the same rows, are driven.
     """
 
     def __init__(self, skin: Skin):

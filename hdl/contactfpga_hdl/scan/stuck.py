@@ -28,10 +28,8 @@ def watched(skin: Skin) -> int:
 
 
 class Stuck(wiring.Component):
-    """Counts columns that read pressed in any ``released`` clock up to ``take``; ``count`` is valid two clocks later.
-
-    Columns masked in every row and the guard column do not count. ``seen`` accumulates the lines.
-    """
+    """Counts columns that read pressed in any ``released`` clock up to ``take``, except fully masked ones and a guard
+    column; ``count`` is valid two clocks later, ``seen`` accumulates the lines."""
 
     def __init__(self, skin: Skin):
         self.skin = skin

@@ -18,8 +18,8 @@ PLACE_BITS = 6
 def packet_signature() -> wiring.Signature:
     """Unit packets without their check, for the link.
 
-    due (out): a packet waits. taken (in): high for a clock when the packet is sent. place (in): place of the byte
-    offered from the next clock. byte (out): that byte.
+    due (out): a packet waits. taken (in): pulse when the packet is sent. place (in): place of the byte offered from the
+    next clock. byte (out): that byte.
     """
     return wiring.Signature({"due": Out(1), "taken": In(1), "place": In(PLACE_BITS), "byte": Out(8)})
 

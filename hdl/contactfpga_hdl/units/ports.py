@@ -8,7 +8,7 @@ from contactfpga.skin.units import INDEX_BITS
 
 
 def unit_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins at the converter; none without units. A converter with its own pace adds its ready signal and its clock."""
+    """The pins at the converter; none without units. Some converters add a ready signal and a pacing clock."""
     if not skin.units:
         return {}
     pins = {"spi_clock": Out(1), "spi_select_n": Out(1, init=1), "spi_mosi": Out(1), "spi_miso": In(1)}
@@ -25,9 +25,9 @@ def reading_layout(skin: Skin) -> data.StructLayout:
 def converter_ports(skin: Skin) -> dict[str, wiring.Member]:
     """The ports of every converter.
 
-    pins: pins at the converter, from registers. sampled (out): high in the clock in which a sweep's first unit is
-    sampled. done (out): high for a clock when a reading is available; units come in ascending order, at least 14 clocks
-    apart. reading (out): valid with ``done``.
+    pins: pins at the converter, from registers. sampled (out): pulse as a sweep's first unit is sampled. done (out):
+    pulse when a reading is available; units come in ascending order, at least 14 clocks apart. reading (out): valid
+    with ``done``.
     """
     return {
         "pins": Out(wiring.Signature(unit_pins(skin))),

@@ -12,7 +12,6 @@ __all__ = ["BOARDS", "find"]
 BOARDS: dict[str, BoardSpec] = {
     board.name: board for board in (ICEBREAKER, ICESTICK, ULX3S_12F, ULX3S_85F, ULX3S_12F_FT232H)
 }
-"""Boards by name."""
 
 
 def find(name: str) -> BoardSpec:

@@ -1,8 +1,8 @@
-"""Description of a board: clock, pins, bridge, programmer; without Amaranth.
+"""Description of a board, without Amaranth.
 
-Sheet lines are on two sides of header pins. Rows use the first from its start, columns the second; lines that do not
-fit continue at the far end of the other side. So row k and column k are on the same pin for every sheet. With shift
-registers, their few wires replace the lines.
+Sheet lines are on two sides of header pins. Rows use the first side from its start, columns the second; lines that do
+not fit continue at the far end of the other side. So row k and column k are on the same pin for every sheet. A few
+wires of shift registers replace the lines.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several
 
 NAME = "contactfpga"
-"""Base name of a build's files."""
 
 UNIT_PORTS = ("spi_ready_n", "spi_pace", "spi_clock", "spi_select_n", "spi_mosi", "spi_miso")
 """Ports of the converter of pressure units; a converter without its own pace lacks the first two."""
@@ -41,7 +40,6 @@ class Bridge:
 
     chip: str
     usb: tuple[int, int]
-    """Vendor and product ID."""
     interface: int | None
     """Interface of the UART; None for a chip with one interface."""
     max_baud: int
@@ -96,7 +94,6 @@ class BoardSpec:
     column_side: tuple[str, ...]
     contact: str
     standard: Mapping[str, str]
-    """Attributes of every pin."""
     pulls: Mapping[str, Mapping[str, object]]
     """Attributes of a column by the Skin's ``diodes``; none if the FPGA lacks such a resistor."""
     bridge: Bridge
@@ -106,7 +103,6 @@ class BoardSpec:
     constraints: str
     """File in constraints/, common to boards with the same pins."""
     skin: Skin
-    """Default sheet."""
     circuit: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Table ``[circuit]`` of the default sheet."""
     uart: tuple[str, str] | None = None
@@ -151,7 +147,7 @@ class BoardSpec:
         return {name: tuple(itertools.islice(pins, count)) for name, count in wires.items()}
 
     def load(self, path: str | Path) -> Skin:
-        """Read a Skin's file; ``clock_hz`` and ``baud`` default to those of the board's own Skin."""
+        """Read a Skin's file with defaults for ``clock_hz`` and ``baud`` from the board's own Skin."""
         return Skin.load(path, usual={"clock_hz": self.skin.clock_hz, "baud": self.skin.baud})
 
     def label(self, pin: str) -> str:

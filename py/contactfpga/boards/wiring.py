@@ -85,7 +85,6 @@ class Output:
 
     @property
     def place(self) -> tuple[str, str, str, str]:
-        """The output's place in words."""
         return self.chip, str(self.chain), str(self.number), f"{self.name} {self.pin}"
 
 
@@ -119,7 +118,6 @@ def outputs(skin: Skin) -> list[Output]:
 
 
 def parts(skin: Skin) -> dict[str, int]:
-    """Number of each part on the sheet, without connectors."""
     lines = [*row_lines(skin), *column_lines(skin)]
     cells = skin.rows * skin.columns - len(skin.mask)
     chips = collections.Counter(chip for chip, *_ in {(one.chip, one.chain, one.number) for one in outputs(skin)})

@@ -69,7 +69,6 @@ class Choice:
         return load(self.gateware)
 
     def load_golden(self) -> Any:
-        """The golden model's rule."""
         return load(self.golden)
 
 
@@ -99,7 +98,6 @@ def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object
 
 
 def load(place: str) -> Any:
-    """The object at ``module:attribute``."""
     module, _, attribute = place.partition(":")
     return getattr(importlib.import_module(module), attribute)
 

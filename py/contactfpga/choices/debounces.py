@@ -59,7 +59,6 @@ DEBOUNCES: dict[str, Debounce] = {
         ),
     )
 }
-"""Built-in debounces by name."""
 
 
 def find(value: object) -> Debounce:

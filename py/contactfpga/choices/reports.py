@@ -11,7 +11,6 @@ class Report:
     """The content of a frame."""
 
     name: str
-    """Name in a Skin."""
     title: str
     """Label in charts and tables."""
     kind: int
@@ -34,4 +33,3 @@ REPORTS: dict[str, Report] = {
         Report(name="cells", title="cells", kind=6, code=1, zones=False, divided=False),
     )
 }
-"""All reports by name."""

@@ -41,10 +41,10 @@ class Scan(Choice):
     max_frame_slots: Bound
     """The most row times of a frame."""
     max_frame_clocks: Bound
-    """The most clocks of a frame, from its first sample to its last."""
+    """The most clocks of a frame, from first to last sample."""
     min_row_clocks: Bound
-    """The least clocks of a row time with which later stages keep up, end mark included; the scanner keeps its tag
-    until the frame before is packed."""
+    """The least clocks of a row time with which later stages keep up; the scanner keeps its tag until the frame before
+    is packed."""
 
 
 def _check_adaptive(skin: Any) -> None:
@@ -159,7 +159,6 @@ SCANS: dict[str, Scan] = {
         ),
     )
 }
-"""Built-in scans by name."""
 
 
 def find(value: object) -> Scan:

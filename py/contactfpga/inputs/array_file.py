@@ -29,9 +29,9 @@ class ArrayFileError(ValueError):
 
 
 def read(path: str | Path, names: Sequence[str], most: int = MAX_BYTES) -> dict[str, np.ndarray]:
-    """The named arrays in a .npz file; the only array of a .npy file has the first name.
-
-    ``most``: bytes of an array. Raises :class:`ArrayFileError` for a damaged file or without the first array, OSError.
+    """The named arrays in a .npz file, or the array of a .npy file by the first name. ``most``: bytes of an array.
+    Raises
+    :class:`ArrayFileError` for a damaged file or without the first array, OSError.
     """
     with open_regular(path) as file:
         try:

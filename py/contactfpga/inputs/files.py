@@ -27,7 +27,8 @@ def open_regular(path: str | Path) -> BinaryIO:
 
 
 def read_small(path: str | Path, most: int, what: str, refused: type[Exception]) -> bytes:
-    """All bytes of a file; ``what``: its kind for messages. Raises ``refused`` for more than ``most`` bytes, OSError."""
+    """All bytes of a file; ``what``: its kind in messages. Raises OSError, and ``refused`` for more than ``most``
+    bytes."""
     with open_regular(path) as file:
         data = file.read(most + 1)
     if len(data) > most:
@@ -66,7 +67,6 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def names_robot(port: str | None) -> TypeGuard[str]:
-    """Whether a port is the file of a robot's links, not a board such as ``sim://?skin=FILE.toml``."""
     return port is not None and port.endswith(".toml") and "://" not in port
 
 

@@ -33,7 +33,7 @@ def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
 
 
 def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
-    """The content of a TOML file of these bytes; ``path``: its name in messages. Raises ``refused``."""
+    """The content of a TOML file of these bytes. Raises ``refused``."""
     if len(data) > MAX_BYTES:
         raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
     try:

@@ -61,7 +61,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def shortened(text: str) -> str:
-    """A message without its middle if it is long: it begins with the failure and ends with the next step."""
+    """A message, without its middle if it is long."""
     if len(text) <= MAX_MESSAGE:
         return text
     return f"{text[: MAX_MESSAGE // 2]}... ({len(text):,} characters) ...{text[-MAX_MESSAGE // 2 :]}"

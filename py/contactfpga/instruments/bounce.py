@@ -47,6 +47,7 @@ class Proposal:
 
     @property
     def lines(self) -> str:
+        """Lines of a Skin's TOML file."""
         return "\n".join(
             f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value:g}"
             for name, value in dataclasses.asdict(self).items()
@@ -97,6 +98,7 @@ class Bounce:
             self._now = zones.cells.copy()
 
     def finish(self) -> None:
+        """End the transitions that are at rest after the last frame."""
         if self._last is not None:
             self._end(self._open & (self._last.time_us - self._to_us > QUIET_US))
 

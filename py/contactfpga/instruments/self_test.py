@@ -10,8 +10,6 @@ from contactfpga.wire.faults import SelfTestSlot
 
 
 class LineFinding(NamedTuple):
-    """One finding of a self-test."""
-
     kind: Literal["fault", "untested"]
     sentence: str
 
@@ -177,7 +175,6 @@ def _listed(lines: list[int]) -> str:
 
 
 def merged(tests: Iterable[SelfTest]) -> tuple[LineFinding, ...]:
-    """The findings of several self-tests, each once, faults first."""
     return tuple(sorted({finding for test in tests for finding in test.findings}))
 
 

@@ -52,8 +52,6 @@ class _Search:
 
 @dataclasses.dataclass(frozen=True)
 class Slow:
-    """Outliers, and times near the settle time."""
-
     cells: list[tuple[int, int]]
     rows: list[int]
     columns: list[int]

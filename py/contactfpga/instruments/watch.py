@@ -65,7 +65,6 @@ def away_from(cells: Iterable[Cell], reach: int, sheet: Sheet) -> np.ndarray:
 
 
 def unchanged(what: str, many: bool, seconds: float, others: str, from_the_start: bool) -> str:
-    """The sentence about unchanging cells."""
     start = ", since the first frame," if from_the_start else ""
     cause = "something lies there, or they are stuck" if many else "stuck, or something small lies there"
     lasted = f"{seconds:.0f}" if seconds >= 10 else f"{seconds:.1f}"
@@ -90,7 +89,7 @@ def places(cells: np.ndarray) -> tuple[Cell, ...]:
 
 
 APART_US = 10_000
-"""Interval within which changes of a cell count once: a bouncing switch does not flutter."""
+"""Interval within which changes of a cell count once, as a switch may bounce."""
 
 QUIET = 10
 """Divisor of the stuck time: for this part nothing beside a stuck switch may have changed."""
@@ -164,7 +163,8 @@ class CellHistory:
                 yield self._told(group, few, since_us, others, time_us)
 
     def _alone(self, group: np.ndarray, time_us: int) -> bool:
-        """Whether nothing is, or was recently, pressed beside the group, which could belong to a contact otherwise."""
+        """Whether nothing is, or was recently, pressed beside the group; otherwise the group may belong to a
+        contact."""
         beside = ~away_from(places(group), 1, self._sheet) & ~group
         quiet_us = time_us - self._limits.stuck_us // QUIET
         return not (beside & (self._cells | (self._changed_us > quiet_us))).any()
@@ -319,7 +319,6 @@ def _keys(zones: Zones) -> set[Key]:
 
 
 LOOKS = 100
-"""Evaluations within the stuck time; frames in between are only recorded."""
 
 
 class Watch:
@@ -330,10 +329,10 @@ class Watch:
     ...     watch.update(board.next())
     ()
 
-    A cell, or a zone if the board sends zones, is suspected if it has stayed pressed without a change for ``stuck_s``
-    seconds of the frames' time, while at least ``others`` cells elsewhere came and went. Without changes elsewhere
+    A cell, or a zone if the board sends zones, is suspected once it has been pressed without a change for ``stuck_s``
+    seconds of the frames' time while at least ``others`` cells elsewhere came and went. Without changes elsewhere
     nothing is suspected: an arm may rest on a table. A cell is loose if it changes more than ``flutter_hz`` times per
-    second; changes within 10 ms count once, as a bouncing switch is not loose. Cells of ``skin.mask`` are left out.
+    second; changes within 10 ms count once. Cells of ``skin.mask`` are left out.
 
     Raises ValueError for limits that are not positive, and :class:`SkinMismatch` for frames of another Skin's sheet.
     """

@@ -32,11 +32,8 @@ _REGISTERED: dict[str, Callable[[object], Choice]] = {
 
 
 def check_types(skin: Skin) -> dict[str, Any]:
-    """Check every field against its declared type; returns the values in their final types.
-
-    Equal Skins have one fingerprint, so 8.0 is no 8; numpy's integers become Python's. Elements of lists are checked
-    later.
-    """
+    """Check every field's type; returns the values in their final types: Python's integers, not numpy's, and 8.0 is no
+    8."""
     _check_name(skin.name)
     return {name: check(name, getattr(skin, name)) for name, check in _type_checks(dataclasses.fields(skin))}
 
@@ -233,7 +230,7 @@ def check_link(skin: Skin) -> None:
 
 
 def check_timing(skin: Skin) -> None:
-    """Check that each row is processed before the next, and times and zone capacity against their limits."""
+    """Check times, zone capacity, and that each row is processed before the next."""
     assert skin.zone_capacity is not None
     _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
     for name in ("settle_us", "release_us", "precharge_us", "project_us"):

@@ -1,4 +1,4 @@
-"""Quantities derived from a Skin or its sheet: bits, bytes, clocks and depths."""
+"""Quantities derived from a Skin or its sheet."""
 
 from __future__ import annotations
 
@@ -27,18 +27,17 @@ HEARD_BITS = 3
 MIN_OVERWRITTEN_BITS = 4
 
 HELLO_PERIOD_US = 500_000
-"""Interval of hellos: a hello may wait for a frame and still comes every second."""
+"""Interval of hellos; one still comes every second if each waits for a frame."""
 
 HELLO_BIT = 19
-"""Bit of the us clock that toggles every 0.52 s, which makes a hello of a waiting scan due."""
+"""Bit of the us clock whose toggles, every 0.52 s, make a hello of a waiting scan due."""
 KEEP_ALIVE_BIT = 10
-"""Bit of the us clock that toggles every 1.024 ms, which counts toward a keep-alive."""
+"""Bit of the us clock whose toggles, every 1.024 ms, count a keep-alive."""
 
 EPOCH_BITS = 22
-"""Log2 of an epoch in us; an epoch is less than half of the range of a frame's time."""
+"""Log2 of an epoch in us, below half of a frame time's range."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
-"""Largest value of the stuck-line counter."""
 
 SELF_TEST = 1
 """Number of the command that tests all lines (docs/protocol.md)."""
@@ -82,10 +81,10 @@ class Widths:
 
     @functools.cached_property
     def record_bits(self) -> tuple[int, ...]:
-        """Bits of a zone's fields on the wire: area, then sum x and sum y, or x and y of the barycenter; on a sheet
-        whose ends meet, also the cells past the seam.
+        """Bits of a zone's fields on the wire: area, and sums or barycenter; on a sheet whose ends meet, also cells
+        past the seam.
 
-        Divided areas are never 0, so an area of all cells is sent as 0. If the cells are a power of two, this saves a
+        Divided areas are never 0, so an area of all cells is sent as 0; if the cells are a power of two, this saves a
         bit.
         """
         if not self.report.divided:
@@ -99,7 +98,6 @@ class Widths:
 
     @functools.cached_property
     def record_bytes(self) -> int:
-        """Bytes of one zone on the wire."""
         return math.ceil(sum(self.record_bits) / 8)
 
     @functools.cached_property
@@ -132,13 +130,13 @@ class Widths:
 
     @functools.cached_property
     def max_stored_bytes(self) -> int:
-        """Bytes of the longest stored frame: items and trailer, stuffed."""
+        """Bytes of the longest stuffed frame without check bytes."""
         plain = self.max_items * self.item_bytes + self.trailer_bytes
         return plain + math.ceil(plain / 254)
 
     @functools.cached_property
     def max_frame_bytes(self) -> int:
-        """Bytes of the longest frame on the wire, with check bytes and delimiter."""
+        """Bytes of the longest frame on the wire."""
         return self.max_stored_bytes + CHECK_BYTES + 1
 
 
@@ -165,7 +163,6 @@ SAMPLED_BIT_CLOCKS = 4
 
 
 def bit_clocks(clock_hz: int, baud: int) -> int:
-    """Clocks of the gateware per bit on the wire."""
     return round(clock_hz / baud)
 
 
@@ -195,14 +192,12 @@ class Derived(Widths):
 
     @property
     def commands(self) -> tuple[int, ...]:
-        """Numbers of the board's commands."""
         self_test = (SELF_TEST,) if self.skin.self_test else ()
         moves = self.scan.moves_sample and not self.report.zones
         return self_test + ((SAMPLE_AT,) if moves else ()) + self.units.commands
 
     @functools.cached_property
     def units(self) -> Units:
-        """Quantities of the pressure units."""
         return Units(self.skin)
 
     # ---- clocks in which lines are driven and read, and those of a bit on the link
@@ -223,9 +218,7 @@ class Derived(Widths):
 
     @property
     def first_sample_clocks(self) -> int:
-        """Least value of the command "sample at"; with shift registers the previous slot's columns are complete by
-        then.
-        """
+        """Least value of the command "sample at": shift registers are read by then."""
         return max(2, self.column_load_clocks + self.column_shift_clocks)
 
     @property
@@ -259,22 +252,22 @@ class Derived(Widths):
 
     @property
     def row_latch_clocks(self) -> int:
-        """Clocks of the pulse that latches a shifted row pattern; 0 with direct rows."""
+        """Clocks of the pulse that latches a row pattern; 0 with direct rows."""
         return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
 
     @property
     def row_shift_clocks(self) -> int:
-        """Clocks from the order to shift a row pattern until it can be driven; 0 with direct rows."""
+        """Clocks from the order to shift a row pattern until its drive; 0 with direct rows."""
         return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
 
     @property
     def column_load_clocks(self) -> int:
-        """Clocks of the pulse that loads all columns, sampled in its last clock; 0 with direct columns."""
+        """Clocks of the pulse that loads all columns in its last clock; 0 with direct columns."""
         return self.shift_clocks if self.skin.column_read == "74hc165" else 0
 
     @property
     def column_shift_clocks(self) -> int:
-        """Latency in clocks of a sample's columns against direct ones; 0 with direct columns."""
+        """Latency of a sample's columns against direct ones in clocks."""
         return self.column_chain_lines * self.column_load_clocks
 
     @property
@@ -297,7 +290,7 @@ class Derived(Widths):
 
     @property
     def frame_clocks(self) -> int:
-        """Clocks in which every row, including a guard row, is driven once. Frames of an adaptive scan vary."""
+        """Clocks in which every row, and a guard row, is driven once. Frames of an adaptive scan vary."""
         return self.row_clocks * self.skin.row_lines
 
     @property
@@ -306,14 +299,12 @@ class Derived(Widths):
 
     @property
     def pulsed(self) -> bool:
-        """Whether requests come as pulses; see :func:`pulsed`."""
         return pulsed(self.skin.clock_hz, self.skin.baud)
 
     # ---- times, in clocks unless named otherwise
 
     @property
     def max_frame_slots(self) -> int:
-        """The most row times of a frame."""
         return self.scan.max_frame_slots(self)
 
     @property
@@ -328,9 +319,8 @@ class Derived(Widths):
 
     @property
     def min_row_clocks(self) -> int:
-        """Least clocks of a row, in which debounce and labeller finish the row before, end mark included, and a frame
-        lasts until the frame before is packed.
-        """
+        """Least clocks of a row: debounce and labeller finish the row before, and a frame outlasts the packing of the
+        frame before."""
         return self.scan.min_row_clocks(self)
 
     @property
@@ -340,13 +330,11 @@ class Derived(Widths):
 
     @property
     def packed_clocks(self) -> int:
-        """Clocks from the offer of a frame's last row to the end of its packing, without the bytes packed meanwhile."""
+        """Clocks from the offer of a frame's last row to the end of its packing, besides bytes packed meanwhile."""
         return 1 + self.debounce_clocks + self.label_clocks + 2 + 4
 
     def items_clocks(self, items: int) -> int:
-        """Clocks to pack a frame's items and trailer: one per byte, or those of the items' divisions if these take
-        longer.
-        """
+        """Clocks to pack items and trailer: one per byte, or the longer division of items."""
         plain = items * self.item_bytes + self.trailer_bytes
         stuffing = math.ceil(plain / 254)
         if not self.report.divided:
@@ -363,7 +351,7 @@ class Derived(Widths):
 
     @property
     def keep_alive_toggles(self) -> int:
-        """Toggles of ``KEEP_ALIVE_BIT`` after which a waiting scan sends a frame in the remaining time."""
+        """Toggles of ``KEEP_ALIVE_BIT`` after which a waiting scan sends a frame."""
         return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_toggles
 
     @property
@@ -383,12 +371,10 @@ class Derived(Widths):
 
     @property
     def press_scans(self) -> int:
-        """The least scans that last ``debounce_press_us``."""
         return whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def release_scans(self) -> int:
-        """The least scans that last ``debounce_release_us``."""
         return whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
     @property
@@ -398,7 +384,6 @@ class Derived(Widths):
 
     @property
     def release_ticks(self) -> int:
-        """Ticks of ``debounce_release_us``, as in :attr:`press_ticks`."""
         return self._debounce_ticks(self.skin.debounce_release_us, self.release_scans)
 
     def _debounce_ticks(self, us: float, scans: int) -> int:
@@ -459,10 +444,10 @@ class Derived(Widths):
     def backlog(self) -> int:
         """Items that the queue before the packer holds.
 
-        Two rows close at most ``open_zones`` zones, in one burst. If packing these takes longer than two rows, the rest
-        accumulates, over at most two frames. Even scans pack each bitmap row before the next. An adaptive scan omits
-        empty rows, so every row may close as many zones, and bitmap rows of two frames may wait. A waiting scan has one
-        frame under way; its depth is a power of two, which needs less logic.
+        Two rows close at most ``open_zones`` zones, in one burst; if packing takes longer than two rows, the rest
+        accumulates over at most two frames. An adaptive scan omits empty rows, so every row may close as many zones,
+        and bitmap rows of two frames may wait. A waiting scan has one frame under way; its depth is a power of two,
+        which needs less logic.
         """
         if self.scan.waits:
             return max(8, 1 << (self.max_items - 1).bit_length())

@@ -39,7 +39,7 @@ class Sheet:
         return self.columns * self.pitch_x_mm if self.closed else None
 
     def max_zones(self) -> int:
-        """The most zones in a frame of this sheet."""
+        """The most zones in a frame."""
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def check(self) -> None:

@@ -194,7 +194,7 @@ class Skin:
         return dataclasses.replace(self, **changes)
 
     def to_toml(self) -> str:
-        """The Skin as TOML text for :meth:`load`."""
+        """TOML text that :meth:`load` reads."""
         lines = []
         for name, value in dataclasses.asdict(self).items():
             if value is not None:
@@ -265,7 +265,6 @@ class Skin:
         return Derived(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone; derived values are computed again."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def max_zones(self) -> int:

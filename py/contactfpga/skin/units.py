@@ -72,7 +72,6 @@ class Units:
 
     @property
     def commands(self) -> tuple[int, ...]:
-        """Numbers of the commands for units."""
         if not self.skin.units:
             return ()
         return (ZERO, THRESHOLD, SUM_THRESHOLD) if self.skin.unit_sums else (ZERO, THRESHOLD)

@@ -24,8 +24,6 @@ MAX_AROUND = 20_000_000
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Triangles:
-    """A triangle mesh in mm."""
-
     corners_mm: Floats
     """(n, 3, 3)."""
     normals: Floats

@@ -45,13 +45,11 @@ def _each(function: Callable[[float], float], values: Floats) -> Floats:
 
 
 def vector(values: Floats) -> Vector:
-    """Three numbers as floats."""
     x, y, z = values.tolist()
     return x, y, z
 
 
 def is_one(*values: Any) -> bool:
-    """Whether all values are plain numbers."""
     return all(isinstance(value, (float, int)) for value in values)
 
 
@@ -59,7 +57,7 @@ LONGEST_MM = 1e6
 
 
 class SurfaceError(ContactFPGAError, ValueError):
-    """An impossible surface or place; the message names the value and the limit."""
+    """An impossible surface or place."""
 
 
 def length(name: str, value: Any, low: float = -LONGEST_MM, unit: str = "mm") -> float:

@@ -1,8 +1,8 @@
 """Surfaces of a sheet on its link: plane, cylinder and cone.
 
 ``place`` maps a place of the flat sheet, in mm, to point and outward unit normal in the link's frame; ``flat`` maps the
-nearest point back. For arrays of one shape, ``place`` returns arrays with one more axis. A NaN place, of a zone without
-cells, has a NaN point.
+nearest point back. ``place`` of arrays returns arrays with one more axis. A NaN place, of a zone without cells, has a
+NaN point.
 """
 
 from __future__ import annotations

@@ -17,8 +17,7 @@ FAST_MM_S = 1500.0
 """Standard deviation of the speed along each axis of a contact seen once."""
 
 SAME_S = 0.003
-"""Time for which a barycenter's error stays the same: it jumps when a cell opens or closes, so denser frames add
-nothing."""
+"""Time for which a barycenter's error stays the same: it jumps with a cell, so denser frames add nothing."""
 
 COAST_S = 0.05
 """Longest extrapolation by a speed."""
@@ -70,7 +69,7 @@ class Spot:
         self.known = NEW
         self.joined_us = time_us
         self.small_us: int | None = None
-        """Time since which the zone is no larger than it would be without one of its contacts."""
+        """Time since which the zone would be large enough without one of its contacts."""
         self.place(zone, time_us)
 
     def place(self, zone: Zone, time_us: int) -> None:
@@ -98,8 +97,7 @@ class Spot:
             self.members[0].area_mm2 = zone.area_mm2
 
     def correct(self, off_x: float, off_y: float, known: Known, error: float) -> None:
-        """Correct by a zone's offset from the expected place; ``known``: covariance of the place, ``error``: the zone's
-        variance."""
+        """Correct by a zone's offset from the expected place; ``error``: variance of the zone's place."""
         at, both, speed = known
         gain, turn = at / (at + error), both / (at + error)
         self.fx, self.fy = self.fx + gain * off_x, self.fy + gain * off_y
@@ -121,12 +119,11 @@ class Spot:
 
     @property
     def area_mm2(self) -> float:
-        """Sum of the contacts' areas, each when last seen alone."""
         return math.fsum(one.area_mm2 for one in self.members)
 
     def spare(self) -> Member | None:
-        """The contact without which the other areas fit the zone best; None if all are needed. Ties go to the contact
-        farthest from the middle, then to the newest."""
+        """The contact without which the areas fit the zone best, then farthest from the middle, then newest; None if
+        all fit."""
         if len(self.members) == 1:
             return None
         total, area = self.area_mm2, self.zone.area_mm2
@@ -138,7 +135,6 @@ class Spot:
         return best if abs(total - best.area_mm2 - area) < abs(total - area) else None
 
     def track(self) -> Track:
-        """The spot as users see it."""
         first = self.members[0]
         merged = tuple(one.id for one in self.members[1:]) if len(self.members) > 1 else ()
         return Track(first.id, self.zone, first.since_us, self.seen_us, self.vx, self.vy, self.held, merged)
@@ -152,10 +148,9 @@ def place(zone: Zone) -> tuple[float, float]:
 
 
 def error_mm2(zone: Zone) -> float:
-    """Variance of a zone's barycenter along each axis: that of a cell, divided by the closed cells."""
+    """Variance of a zone's barycenter along each axis: that of a cell over the number of cells."""
     return zone.area_mm2 / (12 * zone.area_cells)
 
 
 def radius_mm(area_mm2: float) -> float:
-    """Radius of a disc of this area."""
     return math.sqrt(area_mm2 / math.pi)

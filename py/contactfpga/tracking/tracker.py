@@ -57,11 +57,11 @@ class Tracker:
         self._events: list[Event] = []
 
     def update(self, zones: Zones) -> Tracks:
-        """The contacts after a frame, and their events.
+        """The contacts and events after a frame.
 
-        A frame flagged ``mismatch`` may be wrong and changes nothing; one flagged ``overflow`` ends no contact, nor do
-        lost frames. A frame that is older than the last one, or of another sheet, begins a new history. Raises
-        TypeError for anything but a frame.
+        A frame flagged ``mismatch`` changes nothing; one flagged ``overflow`` ends no contact, nor do lost frames. A
+        frame that is older than the last one, or of another sheet, begins a new history. Raises TypeError for anything
+        but a frame.
         """
         if not isinstance(zones, Zones):
             raise TypeError(f"update() takes a frame of zones, such as board.next() returns; it got {shown(zones)}")
@@ -77,7 +77,7 @@ class Tracker:
     # ---- one frame
 
     def _restart(self, zones: Zones) -> bool:
-        """End all contacts if a frame does not continue the last one; returns whether any history ended."""
+        """End all contacts if a frame does not continue the last one."""
         if self._sheet is zones.sheet and zones.time_us >= self._time_us:
             return False
         restarted = zones.time_us < self._time_us or self._sheet not in (None, zones.sheet)
@@ -245,12 +245,12 @@ MOST = 0.75
 
 REACH = 1.5
 """Gates for parting and merging: a zone leaves or enters another within the gate plus this many radii of the larger
-zone, since feet are long; one of several contacts leaves within this many gates of its expected place."""
+zone, as feet are long; one of several contacts leaves within this many gates of its expected place."""
 
 
 def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_mm: float) -> dict[Spot, list[Spot]]:
-    """Lost spots by the spot whose zone they entered. Removes them from ``lost``; a new zone that several form is
-    removed from ``free`` and paired with the largest."""
+    """Lost spots by the spot whose zone they entered; removed from ``lost``. A new zone of several is removed from
+    ``free`` and paired with the largest."""
     found: dict[Spot, list[Spot]] = {}
     area = {spot: spot.zone.area_mm2 for spot, _ in pairs}
     for spot in list(lost):
@@ -285,8 +285,8 @@ def parted(
     expects: Callable[[Spot, Zone], bool],
     gate_mm: float,
 ) -> dict[Spot, list[Zone]]:
-    """New zones by the spot that they leave, judged by place and lost area, or by the expected places of several
-    contacts. Removes them from ``free``, and a lost spot in several from ``lost``."""
+    """New zones by the spot that they leave, by place and lost area or by expected places of contacts; removed from
+    ``free``, and lost spots in several zones from ``lost``."""
     found: dict[Spot, list[Zone]] = {}
     left = {spot: zone.area_mm2 for spot, zone in pairs if spot not in merges}
     for zone in list(free):
@@ -313,7 +313,6 @@ def parted(
 
 
 def touch_mm(one: Zone, other: Zone) -> float:
-    """Distance in mm at which two round contacts share a zone."""
     return radius_mm(one.area_mm2) + radius_mm(other.area_mm2)
 
 
@@ -358,7 +357,6 @@ def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float
 
 
 def _larger(member: Member, zone: Zone) -> float:
-    """Misfit of a zone's area for a contact, on the scale of :attr:`Way.odd`."""
     return (math.log(zone.area_mm2 / member.area_mm2) / LARGER) ** 2
 
 
@@ -372,8 +370,7 @@ def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate
 def shared_out(
     spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
 ) -> list[tuple[Zone, list[Member]]]:
-    """The zones of a parted spot with their contacts: one each by place and area, the rest where most likely; none for
-    a zone that begins a contact."""
+    """The zones of a parted spot with their contacts: one each by place and area, the rest where most likely."""
     ways = [[_ways(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
     off = [[min(way.off_mm for way in both) for both in line] for line in ways]
     odd = [[min(way.odd for way in both) for both in line] for line in ways]

@@ -76,7 +76,7 @@ class Event:
     zone: Zone
     """Zone of the contact; its last zone for ``up``."""
     seen_us: int
-    """Device time at which the contact was last seen, in us: ``time_us``, but up to ``hold_ms`` earlier for ``up``."""
+    """Device time at which the contact was last seen, in us; up to ``hold_ms`` before ``time_us`` for ``up``."""
 
     def to_dict(self) -> dict[str, object]:
         """All values as plain Python objects for JSON."""
@@ -108,8 +108,8 @@ class Tracks:
     events: tuple[Event, ...]
     """Events since the frame before, in order."""
     unsure: tuple[Zone, ...] = ()
-    """Zones that begin no contact: possible ghosts (:attr:`Zone.ghost`), and zones that go around a closed sheet
-    (:attr:`Zone.winding`). A present contact continues in a ghost, and is held while a zone winds."""
+    """Zones that begin no contact: possible ghosts (:attr:`Zone.ghost`), in which a present contact continues, and
+    zones around a closed sheet (:attr:`Zone.winding`), which hold present contacts."""
     restarted: bool = False
     """Whether the board's time ran backward, or its sheet changed: all contacts ended, and new ones began."""
 

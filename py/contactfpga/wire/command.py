@@ -58,9 +58,7 @@ class Command:
 
 
 def encode_command(number: int, command: Command, hello: bool = False, pulsed: bool = False) -> bytes:
-    """A command's bytes on the wire; ``number``, ``hello`` and ``pulsed`` as in
-    :func:`contactfpga.wire.protocol.encode_request`.
-    """
+    """A command's bytes on the wire; arguments as in :func:`contactfpga.wire.protocol.encode_request`."""
     assert may_number(number), f"{number} is no number of a request"
     words = ((number, HEARD_DIGITS), (command.what, WHAT_DIGITS), (command.value, VALUE_DIGITS))
     plain = b"".join(digits(value, count) for value, count in words)

@@ -77,7 +77,6 @@ class SelfTestSlot:
 
 
 def digits_of(bits: int) -> int:
-    """Digits of a word of this many bits."""
     return -(-bits // DIGIT_BITS)
 
 
@@ -88,12 +87,10 @@ def fault_bits(rows: int, columns: int, guard: bool, self_test: bool) -> int:
 
 
 def encode_faults(word: int, bits: int) -> bytes:
-    """The plain bytes of a fault report."""
     return digits(word, digits_of(bits)) + bytes([last_byte(KIND_FAULTS)])
 
 
 def encode_slot(slot: int, word: int, bits: int) -> bytes:
-    """The plain bytes of a slot of the self-test."""
     return digits(slot, SLOT_DIGITS) + digits(word, digits_of(bits)) + bytes([last_byte(KIND_FAULTS, SLOT)])
 
 
@@ -110,7 +107,7 @@ def decode_faults(plain: bytes, rows: int, columns: int, guard: bool, self_test:
 
 
 def decode_slot(plain: bytes, rows: int, columns: int) -> SelfTestSlot:
-    """Read an unsealed slot of the self-test. Raises :class:`PacketError` if this board cannot have sent it."""
+    """Read an unsealed slot of the self-test. Raises :class:`PacketError` as :func:`decode_faults`."""
     slot, word = plain[:SLOT_DIGITS], plain[SLOT_DIGITS:-1]
     if len(slot) < SLOT_DIGITS or not all(byte & 0x80 for byte in slot):
         raise PacketError("content", "a slot of the self-test has no number")

@@ -1,4 +1,4 @@
-"""Framing of packets: stuffing, check bytes, delimiter, and a last byte with kind and flags."""
+"""Framing of packets: stuffing, check bytes, delimiter, last byte."""
 
 from __future__ import annotations
 
@@ -60,7 +60,6 @@ class OldPacket(PacketError):
 
 
 def kind_of(plain: bytes) -> int:
-    """Kind of an unsealed packet."""
     return plain[-1] >> FLAG_BITS
 
 
@@ -122,7 +121,7 @@ def seal(plain: bytes, before: bytes = b"") -> bytes:
 
 
 def unreadable(packet: bytes) -> bool:
-    """Whether a packet from the board may be whole; only the board's fingerprint decides this."""
+    """Whether a packet from the board may be whole, as far as can be told without its fingerprint."""
     marked = all(byte & 0x80 for byte in packet[-CHECK_BYTES:]) and packet[-1] < 0x84
     return len(packet) >= SHORTEST_PACKET and marked and not _bare(packet[-CHECK_BYTES - 1])
 

@@ -26,7 +26,7 @@ _REPORTS = tuple(report.name for report in sorted(REPORTS.values(), key=lambda r
 _SENDS = ("always", "on_change")
 _FINGERPRINT_BYTES = 8
 _CLOSED = 0x80
-"""Flag of a sheet whose ends meet; readers without this flag refuse the connectivity that holds it."""
+"""Flag of a sheet whose ends meet; a reader without this flag refuses the connectivity."""
 
 SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
 STATE_DIGITS = 16
@@ -64,18 +64,17 @@ class Hello:
     sheet: Sheet
     fingerprint: bytes
     name: str
-    """Name of the Skin."""
     clock_hz: int
     baud: int
     send: str
     guard: bool
-    """Whether the board has guard lines, and reports faults by name."""
+    """Whether the board has guard lines and so names faulty lines."""
     commands: bytes
     """Numbers of the board's commands; see :meth:`Board.command`."""
     units: UnitFacts | None = None
     """Pressure units; None without any."""
     place: SheetPlace | None = None
-    """Number of the sheet, and count of sheets on its FPGA; None for a board with one sheet."""
+    """The sheet's number among several on one FPGA, and their count; None for a board with one sheet."""
     sent: int
     """Frames sent since power-up."""
     epoch: int
@@ -83,16 +82,15 @@ class Hello:
     heard: int
     """Number of the last request received."""
     stuck: int
-    """Columns that read pressed while no row was driven, in the last packed frame; 7 means 7 or more."""
+    """Columns that read pressed while no row was driven, as of the last packed frame; 7 means 7 or more."""
 
     @property
     def self_test(self) -> bool:
-        """Whether the board can test its lines."""
         return SELF_TEST in self.commands
 
     @property
     def pulsed(self) -> bool:
-        """Whether the board needs requests as pulses: it has fewer than 4 clocks per bit."""
+        """Whether requests must be pulses: the board has fewer than 4 clocks per bit."""
         return pulsed(self.clock_hz, self.baud)
 
 
@@ -290,7 +288,6 @@ class Cutter:
 
 
 def report_of(sheet: Sheet) -> str:
-    """The report of a board in words."""
     precise = f" of {sheet.barycenter_bits} fraction bits" if sheet.report == "barycenter" else ""
     return f"report {sheet.report!r}{precise}"
 

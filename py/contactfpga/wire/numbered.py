@@ -1,8 +1,7 @@
 """Packets of several sheets that share one FPGA and its line.
 
 A numbered packet is an ordinary one with two bytes after its stuffed bytes, which the check covers too. Removing them
-and running the CRC backward over them keeps the check right or wrong, so packets are sorted by sheet without the
-check's prefix, and become those of a board of one sheet.
+and running the CRC backward keeps the check right or wrong, so packets can be sorted without the check's prefix.
 """
 
 from __future__ import annotations
@@ -29,7 +28,6 @@ class SheetPlace(NamedTuple):
     """Position of a sheet among those of its FPGA."""
 
     number: int
-    """Number from 0."""
     sheets: int
 
 

@@ -123,8 +123,7 @@ class Frame:
     """Device time of the first row's sample, modulo 2^24 us."""
     flags: frozenset[str]
     overwritten: int
-    """Number of complete frames that newer ones replaced before they were sent, modulo 2^``Widths.overwritten_bits``.
-    """
+    """Number of frames that newer ones replaced before they were sent, modulo 2^``Widths.overwritten_bits``."""
     heard: int
     """Lowest bits of the number of the last request received before the frame's scan; 0: none."""
     zones: int
@@ -142,11 +141,8 @@ class Frame:
 
 
 def decode_frame(plain: bytes, widths: Widths) -> Frame:
-    """Read an unsealed frame of the sheet of ``widths``.
-
-    Raises :class:`PacketError` if its length contradicts its zone count, or, without a mismatch flag, its cells
-    contradict its zones.
-    """
+    """Read an unsealed frame of the sheet of ``widths``. Raises :class:`PacketError` if its length contradicts its zone
+    count, or, without a mismatch flag, its cells contradict its zones."""
     sheet = widths.sheet
     kind = KINDS[sheet.report]
     if kind_of(plain) != kind:
@@ -190,7 +186,6 @@ _NO_CLOSED_RECORDS.flags.writeable = False
 
 
 def no_records(sheet: Sheet) -> np.ndarray:
-    """The records of a frame without zones."""
     return _NO_CLOSED_RECORDS if sheet.closed else NO_RECORDS
 
 

@@ -56,12 +56,10 @@ class UnitFacts:
         return cls(skin.units, units.converter.bits, sums, units.sum_bits, *clocks)
 
     def encode(self) -> bytes:
-        """The field's value in a hello."""
         return _FACTS.pack(*dataclasses.astuple(self))
 
     @classmethod
     def decode(cls, value: bytes) -> UnitFacts:
-        """Read the field's value. Raises ValueError."""
         facts = cls(*_FACTS.unpack_from(value))
         if not (1 <= facts.count <= 1 << INDEX_BITS and 1 <= facts.bits <= MOST_BITS and facts.sweep_clocks):
             raise ValueError(f"{facts.count} units of {facts.bits} bits, {facts.sweep_clocks} clocks a sweep")
@@ -118,13 +116,12 @@ def zero_value(facts: UnitFacts, unit: int, reading: object) -> tuple[int, int]:
 
 
 def threshold_value(facts: UnitFacts, unit: int, deviation: object) -> tuple[int, int]:
-    """(what, value) of the command that sets the deviation from which a unit raises ``contact``; 0: never."""
+    """(what, value) of the command that sets a unit's threshold; 0: never reached."""
     return _value(THRESHOLD, "unit", unit, facts.count, "threshold", deviation, facts.bits)
 
 
 def sum_threshold_value(facts: UnitFacts, index: int, deviation: object) -> tuple[int, int]:
-    """(what, value) of the command that sets a weighted sum's threshold, rounded down to the board's steps, but not to
-    0."""
+    """(what, value) of the command that sets a sum's threshold, rounded down to the board's steps, but not to 0."""
     return _value(SUM_THRESHOLD, "sum", index, facts.sums, "threshold", deviation, facts.sum_bits)
 
 

@@ -6,15 +6,15 @@ blocks share no row or column. Any crossings that join a block may be the really
 
 - a cell may be a ghost if its block has another row and another column: it is a corner of a rectangle of pressed cells;
 - with 4-connectivity a zone is a run of a block's rows times a run of its columns. It may be wholly ghosts if the block
-  has another run of rows and another run of columns. Two runs of rows never have one middle, so zones have the same y
-  only if they share a run of rows; likewise columns and x.
+  has another run of rows and another run of columns. Two runs of rows never have one middle, so only zones of one run
+  have the same y; likewise columns and x.
 
-Both hold exactly, in both directions. Zones of one block, found by their common x or y, may also have grown or joined
-by ghosts. A block that is one zone may hide contacts unnoticed if their rows and columns, taken together, have no gap.
+Both hold exactly, in both directions. Zones of one block may also have grown or joined by ghosts. A block that is one
+zone may hide contacts whose rows and columns, taken together, have no gap.
 
-If a switch changes during the scan, rows scanned before lack the change, and corners may be hidden in that frame. But a
-row is read at once, so a ghost's own row shows another cell. So in a frame that differs from the previous one every
-cell or zone with another in its row is suspect; a ghost is missed only if a switch changes twice between two frames.
+If a switch changes during the scan, rows scanned before lack the change, and corners may be hidden. But a row is read
+at once, so a ghost's own row shows another cell. So in a frame that differs from the previous one every cell or zone
+with another in its row is suspect; a ghost is missed only if a switch changes twice between two frames.
 """
 
 from __future__ import annotations

@@ -31,7 +31,6 @@ class Run:
     line: HostLine | HostLines | None
     """Arrival times and times on the host's clock, for all frames or each; None in a recording."""
     before: Frame | None = None
-    """The frame before the first one."""
     faults: tuple[str, ...] = (STUCK,)
     """:attr:`Zones.faults` of flagged frames."""
     history: UnitHistory | None = None

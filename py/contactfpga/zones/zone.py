@@ -141,7 +141,7 @@ class Zones(Sequence[Zone]):
         """Faults that the board noticed, sorted. With guard lines or a self-test these are names: ``row 3 open``,
         ``column 7 open``, ``column 2 stuck`` (it read pressed while no row was driven), ``guard row open`` (all columns
         are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``, or ``unnamed fault`` until
-        the names come. Otherwise ``stuck``; ``board.hello.stuck`` counts the stuck columns."""
+        the names come. Otherwise ``stuck``."""
         self._before = before
         self._line = line
         self._history = history
@@ -171,19 +171,18 @@ class Zones(Sequence[Zone]):
 
     @property
     def units(self) -> UnitSamples | None:
-        """Readings of the pressure units at :attr:`time_us`, interpolated between the samples before and after. None
-        for a board without units, and until both samples have come, usually after the frame: ask again a few sweeps
-        later, but within a second, or take the newest readings from :meth:`Board.events`. Readings once found are kept.
-        """
+        """Readings of the pressure units at :attr:`time_us`, interpolated between two samples. None for a board without
+        units, and until both samples have come, usually after the frame: ask again a few sweeps later, but within a
+        second, or take the newest readings from :meth:`Board.events`."""
         if self._units is None and self._history is not None:
             self._units = self._history.at(self.time_us)
         return self._units
 
     @functools.cached_property
     def flags(self) -> frozenset[str]:
-        """Names from :data:`contactfpga.wire.protocol.FLAGS`; also ``ghost`` if, without diodes, some pressed cells may
-        be ghosts, as a zone (:attr:`Zone.ghost`) or within one, and ``motion`` if a zone moved by more than a pitch
-        since the scan before, so that its place may be off by as much."""
+        """Names from :data:`contactfpga.wire.protocol.FLAGS`; also ``ghost`` if, without diodes, pressed cells may be
+        ghosts, and ``motion`` if a zone moved by more than a pitch since the scan before, so that its place may be off
+        by as much."""
         found = set()
         if self.sheet.ghosts and self._has_ghosts():
             found.add("ghost")
@@ -278,8 +277,8 @@ class Zones(Sequence[Zone]):
         return array
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row per zone: :attr:`time_us`, :attr:`sequence`, and the fields of :attr:`array`; ``point_mm`` and
-        ``normal`` are three columns each (``point_x_mm``). Raises :class:`MissingExtra` without pandas."""
+        """A row per zone: :attr:`time_us`, :attr:`sequence`, and the fields of :attr:`array`, with ``point_mm`` and
+        ``normal`` in three columns each. Raises :class:`MissingExtra` without pandas."""
         return tables.to_pandas(self.array, time_us=self.time_us, sequence=self.sequence)
 
     def to_arrow(self) -> pyarrow.Table:
@@ -363,7 +362,7 @@ class Zones(Sequence[Zone]):
         return self.svg()
 
     def svg(self, width_px: int = notebook.WIDTH_PX) -> str:
-        """Picture of the sheet as SVG: pressed cells where they are known, and a circle of each zone's area."""
+        """SVG of the sheet: known pressed cells, and a circle of each zone's area."""
         sheet = self.sheet
         circles = [
             (zone.x_mm, zone.y_mm, notebook.radius_mm(zone.area_mm2))
@@ -418,7 +417,6 @@ class HostLine(NamedTuple):
     """Arrival of frames, and the linear map from device time to the host's clock as known then."""
 
     arrived_s: float
-    """Arrival of the frames' last bytes."""
     base_us: int
     """Reference device time."""
     base_s: float
@@ -450,11 +448,9 @@ class HostLines:
         return at_s
 
     def of(self, index: int) -> HostLine:
-        """The line of one frame."""
         return HostLine(*(values[index].item() for values in self._fields()))
 
     def after(self, index: int) -> HostLines:
-        """The lines without the first ``index`` ones."""
         return HostLines(*(values[index:] for values in self._fields()))
 
     def _fields(self) -> tuple[np.ndarray, ...]:
