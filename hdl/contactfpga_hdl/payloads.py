@@ -20,7 +20,6 @@ def row_bits(derived: Derived) -> int:
 
 
 def moments_layout(derived: Derived) -> data.StructLayout:
-    """Exact moments of a set of cells."""
     return data.StructLayout({"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits})
 
 

@@ -250,7 +250,6 @@ class Top(wiring.Component):
 
 
 def receiver_of(derived: Derived) -> wiring.Component:
-    """The receiver for the receive pin."""
     if not derived.pulsed:
         return Receiver(derived.bit_clocks)
     from contactfpga_hdl.link.pulses import PulseReceiver

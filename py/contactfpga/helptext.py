@@ -17,8 +17,6 @@ _MADE = {"property", "cached_property", "functools.cached_property"}
 
 
 class Field(NamedTuple):
-    """An attribute of a class."""
-
     name: str
     declared: str
     """Name with type and default, where these are stated."""

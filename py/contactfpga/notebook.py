@@ -85,7 +85,6 @@ def over_the_seam(circles: Iterable[Circle], around_mm: float, pitch_mm: float) 
 
 
 def radius_mm(area_mm2: float) -> float:
-    """Radius in mm of a circle of this area."""
     return math.sqrt(area_mm2 / math.pi)
 
 

@@ -20,10 +20,8 @@ PIPE_WIDTH = 160
 """Width of tables and pictures for a stream without a width."""
 
 USUAL_WIDTH, USUAL_HEIGHT = 80, 24
-"""Size of a terminal that does not report one."""
 
 NARROWEST = 20
-"""Least assumed width."""
 
 _NEAREST = {
     "·": "|",
@@ -49,8 +47,6 @@ _ERRORS = "contactfpga.nearest"
 
 @dataclasses.dataclass(frozen=True)
 class Terminal:
-    """Abilities of a stream."""
-
     width: int
     height: int | None
     """Number of lines; None without a limit."""

@@ -10,13 +10,11 @@ from contactfpga_hdl.board.board_top import platform_for
 
 
 def connector_sites(board: BoardSpec) -> dict[str, str]:
-    """FPGA pin of every connector pin of the platform."""
     platform = platform_for(board)
     return {name: pin for connector in platform.connectors.values() for name, pin in connector}
 
 
 def wire_sites(board: BoardSpec, wires: list[Wire]) -> list[str]:
-    """FPGA pin of each wire."""
     connected, own = connector_sites(board), own_sites(board)
     return [connected[wire.pin] if wire.pin else own[wire.port] for wire in wires]
 

@@ -13,14 +13,11 @@ _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'
 
 @dataclasses.dataclass(frozen=True)
 class Family:
-    """Commands for the FPGAs of a family."""
-
     command: str
     options: str
     before: tuple[str, ...]
     """Yosys commands before synthesis."""
     route: str = ""
-    """Options of nextpnr."""
 
 
 FAMILIES = {
@@ -40,7 +37,6 @@ FAMILIES = {
     # The products have a few bits each; the way to a multiplier and back takes longer than they do.
     "LFE5U": Family("synth_ecp5", "-nodsp", (NO_COLLISIONS,)),
 }
-"""Families by the beginning of the FPGA's name."""
 
 
 def overrides(fpga: str) -> dict[str, str]:

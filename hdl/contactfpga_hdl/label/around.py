@@ -1,12 +1,11 @@
-"""Turns of clusters, runs and cells around a cylinder, for sheets whose ends meet.
+"""Turns of clusters, runs and cells of a sheet whose ends meet (docs/labelling.md).
 
 Columns count on past the seam, over two adjacent turns. A zone's runs, from left to right, are on one turn, or from
-some run on a turn back, because their path to the first one crosses the seam: one bit tells which. The same holds for
-clusters of a group. If two paths disagree by a turn, the zone is a ring around the cylinder.
+some run on a turn back: one bit tells which. The same holds for clusters of a group. If two paths disagree by a turn,
+the zone is a ring around the cylinder.
 
 A group's cells are on the turn of its first cluster and on an adjacent one, the next or the one *back*; ``turned``
-counts the cells on the upper one. When groups merge, their counts move to their present turns. A group that needs a
-third turn is ``wound``.
+counts the cells on the upper one. A group that needs a third turn is ``wound``.
 """
 
 from typing import Protocol
@@ -119,8 +118,6 @@ def unwrapped(
 
 
 class Acts(Protocol):
-    """Actions of the labeller in a clock."""
-
     enable: Signal
     joins: Signal
     apart: Signal

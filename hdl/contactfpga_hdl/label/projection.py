@@ -1,8 +1,8 @@
 """Zones from their shadows on the two axes: small, and wrong where shadows cross.
 
-Adjacent rows with a pressed cell form a *band*. Within a band the columns with a pressed cell, its shadow, form runs;
-the cells above one run are one zone. So two contacts in one band whose shadows touch are merged, and a ring includes
-its interior. A connected contact is never split; the moments of these zones are exact.
+Adjacent rows with a pressed cell form a *band*; the columns with a pressed cell in a band, its shadow, form runs. The
+cells above one run are one zone. So two contacts whose shadows touch are merged, and a ring includes its interior. A
+connected contact is never split; the moments of these zones are exact.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value

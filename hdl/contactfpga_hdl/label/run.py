@@ -1,13 +1,11 @@
-"""Contact zones and their moments, in one pass over the rows as they arrive.
+"""Contact zones and their moments, in one pass over the rows as they arrive (docs/labelling.md).
 
-Two adjacent rows are combined. The connected pieces of these rows alone, *clusters*, are walked from left to right, one
-run of each row per clock. Two bits per run describe the connections further up: whether a run of the same zone precedes
-it in its row, and whether one follows. Zones never cross in the plane, so these bits nest like brackets, and a stack
-replaces equivalence tables: a zone with more runs to the right waits on the stack, and the innermost is always needed
-next.
+The connected pieces of two adjacent rows alone, *clusters*, are walked from left to right, one run of each row per
+clock. Two bits per run tell whether a run of the same zone precedes it in its row, and whether one follows. Zones never
+cross in the plane, so these bits nest like brackets, and a stack replaces equivalence tables.
 
 A zone's moments are in a table at the start column of its first run in the row (halved with 8-connectivity). Runs of
-different zones in the same or adjacent rows never share a place, so the table needs no allocation and cannot overflow.
+different zones in the same or adjacent rows never share a place, so the table cannot overflow.
 """
 
 from amaranth.hdl import Module, Mux, Signal

@@ -1,9 +1,8 @@
 """Contact zones and their moments, one cell per clock, in little more than an adder and three memories.
 
-Rows, clusters and brackets are those of ``docs/labelling.md``, walked a column at a time. Each column takes a clock, in
-which its cell is added to the walked cluster's group. At the start of a run of the row before, a second clock adds its
-zone's moments, from the table or from a waiting group. Waiting groups are in the table, too, each at a place in its
-cluster, linked to the group that began to wait before.
+Rows, clusters and brackets are those of docs/labelling.md. Each column takes a clock, in which its cell is added to the
+walked cluster's group. At the start of a run of the row before, a second clock adds its zone's moments, from the table
+or from a waiting group. Waiting groups are in the table, too, each linked to the group that began to wait before.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value

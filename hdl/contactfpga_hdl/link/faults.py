@@ -99,7 +99,6 @@ def _digits(word: Value) -> list[Value]:
 
 
 def report_of(bits: int, word: int) -> bytes:
-    """A stuffed fault report."""
     return cobs_encode(faults.encode_faults(word, bits))
 
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from contactfpga_hdl.link.between import Readings, Reports
 
 HELLO_REGION = 3
-"""Region of the hello; the others hold frames."""
 
 STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
@@ -295,7 +294,6 @@ class Link(wiring.Component):
 
 
 def hello_words(skin: Skin) -> range:
-    """Addresses of the hello in the memory."""
     first = HELLO_REGION << offset_bits(skin)
     return range(first, first + len(stored_hello(skin)))
 

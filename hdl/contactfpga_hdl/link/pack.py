@@ -10,7 +10,6 @@ from contactfpga.wire import protocol
 from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 
 FULL_BLOCK = 255
-"""Length of a full COBS block."""
 
 
 def verdict_layout(derived: Derived) -> data.StructLayout:

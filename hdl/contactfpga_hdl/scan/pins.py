@@ -41,7 +41,6 @@ def column_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def drives_columns_both_ways(skin: Skin) -> bool:
-    """Whether columns are driven to either level."""
     return skin.reads_rows and (skin.guard or skin.self_test)
 
 
@@ -174,7 +173,6 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
 
 
 def moves_sample(derived: Derived) -> bool:
-    """Whether the scan obeys the command "sample at"."""
     return SAMPLE_AT in derived.commands
 
 

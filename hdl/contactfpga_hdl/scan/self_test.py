@@ -16,7 +16,6 @@ from contactfpga_hdl.scan.guard import checked_rows
 from contactfpga_hdl.scan.stuck import anywhere
 
 SEEN = 2
-"""Clocks from a level to a synchronizer's output."""
 
 
 class SelfTest(wiring.Component):

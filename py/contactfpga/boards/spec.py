@@ -58,7 +58,6 @@ class Bridge:
         return (512 if self.high_speed else 64) - 2
 
     def nearest(self, baud: int) -> float:
-        """The chip's actual rate for ``baud``."""
         eighths = max(16, round(8 * self.max_baud / baud))
         rates = [self.max_baud, self.max_baud / 1.5, 8 * self.max_baud / eighths]
         return min(rates, key=lambda rate: abs(rate - baud))
@@ -89,7 +88,6 @@ class BoardSpec:
     pll: str
     """PLL cell for other clocks, which depends on the crystal's pin."""
     connectors: Mapping[str, str]
-    """Print beside each connector."""
     row_side: tuple[str, ...]
     column_side: tuple[str, ...]
     contact: str
@@ -99,7 +97,6 @@ class BoardSpec:
     bridge: Bridge
     programmer: Programmer
     bitstream: str
-    """File ending of the bitstream."""
     constraints: str
     """File in constraints/, common to boards with the same pins."""
     skin: Skin
@@ -167,7 +164,6 @@ class BoardSpec:
             pll.dividers(self.pll, self.clock_hz, skin.clock_hz)
 
     def check_pins(self, skin: Skin | Several) -> None:
-        """Raise SkinError for more wires than pins."""
         if isinstance(skin, Several):
             self._check_sheets(skin)
         else:
@@ -240,5 +236,4 @@ def pins_of(connector: str, numbers: str) -> tuple[str, ...]:
 
 
 def bitstream_path(board: BoardSpec, folder: Path) -> Path:
-    """Path of a build's bitstream."""
     return folder / f"{NAME}.{board.bitstream}"

@@ -50,8 +50,6 @@ _CONVERTER_PINS = {
 
 @dataclasses.dataclass(frozen=True)
 class Connection:
-    """The destination of a line."""
-
     leads_to: str
     """Destination such as ``row 3``, ``guard column``, ``nothing``."""
     kind: str = ""
@@ -62,8 +60,6 @@ class Connection:
 
 @dataclasses.dataclass(frozen=True)
 class Wire:
-    """An FPGA pin of the gateware."""
-
     port: str
     """Name in the constraints, with the bit of a wide port: ``rows[3]``, ``uart rx``."""
     pin: str

@@ -34,7 +34,6 @@ def trusted(trust: bool) -> Iterator[None]:
 
 
 def trusting() -> bool:
-    """Whether the caller is inside :func:`trusted`."""
     return _trusting.get()
 
 
@@ -58,7 +57,6 @@ class Choice:
     name: str
     """Name in a Skin: a built-in name, or the ``module:attribute`` of this object."""
     title: str
-    """Label in charts and tables."""
     gateware: str
     """``module:attribute`` of the gateware's class, which is called with the Skin; "": none."""
     golden: str

@@ -93,5 +93,4 @@ CONVERTERS: dict[str, Converter] = {
 
 
 def find(value: object) -> Converter:
-    """The converter that ``value`` names or is. Raises SkinError."""
     return find_choice(Converter, CONVERTERS, value)

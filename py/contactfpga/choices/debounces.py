@@ -62,5 +62,4 @@ DEBOUNCES: dict[str, Debounce] = {
 
 
 def find(value: object) -> Debounce:
-    """The debounce that ``value`` names or is. Raises SkinError."""
     return find_choice(Debounce, DEBOUNCES, value)

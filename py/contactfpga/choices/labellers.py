@@ -79,5 +79,4 @@ LABELLERS: dict[str, Labeller] = {
 
 
 def find(value: object) -> Labeller:
-    """The labeller that ``value`` names or is. Raises SkinError."""
     return find_choice(Labeller, LABELLERS, value)

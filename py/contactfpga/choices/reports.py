@@ -8,13 +8,9 @@ from typing import Literal
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Report:
-    """The content of a frame."""
-
     name: str
     title: str
-    """Label in charts and tables."""
     kind: int
-    """Packet kind."""
     code: int
     """Code in a hello."""
     zones: bool

@@ -39,7 +39,6 @@ class Scan(Choice):
     choice_clocks: Bound
     """Clocks from a strobe until the next rows are known; 0 if known beforehand."""
     max_frame_slots: Bound
-    """The most row times of a frame."""
     max_frame_clocks: Bound
     """The most clocks of a frame, from first to last sample."""
     min_row_clocks: Bound
@@ -162,5 +161,4 @@ SCANS: dict[str, Scan] = {
 
 
 def find(value: object) -> Scan:
-    """The scan that ``value`` names or is. Raises SkinError."""
     return find_choice(Scan, SCANS, value)

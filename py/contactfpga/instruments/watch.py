@@ -43,8 +43,6 @@ class Suspicion:
 
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """Thresholds of suspicion in device time."""
-
     stuck_us: int
     others: int
     flutter_hz: float
@@ -98,8 +96,6 @@ SECOND_US = 1_000_000
 
 
 class CellHistory:
-    """Pressed cells over time."""
-
     def __init__(self, first: Zones, limits: Limits, present: np.ndarray):
         """``present``: (rows, columns) bool, False where the Skin's mask has no switch."""
         assert first.cells is not None
@@ -207,7 +203,6 @@ Record = tuple[int, int, int]
 """Area and sums of a zone, or area and barycenter."""
 
 Key = tuple[int, int, int, str]
-"""A record, and :attr:`Zone.winding`."""
 
 _AROUND = {"ring": "a ring around the sheet", "wound": "wound around the sheet"}
 
@@ -216,7 +211,6 @@ class ZoneHistory:
     """Zones over time; an unchanged record is the same zone."""
 
     def __init__(self, first: Zones, limits: Limits, present: np.ndarray):
-        """``present`` as in :class:`CellHistory`."""
         self._limits = limits
         self._present = present
         self._sheet = first.sheet

@@ -210,7 +210,6 @@ def _check_ghosts(skin: Skin, mask: Mask) -> None:
 
 
 def check_link(skin: Skin) -> None:
-    """Check clock, baud rate and report."""
     _within("barycenter_bits", skin.barycenter_bits, 0, limits.MAX_BARYCENTER_BITS)
     if skin.report != "barycenter":
         _left_out(skin, "barycenter_bits", "set report = 'barycenter'")

@@ -136,7 +136,6 @@ class Widths:
 
     @functools.cached_property
     def max_frame_bytes(self) -> int:
-        """Bytes of the longest frame on the wire."""
         return self.max_stored_bytes + CHECK_BYTES + 1
 
 
@@ -325,7 +324,6 @@ class Derived(Widths):
 
     @property
     def debounce_clocks(self) -> int:
-        """Latency of a row in the debounce, in clocks."""
         return self.skin.columns + 3 if self.debounced else 0
 
     @property
@@ -356,7 +354,6 @@ class Derived(Widths):
 
     @property
     def min_keep_alive_ms(self) -> float:
-        """Least keep-alive time of a waiting scan, in ms."""
         return (self._spare_toggles + 1) * (1 << KEEP_ALIVE_BIT) / 1000
 
     @property

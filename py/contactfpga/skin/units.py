@@ -25,8 +25,6 @@ MAX_SUMS, MAX_WEIGHT = 4, 127
 
 @dataclasses.dataclass(frozen=True)
 class Units:
-    """Quantities of a Skin with pressure units."""
-
     skin: Skin
 
     @functools.cached_property

@@ -13,9 +13,7 @@ from contactfpga.surfaces.mesh import Mesh
 from contactfpga.surfaces.shapes import Floats, SurfaceError
 
 FINE = 8
-"""Rays per pitch for measuring arc lengths."""
 CHUNK = 2_000_000
-"""Pairs of ray and triangle per batch."""
 EDGE = 0.8
 """Cosine of the angle from which two triangles form an edge, not a round surface."""
 MAX_AROUND = 20_000_000
@@ -110,7 +108,6 @@ class Placement:
     pitch_x_mm: float
     pitch_y_mm: float
     rotation: Floats
-    """(3, 3)."""
     origin_mm: Floats
 
     def projected(self, mesh: Triangles) -> Mesh:

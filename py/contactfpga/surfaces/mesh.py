@@ -17,7 +17,6 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, le
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
 MAX_BYTES = 8 * 3 * MAX_LINES**2
-"""Bytes of the largest array."""
 BEYOND = 1.0
 """Pitches beyond the outermost cells to which the surface is extrapolated."""
 STEPS = 30
@@ -76,7 +75,6 @@ class Mesh:
             raise SurfaceError(f"{path}: {error}") from None
 
     def save(self, path: str | Path) -> None:
-        """Write the table as a .npz file."""
         pitch = np.array([self.pitch_x_mm, self.pitch_y_mm])
         with replaced(path) as new, open(new, "wb") as file:
             np.savez(file, points_mm=self.points_mm, normals=self.normals, pitch_mm=pitch, closed=np.array(self.closed))

@@ -20,7 +20,6 @@ SAME_S = 0.003
 """Time for which a barycenter's error stays the same: it jumps with a cell, so denser frames add nothing."""
 
 COAST_S = 0.05
-"""Longest extrapolation by a speed."""
 
 
 class Known(NamedTuple):
@@ -31,7 +30,6 @@ class Known(NamedTuple):
     speed: float
 
     def later(self, seconds: float) -> Known:
-        """The covariance after a time of random acceleration."""
         spread = SUDDEN * seconds
         place = self.place + seconds * (2 * self.both + seconds * (self.speed + spread / 3))
         return Known(place, self.both + seconds * (self.speed + spread / 2), self.speed + spread)
@@ -43,8 +41,6 @@ NEW = Known(0.0, 0.0, FAST_MM_S**2)
 
 @dataclasses.dataclass(slots=True)
 class Member:
-    """A contact of a spot."""
-
     id: int
     since_us: int
     area_mm2: float
@@ -79,7 +75,6 @@ class Spot:
         self.known = Known(error_mm2(zone), 0.0, self.known.speed)
 
     def ahead(self, time_us: int) -> tuple[float, float]:
-        """Expected place in mm at a time."""
         seconds = min((time_us - self.seen_us) / 1e6, COAST_S)
         return self.fx + self.vx * seconds, self.fy + self.vy * seconds
 

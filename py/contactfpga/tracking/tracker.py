@@ -91,7 +91,6 @@ class Tracker:
         return restarted
 
     def _step(self, zones: Zones) -> list[Zone]:
-        """Process a frame; returns the zones without a contact."""
         pairs, lost, free = self._paired([zone for zone in zones if zone.x_mm is not None])
         winding = [zone for zone in zones if zone.winding]
         unsure = [zone for zone in free if zone.ghost] + winding

@@ -23,7 +23,6 @@ from contactfpga.wire.hello import HEARD_DIGITS
 from contactfpga.wire.protocol import KIND_REQUEST, REQUEST_HELLO, may_number
 
 KIND_COMMAND = 10
-"""Packet kind of commands."""
 WHAT_DIGITS, VALUE_DIGITS = 1, 3
 MOST_WHAT, MOST_VALUE = (1 << DIGIT_BITS * WHAT_DIGITS) - 1, (1 << DIGIT_BITS * VALUE_DIGITS) - 1
 
@@ -39,8 +38,6 @@ COMMANDS = {
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """An action of a board."""
-
     what: int
     """Key of :data:`COMMANDS`."""
     value: int = 0
@@ -73,8 +70,6 @@ _SIZES = {KIND_REQUEST: HEARD_DIGITS + 1, KIND_COMMAND: HEARD_DIGITS + WHAT_DIGI
 
 
 class RequestKind(enum.Enum):
-    """The strongest request in some bytes."""
-
     REQUEST = "requests for a frame or a hello, which change nothing"
     COMMAND = "a command"
     OTHER = "something that no host sends"

@@ -11,7 +11,6 @@ KIND_FAULTS = 9
 SLOT = 1
 """Flag of a packet with a slot of the self-test."""
 SLOT_DIGITS = 2
-"""Digits of a slot's number."""
 
 STUCK, UNNAMED = "stuck", "unnamed fault"
 """A fault without a name, and one before its name arrives."""

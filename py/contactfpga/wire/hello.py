@@ -49,7 +49,6 @@ _SIZES = {
 """Least bytes of a field by type."""
 _MANDATORY = {SHEET, STATE, PITCH, FINGERPRINT, RATES}
 _MOST_BYTES = 8192
-"""Most bytes of a hello."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -293,7 +292,6 @@ def report_of(sheet: Sheet) -> str:
 
 
 def describe(hello: Hello) -> str:
-    """The Skin of a board's hello in words."""
     sheet = hello.sheet
     name = f" named {hello.name!r}" if hello.name else ""
     return (

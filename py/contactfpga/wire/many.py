@@ -40,8 +40,6 @@ FIELDS = np.dtype(
 
 @dataclasses.dataclass(frozen=True)
 class PacketTable:
-    """Consecutive packets."""
-
     packets: np.ndarray
     """(n,) of :data:`FIELDS`."""
     starts: np.ndarray
@@ -53,7 +51,6 @@ class PacketTable:
     """
 
     def part(self, start: int, end: int) -> PacketTable:
-        """The table of packets ``start`` to ``end`` - 1."""
         return PacketTable(self.packets[start:end], self.starts[start : end + 1], self.records)
 
 

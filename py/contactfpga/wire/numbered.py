@@ -15,7 +15,6 @@ from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
 
 KIND_NUMBERED = 11
 NUMBER_BYTES = 2
-"""Additional bytes of a numbered packet."""
 _BLOCK = 2
 """COBS code of a zero after the packet and of a block of one byte."""
 _MARKS = (0x80, 0x80, 0xFC)
@@ -32,7 +31,6 @@ class SheetPlace(NamedTuple):
 
 
 def closing(number: int) -> bytes:
-    """The two additional bytes of a numbered packet."""
     return bytes([_BLOCK, framing.last_byte(KIND_NUMBERED, number)])
 
 

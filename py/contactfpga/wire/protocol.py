@@ -87,7 +87,6 @@ FLAGS = ("overflow", "mismatch", "fault", "motion")
 """Names of a frame's flags, lowest bit first."""
 
 KIND_REQUEST = 5
-"""Packet kind of requests."""
 REQUEST_HELLO = 1
 """Flag of a request for a hello as well."""
 
@@ -190,7 +189,6 @@ def no_records(sheet: Sheet) -> np.ndarray:
 
 
 FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << len(FLAGS))]
-"""Flags of a frame by the flag bits of its last byte."""
 
 
 def _check_sums(frame: Frame, widths: Widths) -> None:

@@ -24,7 +24,6 @@ OVER, ARMED = 1, 2
 """Flags: a threshold is reached; a threshold is set."""
 
 MOST_BITS = 28
-"""Most bits of a reading."""
 MOST_SUM_BITS = MOST_BITS + 7 + 3
 """Most bits of a sum's magnitude: readings times weights of seven bits, over eight units."""
 
@@ -34,11 +33,8 @@ FACTS_BYTES = _FACTS.size
 
 @dataclasses.dataclass(frozen=True)
 class UnitFacts:
-    """Pressure units in a hello."""
-
     count: int
     bits: int
-    """Bits of a reading."""
     sums: int
     sum_bits: int
     """Bits of the largest magnitude of a sum; 0 without sums."""
@@ -49,7 +45,6 @@ class UnitFacts:
 
     @classmethod
     def of(cls, units: Units) -> UnitFacts:
-        """The pressure units of a Skin's board."""
         skin = units.skin
         sums = len(skin.unit_sums)
         clocks = units.spacing_clocks, units.sweep_clocks
@@ -80,16 +75,13 @@ class Sweep:
     over: bool
     """Whether a threshold is reached."""
     armed: bool
-    """Whether the board has a threshold."""
 
 
 def plain_bytes(units: int, bits: int) -> int:
-    """Plain bytes of a sweep's packet."""
     return units * digits_of_reading(bits) + TRAILER_DIGITS + 1
 
 
 def encode_sweep(sweep: Sweep, bits: int) -> bytes:
-    """The plain bytes of a sweep's packet."""
     data = b"".join(digits(reading, digits_of_reading(bits)) for reading in sweep.readings)
     trailer = digits(sweep.sequence << TIME_BITS | sweep.time_us, TRAILER_DIGITS)
     return data + trailer + bytes([last_byte(KIND_UNITS, OVER * sweep.over | ARMED * sweep.armed)])

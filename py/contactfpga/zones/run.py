@@ -27,20 +27,16 @@ class Run:
     records: np.ndarray
     """(m, 3) int64, or (m, 4) for a sheet whose ends meet."""
     times_us: np.ndarray
-    """(n,) int64 times since power-up."""
     line: HostLine | HostLines | None
     """Arrival times and times on the host's clock, for all frames or each; None in a recording."""
     before: Frame | None = None
     faults: tuple[str, ...] = (STUCK,)
-    """:attr:`Zones.faults` of flagged frames."""
     history: UnitHistory | None = None
-    """History of the board's pressure units."""
 
     def __len__(self) -> int:
         return len(self.packets)
 
     def after(self, index: int) -> Run:
-        """The run without its first ``index`` frames."""
         return dataclasses.replace(
             self,
             packets=self.packets[index:],

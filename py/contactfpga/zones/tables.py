@@ -17,7 +17,6 @@ VECTORS = {
     "point_mm": ("point_x_mm", "point_y_mm", "point_z_mm"),
     "normal": ("normal_x", "normal_y", "normal_z"),
 }
-"""Fields of three numbers, and their columns."""
 
 
 def columns(records: np.ndarray, **same: int) -> dict[str, np.ndarray]:

@@ -11,9 +11,7 @@ from collections.abc import Sequence
 from contactfpga.wire.units import Sweep, UnitFacts
 
 KEPT = 8192
-"""Stored sweeps, about a second."""
 _ROUNDING = 1 / math.sqrt(12)
-"""Standard deviation of rounding to whole steps."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

@@ -240,7 +240,6 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def suspects(self) -> list[bool]:
-        """:attr:`Zone.ghost` of each of :attr:`records`."""
         if not self.sheet.ghosts:
             return [False] * len(self)
         if self.frame.bitmap is None:
@@ -424,7 +423,6 @@ class HostLine(NamedTuple):
     rate: float
     """Seconds of the host's clock per second of device time."""
     sigma_s: float
-    """Standard deviation of :meth:`at`."""
 
     def at(self, time_us: Times) -> float | Times:
         """The host's clock in s at a device time in us, at most :attr:`arrived_s`."""
@@ -443,7 +441,6 @@ class HostLines:
     sigma_s: np.ndarray
 
     def at(self, times_us: np.ndarray) -> np.ndarray:
-        """(n,) results of :meth:`HostLine.at`."""
         at_s: np.ndarray = np.minimum(self.base_s + (times_us - self.base_us) * (self.rate * 1e-6), self.arrived_s)
         return at_s
 
