@@ -23,7 +23,8 @@ class Dual(wiring.Component):
     The only state here is the restart's counter, which always ends, and the register at ``contact``, written every
     clock.
 
-    first (component): may have probes, which are passed on. second (component): the same without probes.
+    first (component): may have probes, which are passed on.
+    second (component): the same without probes.
     """
 
     def __init__(self, skin: Skin, first: wiring.Component, second: wiring.Component):

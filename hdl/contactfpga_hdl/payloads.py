@@ -103,7 +103,8 @@ def row_number(m: Module, derived: Derived, row: data.View, taken: Value) -> Val
 def labeller_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of a labeller.
 
-    rows (in): a frame's rows in ascending order. records (out): the frame's zones, then an end mark.
+    rows (in): a frame's rows in ascending order.
+    records (out): the frame's zones, then an end mark.
     """
     return {
         "rows": In(stream.Signature(row_layout(derived))),

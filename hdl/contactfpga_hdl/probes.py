@@ -11,9 +11,10 @@ from contactfpga_hdl.payloads import zone_layout
 def probe_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of the probes; each ``transfer`` is high in clocks in which the others hold a payload.
 
-    row_transfer, row_cells, row_last (out): rows at the labeller. record_transfer, record_data, record_end (out): zone
-    records, or with ``report = "cells"`` bitmap rows. item_transfer, item_data, item_end (out): with ``report =
-    "barycenter"``, the divided records. byte_transfer, byte_data (out): bytes.
+    row_transfer, row_cells, row_last (out): rows at the labeller.
+    record_transfer, record_data, record_end (out): zone records, or with ``report = "cells"`` bitmap rows.
+    item_transfer, item_data, item_end (out): with ``report = "barycenter"``, the divided records.
+    byte_transfer, byte_data (out): bytes.
     """
     divides = derived.skin.report == "barycenter"
     item = Out(8 * derived.item_bytes)

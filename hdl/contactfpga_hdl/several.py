@@ -67,8 +67,8 @@ class RoundRobin(wiring.Component):
     sheet with nothing to send passes the grant on in the same clock. So a sheet waits for at most one packet of each
     other sheet.
 
-    holds (in), by sheet: a packet begins in this clock, or does not end in it; ignored without the grant. grant (out),
-    by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
+    holds (in), by sheet: a packet begins in this clock, or does not end in it; ignored without the grant.
+    grant (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
     """
 
     def __init__(self, sheets: int):

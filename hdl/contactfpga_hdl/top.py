@@ -28,11 +28,11 @@ class Top(wiring.Component):
 
     rows (out), columns (in): one pin per row and column, or those of shift registers, see
         :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
-    tx (out), rx (in): the UART. contact (out): high while something touches the sheet. With units a clock later, and
-    while a threshold is reached; with
-        ``fail_safe`` a clock later, and while a fault is known or units have no threshold.
-    spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, pins at their converter. alive (out): with
-    ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
+    tx (out), rx (in): the UART.
+    contact (out): high while something touches the sheet. With units a clock later, and while a threshold is reached;
+        with ``fail_safe`` a clock later, and while a fault is known or units have no threshold.
+    spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, pins at their converter.
+    alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
     ``probes`` adds the outputs of :func:`~contactfpga_hdl.probes.probe_ports`.
 

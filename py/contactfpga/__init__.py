@@ -4,10 +4,11 @@
 >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
 >>> for zone in zones:
 ...     print(zone.area_mm2, zone.x_mm, zone.y_mm)
-400.0 55.0 75.0 400.0 95.0 75.0
+400.0 55.0 75.0
+400.0 95.0 75.0
 
-``read_zones()`` reads the board that is plugged in; ``open()`` gives its frames. ``help(contactfpga.Zone)`` lists the
-fields of a zone.
+``read_zones()`` reads the board that is plugged in; ``open()`` gives its frames. ``help(contactfpga.Zone)`` lists a
+zone's fields.
 """
 
 # What it offers is imported when it is used first: so the command `contactfpga` takes Ctrl-C before numpy is loaded.

@@ -34,7 +34,8 @@ class Debounce(wiring.Component):
     A memory has a word per switch: with ``sym_defer_pk`` its state and the samples for which the raw one has differed,
     with ``asym_eager_defer_pk`` the samples until the switch counts as released, or 0.
 
-    raw (in): a frame's rows in ascending order; taken when the row before has left. rows (out): debounced rows.
+    raw (in): a frame's rows in ascending order; taken when the row before has left.
+    rows (out): debounced rows.
     """
 
     def __init__(self, skin: Skin):

@@ -14,9 +14,11 @@ class TimedDebounce(wiring.Component):
 
     Other rows are quiet: no cell reads pressed, and no switch counts as pressed or has a time running.
 
-    raw (in): a frame's rows in ascending order. alone (in): the offered row was driven alone. now (in): row time of its
-    sample, constant for C + 4 clocks unless the scan waits. rows (out): debounced rows. busy (out): a bit per row that
-    was not quiet after its last sample, from the row's offer on.
+    raw (in): a frame's rows in ascending order.
+    alone (in): the offered row was driven alone.
+    now (in): row time of its sample, constant for C + 4 clocks unless the scan waits.
+    rows (out): debounced rows.
+    busy (out): a bit per row that was not quiet after its last sample, from the row's offer on.
     """
 
     def __init__(self, skin: Skin):

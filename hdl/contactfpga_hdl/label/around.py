@@ -31,9 +31,11 @@ class Turns:
     def find(self, m: Module, turn: Value, goes_on: Value, pop: Value, apart: Value, linked: Value) -> None:
         """Determine the turn.
 
-        turn: the turn as known so far. goes_on: a run of the row before has an earlier one of its zone; ``linked``: it
-        is a turn further back than that one. pop: the run or the seam joins a waiting group. apart: the run does not
-        touch the cluster before it, though the group continues.
+        turn: the turn as known so far.
+        goes_on: a run of the row before has an earlier one of its zone; ``linked``: it is a turn further back than that
+            one.
+        pop: the run or the seam joins a waiting group.
+        apart: the run does not touch the cluster before it, though the group continues.
         """
         m.d.comb += [
             self.turn.eq(turn),
@@ -55,10 +57,11 @@ class Turns:
 class Unwrap(Elaboratable):
     """The turns of a group while cells and found groups are added.
 
-    kept, down (in): the group so far, and whether all of it is now known to be a turn back. found, joins, zone (in):
-    the group that joins, or zeros: a zone of the row before, or a waiting group, whose first
+    kept, down (in): the group so far, and whether all of it is now known to be a turn back.
+    found, joins, zone (in): the group that joins, or zeros: a zone of the row before, or a waiting group, whose first
         cluster becomes the group's.
-    turn, cells (in): turn of the walked cluster, and number of its new cells. ring (in): the group becomes a ring.
+    turn, cells (in): turn of the walked cluster, and number of its new cells.
+    ring (in): the group becomes a ring.
     group (out): the resulting group.
     """
 

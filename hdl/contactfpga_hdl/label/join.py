@@ -41,10 +41,11 @@ def _runs(derived: Derived) -> int:
 class Brackets(wiring.Component):
     """Whether runs of a row have an earlier or a later run of their zone in this row.
 
-    enable (in): nothing changes without it. marks (in): marks of a step, zeros for none; they count from the next
-    clock. passes (in): the run of the row before is passed. earlier, later (out): that run has an earlier, or a later,
-    run of its zone in its row. turned (out): on a sheet whose ends meet, the run is a turn further back than the
-    earlier one.
+    enable (in): nothing changes without it.
+    marks (in): marks of a step, zeros for none; they count from the next clock.
+    passes (in): the run of the row before is passed.
+    earlier, later (out): that run has an earlier, or a later, run of its zone in its row.
+    turned (out): on a sheet whose ends meet, the run is a turn further back than the earlier one.
     """
 
     def __init__(self, derived: Derived):
@@ -91,8 +92,10 @@ def _bit(condition: Value, number: Value) -> Value:
 class Join(wiring.Component):
     """Assigns the new row's runs to zones, and each step's moments to a zone.
 
-    enable (in): nothing changes without it. valid, step (in): from the walk. lookup (out): place of the stored group
-    that is added, if any. join_valid, join (out): one clock after the step.
+    enable (in): nothing changes without it.
+    valid, step (in): from the walk.
+    lookup (out): place of the stored group that is added, if any.
+    join_valid, join (out): one clock after the step.
     """
 
     def __init__(self, derived: Derived):

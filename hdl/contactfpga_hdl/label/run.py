@@ -54,9 +54,10 @@ class RunLabeller(wiring.Component):
 class Sum(wiring.Component):
     """Adds up the moments of each zone.
 
-    enable (in): nothing changes without it. valid, join (in): a step's addition to its zone, and the zone's fate.
-    lookup (in): one clock before ``join``, the place of the data that it loads. records (out): in the clock of the step
-    that closes the zone.
+    enable (in): nothing changes without it.
+    valid, join (in): a step's addition to its zone, and the zone's fate.
+    lookup (in): one clock before ``join``, the place of the data that it loads.
+    records (out): in the clock of the step that closes the zone.
     """
 
     def __init__(self, derived: Derived):

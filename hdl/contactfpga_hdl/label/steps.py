@@ -147,8 +147,8 @@ class _Left:
 class Walk(wiring.Component):
     """Cuts two adjacent rows into steps, one per clock while ``enable`` is high.
 
-    rows (in): taken when the row before is cut; the first step is cut two clocks later. step_valid, step (out): one
-    clock after the step is cut.
+    rows (in): taken when the row before is cut; the first step is cut two clocks later.
+    step_valid, step (out): one clock after the step is cut.
     """
 
     def __init__(self, derived: Derived):

@@ -10,8 +10,9 @@ TICK_US = 1000
 class Alive(wiring.Component):
     """Toggles every :data:`TICK_US` if the sheet was well since the last chance, for a watchdog or a safety relay.
 
-    well (in): pulse when a whole frame is packed, or an untouched sheet was checked. fault (in): high while a fault is
-    reported, which cancels an earlier ``well``. pin (out): from a register.
+    well (in): pulse when a whole frame is packed, or an untouched sheet was checked.
+    fault (in): high while a fault is reported, which cancels an earlier ``well``.
+    pin (out): from a register.
     """
 
     def __init__(self, clocks_per_us: int):

@@ -31,7 +31,8 @@ class Wire(Protocol):
 class Reports:
     """Fault reports, and slots of a self-test, among a link's packets.
 
-    sent: whether the last packet taken is one of these. byte: offered byte.
+    sent: whether the last packet taken is one of these.
+    byte: offered byte.
     """
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):

@@ -15,11 +15,15 @@ class Reporter(wiring.Component):
     report: while none is on the wire, a byte is compared in each clock. Each digit is read in the clock before its byte
     is offered, so a report may mix the words before and after a change; then another follows.
 
-    word (in): fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`. slots (in): with ``self_test``, slots to
-    be sent; ``ready`` in the clock after a slot's last byte was taken. greeted (in): pulse when a hello is sent. taken
-    (in): pulse when the packet that is ``due`` is sent. sends (in): high from the next clock until the wire is idle
-    again. place, fetches (in): place of the byte offered from the next clock; at the end ``place`` is ``length``. due
-    (out): a packet waits. length (out): length of that packet. byte (out): offered byte.
+    word (in): fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`.
+    slots (in): with ``self_test``, slots to be sent; ``ready`` in the clock after a slot's last byte was taken.
+    greeted (in): pulse when a hello is sent.
+    taken (in): pulse when the packet that is ``due`` is sent.
+    sends (in): high from the next clock until the wire is idle again.
+    place, fetches (in): place of the byte offered from the next clock; at the end ``place`` is ``length``.
+    due (out): a packet waits.
+    length (out): length of that packet.
+    byte (out): offered byte.
     """
 
     def __init__(self, skin: Skin):

@@ -52,15 +52,18 @@ class Link(wiring.Component):
     The hello is fixed except for the digits of its state, each read in the clock before its byte is offered.
     :mod:`contactfpga_hdl.link.between` has the order of packets.
 
-    frames (in): see :func:`~contactfpga_hdl.link.pack.frames_signature`. tag, summary (in): describe the frame from
-    ``frames.decide`` to ``frames.commit``. asked (in): pulse when a hello is wanted. epoch (in): pulse every 2^22 us.
-    time (in): device time in us, of a scan that waits. due (out): a frame is to be sent although nothing has changed.
-    number (in): number of the last request. faults, slots (in): with ``guard`` or ``self_test``, see
-    :class:`~contactfpga_hdl.link.faults.Reporter`. units (in): with units, see
-    :func:`~contactfpga_hdl.units.pack.packet_signature`. bytes (out): stuffed packets; a byte is offered two clocks
-    after the one before was taken. upset (out): high while two frames share a region because a bit of its number
-    flipped by itself; never with ``dual``,
-        which finds more.
+    frames (in): see :func:`~contactfpga_hdl.link.pack.frames_signature`.
+    tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
+    asked (in): pulse when a hello is wanted.
+    epoch (in): pulse every 2^22 us.
+    time (in): device time in us, of a scan that waits.
+    due (out): a frame is to be sent although nothing has changed.
+    number (in): number of the last request.
+    faults, slots (in): with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
+    units (in): with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
+    bytes (out): stuffed packets; a byte is offered two clocks after the one before was taken.
+    upset (out): high while two frames share a region because a bit of its number flipped by itself; never with
+        ``dual``, which finds more.
     grant (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
         packets then include the sheet's number.
     """

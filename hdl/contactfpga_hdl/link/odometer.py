@@ -18,8 +18,9 @@ class Odometer(wiring.Component):
 
     A carry takes two clocks per changing digit. At first all digits are set to 0, a clock each, as memory has no reset.
 
-    sent, epoch (in): pulses to count one more; one carry of each kind may wait. hold (in): no carry begins. place (in),
-    digit (out): the digit at the previous clock's place while no carry is under way; 0 at other places.
+    sent, epoch (in): pulses to count one more; one carry of each kind may wait.
+    hold (in): no carry begins.
+    place (in), digit (out): the digit at the previous clock's place while no carry is under way; 0 at other places.
     """
 
     def __init__(self):

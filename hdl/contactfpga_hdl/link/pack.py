@@ -20,9 +20,11 @@ def verdict_layout(derived: Derived) -> data.StructLayout:
 def frames_signature(derived: Derived, offset_bits: int) -> wiring.Signature:
     """Frames from the packer, the initiator, to the link.
 
-    write: a byte and its offset in the frame's region. decide: pulse as an end mark is taken. verdict (in): the link's
-    decision in that clock, with its numbers until ``commit``. commit: pulse as the frame's last byte is written; later
-    writes belong to another frame. end: in that clock, the offset after the last byte.
+    write: a byte and its offset in the frame's region.
+    decide: pulse as an end mark is taken.
+    verdict (in): the link's decision in that clock, with its numbers until ``commit``.
+    commit: pulse as the frame's last byte is written; later writes belong to another frame.
+    end: in that clock, the offset after the last byte.
     """
     return wiring.Signature(
         {
@@ -60,8 +62,9 @@ class Packer(wiring.Component):
     one write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero
     needs one more.
 
-    items (in): a frame's items and its end mark. tag, summary (in): describe the frame from ``frames.decide`` to
-    ``frames.commit``. frames (out): see :func:`frames_signature`.
+    items (in): a frame's items and its end mark.
+    tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
+    frames (out): see :func:`frames_signature`.
     """
 
     def __init__(self, skin: Skin, offset_bits: int):

@@ -17,8 +17,8 @@ class PulseReceiver(wiring.Component):
     A mark is a byte without bits, which is ``good``; a mark within a byte first makes that byte ``bad``, a clock
     earlier.
 
-    pin (in): the line, through two synchronizer stages. bits (out): see :data:`~contactfpga_hdl.link.uart.LINE_BITS`;
-    ``good`` comes in the clock after a byte's last bit.
+    pin (in): the line, through two synchronizer stages.
+    bits (out): see :data:`~contactfpga_hdl.link.uart.LINE_BITS`; ``good`` comes in the clock after a byte's last bit.
     """
 
     def __init__(self, bit_clocks: int):

@@ -37,11 +37,12 @@ class Records(wiring.Component):
     With ``send = "on_change"`` the frame after a replaced one counts as changed, so that the newest cells always
     arrive. A bit of registers or memory that flips may spoil a frame or two unnoticed.
 
-    item (in), taken (in): a frame's items and its end mark, and the clocks in which the packer takes them. send (in):
-    with the end mark, whether the frame is sent. tag, summary (in): describe the frame in that clock. restart (in):
-    drops the frame being filled. words (out): records and closing words. A frame's first word is offered three clocks
-    after its end mark is taken, if the
-        reader has the frame before; each further word in the clock after the one before is taken.
+    item (in), taken (in): a frame's items and its end mark, and the clocks in which the packer takes them.
+    send (in): with the end mark, whether the frame is sent.
+    tag, summary (in): describe the frame in that clock.
+    restart (in): drops the frame being filled.
+    words (out): records and closing words. A frame's first word is offered three clocks after its end mark is taken, if
+        the reader has the frame before; each further word in the clock after the one before is taken.
     """
 
     def __init__(self, skin: Skin):

@@ -23,12 +23,12 @@ class RequestReader(wiring.Component):
     """Finds requests bit by bit and stores only the number and the check's state. With ``commands`` it also finds
     commands, with kind and value after the number; with ``sheet`` it accepts only packets for this sheet number.
 
-    received (out): high with ``good`` of the closing delimiter of a request or command. hello (out): in that clock,
-    whether a hello is requested. heard, number (out): lowest bits, and all bits, of the packet's number, from the next
-    clock; ``number`` is 0 from the
-        clock after the first bit of the first digit of any later packet.
-    command (out): with ``received``, whether the packet is a command. what, value (out): of the command, until the next
-    packet.
+    received (out): high with ``good`` of the closing delimiter of a request or command.
+    hello (out): in that clock, whether a hello is requested.
+    heard, number (out): lowest bits, and all bits, of the packet's number, from the next clock; ``number`` is 0 from
+        the clock after the first bit of the first digit of any later packet.
+    command (out): with ``received``, whether the packet is a command.
+    what, value (out): of the command, until the next packet.
     """
 
     def __init__(self, commands: bool = False, sheet: int | None = None):

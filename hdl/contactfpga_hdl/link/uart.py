@@ -9,8 +9,8 @@ from amaranth.lib.wiring import In, Out
 class Transmitter(wiring.Component):
     """Bytes in, line level out. A byte takes ten bits of ``bit_clocks``; the next one follows without a gap.
 
-    bytes (in): a byte is taken in the last clock of the stop bit before, or when nothing is sent. pin (out): the line;
-    the start bit begins in the clock after a byte is taken.
+    bytes (in): a byte is taken in the last clock of the stop bit before, or when nothing is sent.
+    pin (out): the line; the start bit begins in the clock after a byte is taken.
     """
 
     def __init__(self, bit_clocks: int):
@@ -52,7 +52,8 @@ class Receiver(wiring.Component):
     Bit n, from 1 for the lowest to 9 for the stop bit, is sampled ``2 + bit_clocks // 2 + n * bit_clocks`` clocks after
     the pin fell. A start bit that is over in its middle is ignored.
 
-    pin (in): the line, through two synchronizer stages. bits (out): see :data:`LINE_BITS`.
+    pin (in): the line, through two synchronizer stages.
+    bits (out): see :data:`LINE_BITS`.
     """
 
     def __init__(self, bit_clocks: int):

@@ -25,10 +25,12 @@ GROUPS = 4
 class Audit(wiring.Component):
     """Counts a frame before and after the labeller; passes as many zones as the frame can carry.
 
-    taken, row (in): a row, in the clock in which the labeller takes it. free (out): that row can be counted. records
-    (in): from the labeller. items (out): the records without delay, up to the frame's capacity. summary (out): valid
-    until the next frame's; ``zones``, ``overflow`` and ``changed`` from one clock after the end mark,
-        ``cells`` and ``mismatch`` from at most seven, before the packer can reach them.
+    taken, row (in): a row, in the clock in which the labeller takes it.
+    free (out): that row can be counted.
+    records (in): from the labeller.
+    items (out): the records without delay, up to the frame's capacity.
+    summary (out): valid until the next frame's; ``zones``, ``overflow`` and ``changed`` from one clock after the end
+        mark, ``cells`` and ``mismatch`` from at most seven, before the packer can reach them.
     """
 
     def __init__(self, skin: Skin):
@@ -88,9 +90,10 @@ class Audit(wiring.Component):
 class Tally(wiring.Component):
     """Moments of each row, one group of columns per clock; an empty row has no group, others up to :data:`GROUPS`.
 
-    taken (in): pulse as ``row`` (in) is taken; only empty rows may be taken while ``busy``. moments (out): a group's
-    share in each clock without ``hold``, from two clocks after ``taken``; otherwise zero. hold (in): no group is
-    counted. busy (out): falls after the last group.
+    taken (in): pulse as ``row`` (in) is taken; only empty rows may be taken while ``busy``.
+    moments (out): a group's share in each clock without ``hold``, from two clocks after ``taken``; otherwise zero.
+    hold (in): no group is counted.
+    busy (out): falls after the last group.
     """
 
     def __init__(self, skin: Skin):

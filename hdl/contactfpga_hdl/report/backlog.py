@@ -14,8 +14,8 @@ class Queue(wiring.Component):
     The queue is empty when the places of the next item in and the next out are equal. There is no other count, so a
     flip in one of them loses or repeats items until the places meet.
 
-    items (in): taken unless all places are. waiting (out): the items in order; each is offered two clocks later at the
-    earliest.
+    items (in): taken unless all places are.
+    waiting (out): the items in order; each is offered two clocks later at the earliest.
     """
 
     def __init__(self, width: int, depth: int):
@@ -51,8 +51,8 @@ class Backlog(wiring.Component):
     """Queue before the division or packing. Its places, ``Derived.backlog`` or more, suffice for any frame, so
     ``passed`` is always ready.
 
-    passed (in): zones, or items if nothing is divided, and end marks. waiting (out): the same in order, each two clocks
-    later at the earliest.
+    passed (in): zones, or items if nothing is divided, and end marks.
+    waiting (out): the same in order, each two clocks later at the earliest.
     """
 
     def __init__(self, skin: Skin):

@@ -12,9 +12,10 @@ from contactfpga_hdl.report.audit import Counts
 class Bitmap(wiring.Component):
     """With ``report = "cells"`` the replacement of labeller and audit: rows enter the frame unchanged.
 
-    rows (in): a frame's rows in ascending order. free (out): the offered row can be counted. items (out): the rows
-    without delay; the end mark follows the last one three clocks later, when it is counted. summary (out): as of
-    :class:`Audit`, without zones.
+    rows (in): a frame's rows in ascending order.
+    free (out): the offered row can be counted.
+    items (out): the rows without delay; the end mark follows the last one three clocks later, when it is counted.
+    summary (out): as of :class:`Audit`, without zones.
     """
 
     def __init__(self, skin: Skin):

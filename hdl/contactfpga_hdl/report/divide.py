@@ -31,7 +31,8 @@ class Divider(wiring.Component):
     While an item waits, the next zone is divided up to its last bit, with which a zone is taken. An end mark passes
     without delay when no item is before it.
 
-    records (in): zones and end marks. items (out): area and barycenter of each, in order.
+    records (in): zones and end marks.
+    items (out): area and barycenter of each, in order.
     """
 
     def __init__(self, skin: Skin):

@@ -30,10 +30,11 @@ class AdaptiveScanner(wiring.Component):
 
     The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`, and:
 
-    tag (out): complete from three clocks after a frame's last strobe to the next frame's. contact (out): rises three
-    clocks after a touch, and falls two clocks after the last strobe of an empty frame. alone (out): the offered row was
-    driven alone. sampled (out): slot of the offered row, counted from power-up. busy (in): with debounce, a bit per row
-    that must stay on the list.
+    tag (out): complete from three clocks after a frame's last strobe to the next frame's.
+    contact (out): rises three clocks after a touch, and falls two clocks after the last strobe of an empty frame.
+    alone (out): the offered row was driven alone.
+    sampled (out): slot of the offered row, counted from power-up.
+    busy (in): with debounce, a bit per row that must stay on the list.
     """
 
     def __init__(self, skin: Skin):

@@ -15,12 +15,15 @@ RETRY_BIT = 16
 class FrameClock(wiring.Component):
     """Counts microseconds, and stores values as a frame begins.
 
-    runs (in): the time advances, at power-up from ``ahead`` clocks after, or before, 0. request (in): pulse when a
-    request is received. heard (in): lowest bits of the number of the last request. frame_begins (in): pulse. time
-    (out): device time in us. epoch (out): pulse in the first clock of each further 2^``EPOCH_BITS`` us. waiting (out):
-    a request was received since the last frame began. begun, requested, known (out): ``time``, ``waiting`` and
-    ``heard`` as the last frame began. upset (out): a bit of the time flipped by itself
-    (:mod:`contactfpga_hdl.util.upset`); not with ``dual``.
+    runs (in): the time advances, at power-up from ``ahead`` clocks after, or before, 0.
+    request (in): pulse when a request is received.
+    heard (in): lowest bits of the number of the last request.
+    frame_begins (in): pulse.
+    time (out): device time in us.
+    epoch (out): pulse in the first clock of each further 2^``EPOCH_BITS`` us.
+    waiting (out): a request was received since the last frame began.
+    begun, requested, known (out): ``time``, ``waiting`` and ``heard`` as the last frame began.
+    upset (out): a bit of the time flipped by itself (:mod:`contactfpga_hdl.util.upset`); not with ``dual``.
     """
 
     def __init__(self, skin: Skin, ahead: int = 0):

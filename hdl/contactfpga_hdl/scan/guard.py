@@ -22,9 +22,11 @@ class LineFaults(wiring.Component):
     ``retry`` toggles finds it good, so an intermittent fault changes the report at most twice per toggle. Fully masked
     lines are not reported.
 
-    rows, columns, stuck (in): lines that a check finds faulty in this clock. checks_rows, checks_columns, checks_stuck
-    (in): lines checked in this clock; columns all or none. round (in): pulse as a round of checks ends, with its last
-    check or later. retry (in): bit ``RETRY_BIT`` of a clock in us. faults (out): reported lines.
+    rows, columns, stuck (in): lines that a check finds faulty in this clock.
+    checks_rows, checks_columns, checks_stuck (in): lines checked in this clock; columns all or none.
+    round (in): pulse as a round of checks ends, with its last check or later.
+    retry (in): bit ``RETRY_BIT`` of a clock in us.
+    faults (out): reported lines.
     """
 
     def __init__(self, skin: Skin):

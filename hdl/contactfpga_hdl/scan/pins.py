@@ -66,11 +66,12 @@ def row_driver(skin: Skin) -> wiring.Signature:
     """Interface of a row driver to the scanner. Direct rows drive the first row at power-up; in an adaptive scan, all
     rows.
 
-    pins (out): pins at the sheet. pattern (in): rows of the next slot as ones, stable from ``shift`` until ``drive``.
+    pins (out): pins at the sheet.
+    pattern (in): rows of the next slot as ones, stable from ``shift`` until ``drive``.
     shift (in): pulse ``Derived.row_shift_clocks`` before the slot, unused by direct rows. A driven pattern may be
-    shifted
-        again.
-    drive (in): pulse in the last clock before the slot. release (in): pulse in the last clock in which rows are driven.
+        shifted again.
+    drive (in): pulse in the last clock before the slot.
+    release (in): pulse in the last clock in which rows are driven.
     upset (out): see :func:`scan_ports`.
     """
     return wiring.Signature(
@@ -88,9 +89,10 @@ def row_driver(skin: Skin) -> wiring.Signature:
 def column_reader(skin: Skin) -> wiring.Signature:
     """Interface of a column reader to the scanner.
 
-    pins (out): pins at the sheet. begin (in): pulse ``Derived.column_load_clocks`` before the columns are sampled.
-    levels (out): levels of the columns while ``done``. done (out): pulse ``2 + Derived.column_shift_clocks`` after the
-    sample.
+    pins (out): pins at the sheet.
+    begin (in): pulse ``Derived.column_load_clocks`` before the columns are sampled.
+    levels (out): levels of the columns while ``done``.
+    done (out): pulse ``2 + Derived.column_shift_clocks`` after the sample.
     """
     return wiring.Signature(
         {
@@ -148,11 +150,14 @@ class DirectColumns(wiring.Component):
 def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of every scan to the sheet, the stages that take its rows, and the link.
 
-    pins: pins of row driver and column reader. rows (out): rows in ascending order. tag (out): data of the frame whose
-    last row had a strobe; each scan states when the tag is complete. request (in): pulse that the tag of the next frame
-    to start answers with ``requested``. heard (in): copied into that tag. epoch (out): pulse every 2^22 us. faults
-    (out): fault word, with ``guard`` or ``self_test``. upset (out): pulse when a register flipped by itself
-    (:mod:`contactfpga_hdl.util.upset`); never with ``dual``, which
+    pins: pins of row driver and column reader.
+    rows (out): rows in ascending order.
+    tag (out): data of the frame whose last row had a strobe; each scan states when the tag is complete.
+    request (in): pulse that the tag of the next frame to start answers with ``requested``.
+    heard (in): copied into that tag.
+    epoch (out): pulse every 2^22 us.
+    faults (out): fault word, with ``guard`` or ``self_test``.
+    upset (out): pulse when a register flipped by itself (:mod:`contactfpga_hdl.util.upset`); never with ``dual``, which
         finds more.
     contact (out): high while any switch reads pressed; each scan states when it rises and falls.
     """
@@ -179,6 +184,7 @@ def moves_sample(derived: Derived) -> bool:
 def sample_at_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of a scan that obeys the command "sample at".
 
-    moves (in): pulse with each command. clocks (in): value of the command, in that clock.
+    moves (in): pulse with each command.
+    clocks (in): value of the command, in that clock.
     """
     return {"moves": In(1), "clocks": In(DIGIT_BITS * VALUE_DIGITS)} if moves_sample(derived) else {}

@@ -19,13 +19,15 @@ class Precharge(wiring.Component):
     apart_bits`` clocks apart, longer than driving a column to its level, and than a projection. In the first window
     after ``retry`` toggles a stuck column is driven and judged again.
 
-    drive (in): in the next clock the columns are driven. columns (in): columns that read pressed. looks (in): pulse
-    with a sample in ``columns``; all columns that are not stuck were driven before. retry (in): bit ``RETRY_BIT`` of a
-    clock in us. guard_pressed (in): of a scan that reads rows: pulse when the guard column is found stuck, until
-    ``retry`` toggles;
+    drive (in): in the next clock the columns are driven.
+    columns (in): columns that read pressed.
+    looks (in): pulse with a sample in ``columns``; all columns that are not stuck were driven before.
+    retry (in): bit ``RETRY_BIT`` of a clock in us.
+    guard_pressed (in): of a scan that reads rows: pulse when the guard column is found stuck, until ``retry`` toggles;
         other scans treat it as any column.
-    others (in): with a self-test, columns driven in the next clock whatever they read. held (out): stuck columns, from
-    the clock after a window. pins (out): driven columns, from registers.
+    others (in): with a self-test, columns driven in the next clock whatever they read.
+    held (out): stuck columns, from the clock after a window.
+    pins (out): driven columns, from registers.
     """
 
     def __init__(self, skin: Skin):

@@ -57,9 +57,9 @@ class Scanner(wiring.Component):
 
     The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`:
 
-    tag (out): complete from one clock after the offer of a frame's last row to the next frame's. faults (out): changes
-    one clock after a row's sample is available, for columns after the guard row's sample, for stuck
-        columns after the last row's.
+    tag (out): complete from one clock after the offer of a frame's last row to the next frame's.
+    faults (out): changes one clock after a row's sample is available, for columns after the guard row's sample, for
+        stuck columns after the last row's.
     contact (out): rises with the first row with a pressed switch, and falls with the last row of a scan without one.
     """
 

@@ -31,13 +31,16 @@ class ReversalScanner(wiring.Component):
 
     rows (out): driven rows in ascending order, and an empty row after a row whose neighbor was not driven; an untouched
         sheet has one empty row. With ``report = "cells"`` all rows.
-    tag (out): of the current frame; ``fault`` and stuck columns from three clocks after the frame began. faults (out):
-    with ``guard``, from the clock after a check's sample is available. watched (out): pulse when a resting sheet was
-    watched for another 256 us; with ``guard`` when it was checked. packed (in): pulse when the frame is packed. time
-    (out): device time in us. due (in): a frame is wanted without a touch. contact (out): rises three clocks after a
-    touch of an untouched sheet; falls with a frame without a pressed switch. alone (out): the offered row was driven.
-    sampled (out): time of its sample. busy (in): with debounce, a bit per row that is driven in the next frame, touched
-    or not.
+    tag (out): of the current frame; ``fault`` and stuck columns from three clocks after the frame began.
+    faults (out): with ``guard``, from the clock after a check's sample is available.
+    watched (out): pulse when a resting sheet was watched for another 256 us; with ``guard`` when it was checked.
+    packed (in): pulse when the frame is packed.
+    time (out): device time in us.
+    due (in): a frame is wanted without a touch.
+    contact (out): rises three clocks after a touch of an untouched sheet; falls with a frame without a pressed switch.
+    alone (out): the offered row was driven.
+    sampled (out): time of its sample.
+    busy (in): with debounce, a bit per row that is driven in the next frame, touched or not.
     """
 
     def __init__(self, skin: Skin):

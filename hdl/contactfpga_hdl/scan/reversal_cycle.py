@@ -18,25 +18,34 @@ class ReversalCycle(wiring.Component):
     """Sequence of listening, and of charge, gap and select for each row; with ``guard`` also checks, with ``self_test``
     tests.
 
-    touched (in): rows to drive: they read touched, or have a debounce time running. wanted (in): a frame is wanted
-    without a touch. packed (in): pulse when the last begun frame is packed. offers (in): a row is on offer. begins
-    (out): pulse when a frame begins, with the rows that read touched then. rests (out): rows are watched, and no frame
-    has begun since. settled (out): rows have been released for long enough. todo (out): rows still to be driven in this
-    frame. y, following (out): number of the last driven row, and of the next one. strobe (out): pulse when the columns
-    of row ``y`` are available. charges, listens (out): in the next clock columns are driven; rows are released.
+    touched (in): rows to drive: they read touched, or have a debounce time running.
+    wanted (in): a frame is wanted without a touch.
+    packed (in): pulse when the last begun frame is packed.
+    offers (in): a row is on offer.
+    begins (out): pulse when a frame begins, with the rows that read touched then.
+    rests (out): rows are watched, and no frame has begun since.
+    settled (out): rows have been released for long enough.
+    todo (out): rows still to be driven in this frame.
+    y, following (out): number of the last driven row, and of the next one.
+    strobe (out): pulse when the columns of row ``y`` are available.
+    charges, listens (out): in the next clock columns are driven; rows are released.
     selected (out): rows driven to the selecting level.
 
     With ``guard``, see :class:`~contactfpga_hdl.scan.reversal_guard.Checks`:
 
-    check_asked (in): a check of a resting sheet is wanted. of_rows (in): the next check is of the rows. check_starts,
-    checked (out): pulses when a check starts, and when its sample is available. guard (out): the guard row is driven to
-    the selecting level. inverts (out): in the next clock the guard column has the released level, other columns the
-    selecting level.
+    check_asked (in): a check of a resting sheet is wanted.
+    of_rows (in): the next check is of the rows.
+    check_starts, checked (out): pulses when a check starts, and when its sample is available.
+    guard (out): the guard row is driven to the selecting level.
+    inverts (out): in the next clock the guard column has the released level, other columns the selecting level.
 
     With ``self_test``, see :class:`~contactfpga_hdl.scan.self_test.SelfTest`:
 
-    test_asked (in): a slot is wanted. tested (in): pulse in a slot's last clock. discharges (in): in the next clock all
-    rows are driven to the selecting level. lets_go (out): pulse when a slot begins. tests (out): a slot is under way.
+    test_asked (in): a slot is wanted.
+    tested (in): pulse in a slot's last clock.
+    discharges (in): in the next clock all rows are driven to the selecting level.
+    lets_go (out): pulse when a slot begins.
+    tests (out): a slot is under way.
     """
 
     def __init__(self, skin: Skin):

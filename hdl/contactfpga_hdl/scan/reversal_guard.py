@@ -19,11 +19,15 @@ CHECK_BIT = 8
 class Checks(wiring.Component):
     """The next check, and the results of checks. A stuck guard column prevents conclusions about rows.
 
-    due (in): pulse when a resting sheet is to be checked. asked (out): such a check is wanted, until a check starts.
-    starts, checked (in): pulses when a check starts, and when its sample is available. of_rows (out): the next check is
-    of the rows. of_guard (out): pulse when the sample of the rows, and of the guard column, is available. rows, columns
-    (in): rows that read touched, columns that read pressed. held (in): stuck columns. retry (in): bit ``RETRY_BIT`` of
-    the clock in us. faults (out): see :class:`~contactfpga_hdl.scan.guard.LineFaults`.
+    due (in): pulse when a resting sheet is to be checked.
+    asked (out): such a check is wanted, until a check starts.
+    starts, checked (in): pulses when a check starts, and when its sample is available.
+    of_rows (out): the next check is of the rows.
+    of_guard (out): pulse when the sample of the rows, and of the guard column, is available.
+    rows, columns (in): rows that read touched, columns that read pressed.
+    held (in): stuck columns.
+    retry (in): bit ``RETRY_BIT`` of the clock in us.
+    faults (out): see :class:`~contactfpga_hdl.scan.guard.LineFaults`.
     """
 
     def __init__(self, skin: Skin):

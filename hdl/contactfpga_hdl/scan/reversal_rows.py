@@ -13,10 +13,11 @@ from contactfpga_hdl.scan.stuck import present
 def offer_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of the stage that passes rows on.
 
-    untouched (in): pulse when a frame without a driven row begins. strobe (in): pulse with the columns of a row.
+    untouched (in): pulse when a frame without a driven row begins.
+    strobe (in): pulse with the columns of a row.
     pressed, y, last (in): columns that read pressed in that row, its number, and whether it is the frame's last.
-    following (in): number of the next row. rows (out), alone (out): see
-    :class:`~contactfpga_hdl.scan.reversal.ReversalScanner`.
+    following (in): number of the next row.
+    rows (out), alone (out): see :class:`~contactfpga_hdl.scan.reversal.ReversalScanner`.
     """
     number = row_bits(derived)
     return {
@@ -88,10 +89,11 @@ class AllRows(wiring.Component):
 class Contact(wiring.Component):
     """The contact pin.
 
-    begins, untouched (in): pulses when a frame begins, and when it has no driven row. wakes (in): a row without a
-    masked switch of a resting sheet reads touched. strobe (in): pulse with the columns of a row. pressed, last (in): a
-    switch of that row is pressed; the row is the frame's last. contact (out): rises with ``wakes`` or ``pressed``, and
-    falls with a frame without a pressed switch.
+    begins, untouched (in): pulses when a frame begins, and when it has no driven row.
+    wakes (in): a row without a masked switch of a resting sheet reads touched.
+    strobe (in): pulse with the columns of a row.
+    pressed, last (in): a switch of that row is pressed; the row is the frame's last.
+    contact (out): rises with ``wakes`` or ``pressed``, and falls with a frame without a pressed switch.
     """
 
     def __init__(self) -> None:
@@ -119,9 +121,11 @@ class Contact(wiring.Component):
 class Motion(wiring.Component):
     """Whether a row without a masked switch read touched as the frame began, and empty when driven.
 
-    begins (in): pulse when a frame begins. read (in): rows that then read touched. strobe (in): pulse with the columns
-    of a row. pressed, y (in): a switch of that row is pressed; number of the row. motion (out): such a row was found
-    since the frame began.
+    begins (in): pulse when a frame begins.
+    read (in): rows that then read touched.
+    strobe (in): pulse with the columns of a row.
+    pressed, y (in): a switch of that row is pressed; number of the row.
+    motion (out): such a row was found since the frame began.
     """
 
     def __init__(self, skin: Skin):

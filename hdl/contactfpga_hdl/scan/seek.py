@@ -34,11 +34,16 @@ class Seek(wiring.Component):
     the list while it hits, or while ``busy``. Outputs except ``known`` and ``ends`` are valid from
     ``Derived.choice_clocks`` after the strobe until the next one.
 
-    strobe (in): pulse at the end of a slot. hit (in): in that clock, whether any column read pressed. busy (in): in
-    that clock, whether the row driven alone must stay on the list. clear (in): clears ``known`` before the next frame's
-    first strobe. pattern (out): rows of the next slot. alone (out): the slot is one row, not a probe. idle (out): the
-    slot is a probe of all rows. first (out): the slot is the frame's first. known (out): rows whose cells in this frame
-    are known, one clock after the strobe. ends (out): pulse in the clock after a frame's last strobe.
+    strobe (in): pulse at the end of a slot.
+    hit (in): in that clock, whether any column read pressed.
+    busy (in): in that clock, whether the row driven alone must stay on the list.
+    clear (in): clears ``known`` before the next frame's first strobe.
+    pattern (out): rows of the next slot.
+    alone (out): the slot is one row, not a probe.
+    idle (out): the slot is a probe of all rows.
+    first (out): the slot is the frame's first.
+    known (out): rows whose cells in this frame are known, one clock after the strobe.
+    ends (out): pulse in the clock after a frame's last strobe.
     """
 
     def __init__(self, skin: Skin):

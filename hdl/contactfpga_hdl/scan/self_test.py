@@ -24,17 +24,17 @@ class SelfTest(wiring.Component):
     A column that rises in slot 0 is ignored in other slots; a row that rises without a column is joined with the
     supply. Fully masked lines are not driven.
 
-    command (in): pulse from which slots are sent; a test under way starts again after its slot. asks (out): a slot is
-    wanted. begin (in): pulse when a slot begins; the scan drives nothing from the second clock after. ends (out): pulse
-    in the last clock of a slot. rows, columns (in): lines that read released, from synchronizers; fully masked rows
-    never do. discharges (out): in the next clock all lines are driven to the selecting level; from the third clock
-    after ``begin``
-        for the projection time.
+    command (in): pulse from which slots are sent; a test under way starts again after its slot.
+    asks (out): a slot is wanted.
+    begin (in): pulse when a slot begins; the scan drives nothing from the second clock after.
+    ends (out): pulse in the last clock of a slot.
+    rows, columns (in): lines that read released, from synchronizers; fully masked rows never do.
+    discharges (out): in the next clock all lines are driven to the selecting level; from the third clock after
+        ``begin`` for the projection time.
     alone (out): rows, then columns: the line driven to the released level in the next clock, after a gap of a clock,
-    for
-        the settle time.
-    slots (out): readings of each slot after a command. joined (out): high from a slot in which a line follows another
-    until a whole test finds none.
+        for the settle time.
+    slots (out): readings of each slot after a command.
+    joined (out): high from a slot in which a line follows another until a whole test finds none.
     """
 
     def __init__(self, skin: Skin):

@@ -18,8 +18,10 @@ PLACE_BITS = 6
 def packet_signature() -> wiring.Signature:
     """Unit packets without their check, for the link.
 
-    due (out): a packet waits. taken (in): pulse when the packet is sent. place (in): place of the byte offered from the
-    next clock. byte (out): that byte.
+    due (out): a packet waits.
+    taken (in): pulse when the packet is sent.
+    place (in): place of the byte offered from the next clock.
+    byte (out): that byte.
     """
     return wiring.Signature({"due": Out(1), "taken": In(1), "place": In(PLACE_BITS), "byte": Out(8)})
 
@@ -28,8 +30,9 @@ class UnitPacker(wiring.Component):
     """Writes a packet's digits, one per clock: those of a reading after it, the rest after the last reading. Three
     regions of a memory rotate: the sweep being written, the waiting one, the one on the wire.
 
-    sampled, done, reading (in): from the converter. over, armed (in): the packet's flags, read nine clocks after the
-    last reading of two digits. packet (out): see :func:`packet_signature`.
+    sampled, done, reading (in): from the converter.
+    over, armed (in): the packet's flags, read nine clocks after the last reading of two digits.
+    packet (out): see :func:`packet_signature`.
     """
 
     def __init__(self, skin: Skin):

@@ -25,9 +25,10 @@ def reading_layout(skin: Skin) -> data.StructLayout:
 def converter_ports(skin: Skin) -> dict[str, wiring.Member]:
     """The ports of every converter.
 
-    pins: pins at the converter, from registers. sampled (out): pulse as a sweep's first unit is sampled. done (out):
-    pulse when a reading is available; units come in ascending order, at least 14 clocks apart. reading (out): valid
-    with ``done``.
+    pins: pins at the converter, from registers.
+    sampled (out): pulse as a sweep's first unit is sampled.
+    done (out): pulse when a reading is available; units come in ascending order, at least 14 clocks apart.
+    reading (out): valid with ``done``.
     """
     return {
         "pins": Out(wiring.Signature(unit_pins(skin))),

@@ -15,9 +15,10 @@ class Units(wiring.Component):
     """Sweeps of the converter, a packet for each; ``over`` follows a unit's reading by two clocks, the last sum's by up
     to seven, the packet's ``due`` as in docs/timing.md.
 
-    pins: pins at the converter. command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`. over,
-    armed (out): see :class:`~contactfpga_hdl.units.watch.Watch`. packet (out): see
-    :func:`~contactfpga_hdl.units.pack.packet_signature`.
+    pins: pins at the converter.
+    command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.
+    over, armed (out): see :class:`~contactfpga_hdl.units.watch.Watch`.
+    packet (out): see :func:`~contactfpga_hdl.units.pack.packet_signature`.
     """
 
     def __init__(self, skin: Skin):

@@ -13,9 +13,10 @@ from contactfpga_hdl.units.ports import reading_layout
 class Watch(wiring.Component):
     """Compares each unit at each of its readings, and each sum once per sweep.
 
-    done, reading (in): from the converter. command, what, value (in): see :class:`Settings`. over (out): a threshold is
-    reached, until the next comparison; for a unit from two clocks after ``done``, for sum k from
-        4 + k clocks after ``done`` of the sweep's last unit.
+    done, reading (in): from the converter.
+    command, what, value (in): see :class:`Settings`.
+    over (out): a threshold is reached, until the next comparison; for a unit from two clocks after ``done``, for sum k
+        from 4 + k clocks after ``done`` of the sweep's last unit.
     armed (out): a threshold is set.
     """
 
@@ -73,9 +74,10 @@ class Watch(wiring.Component):
 class Settings(wiring.Component):
     """Zeros and thresholds in registers, so that a restart of two copies clears them.
 
-    command (in): pulse with a command; ``what`` and ``value`` (in) are ignored for absent units and sums. unit (in):
-    selects ``zero``, ``threshold``, and ``watched``, whether there is a threshold (out). sum (in), with sums: likewise
-    for a sum. armed (out): a threshold is set.
+    command (in): pulse with a command; ``what`` and ``value`` (in) are ignored for absent units and sums.
+    unit (in): selects ``zero``, ``threshold``, and ``watched``, whether there is a threshold (out).
+    sum (in), with sums: likewise for a sum.
+    armed (out): a threshold is set.
     """
 
     def __init__(self, skin: Skin):
@@ -130,9 +132,10 @@ class Settings(wiring.Component):
 class Sums(wiring.Component):
     """One multiplier computes the sums in turn, a clock each, while their totals rotate.
 
-    taken (in): pulse with a ``deviation`` of ``unit``, which are stable for as many clocks as there are sums. last
-    (in): the deviation is of the sweep's last unit. sum (out): number of the sum whose ``threshold`` and ``watched``
-    (in) are needed in this clock. over (out): a bit per sum, three clocks after its product with the last unit.
+    taken (in): pulse with a ``deviation`` of ``unit``, which are stable for as many clocks as there are sums.
+    last (in): the deviation is of the sweep's last unit.
+    sum (out): number of the sum whose ``threshold`` and ``watched`` (in) are needed in this clock.
+    over (out): a bit per sum, three clocks after its product with the last unit.
     """
 
     def __init__(self, skin: Skin):

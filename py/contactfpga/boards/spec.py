@@ -40,6 +40,7 @@ class Bridge:
 
     chip: str
     usb: tuple[int, int]
+    """Vendor and product ID."""
     interface: int | None
     """Interface of the UART; None for a chip with one interface."""
     max_baud: int
@@ -88,15 +89,18 @@ class BoardSpec:
     pll: str
     """PLL cell for other clocks, which depends on the crystal's pin."""
     connectors: Mapping[str, str]
+    """Print beside each connector."""
     row_side: tuple[str, ...]
     column_side: tuple[str, ...]
     contact: str
     standard: Mapping[str, str]
+    """Attributes of every pin."""
     pulls: Mapping[str, Mapping[str, object]]
     """Attributes of a column by the Skin's ``diodes``; none if the FPGA lacks such a resistor."""
     bridge: Bridge
     programmer: Programmer
     bitstream: str
+    """File ending of the bitstream."""
     constraints: str
     """File in constraints/, common to boards with the same pins."""
     skin: Skin

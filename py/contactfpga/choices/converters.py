@@ -34,9 +34,11 @@ class Converter(Choice):
     bits: int
     """Bits of a reading, at most 28."""
     channels: int
+    """Largest number of units."""
     limits: tuple[tuple[float, int], ...]
     """(supply in V, highest SPI clock in Hz) from the data sheet, rising; the first is the lowest supply."""
     most_v: float
+    """Highest supply in V."""
     least_level_ns: int
     """Shortest level, high or low, of the SPI clock."""
     sweep_levels: int

@@ -52,6 +52,8 @@ class _Search:
 
 @dataclasses.dataclass(frozen=True)
 class Slow:
+    """Outliers, and times near the settle time."""
+
     cells: list[tuple[int, int]]
     rows: list[int]
     columns: list[int]
@@ -129,6 +131,7 @@ class Settling:
         return float(np.median(known)) if len(known) else float("nan")
 
     def slow(self) -> Slow:
+        """Outliers so far."""
         known = self.clocks > 0
         slow = known & ((self.clocks > SLOW * self.median) | (self.clocks > NEAR * self.settle))
         rows, columns = (

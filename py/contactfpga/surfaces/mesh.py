@@ -75,12 +75,14 @@ class Mesh:
             raise SurfaceError(f"{path}: {error}") from None
 
     def save(self, path: str | Path) -> None:
+        """Write the table as a .npz file."""
         pitch = np.array([self.pitch_x_mm, self.pitch_y_mm])
         with replaced(path) as new, open(new, "wb") as file:
             np.savez(file, points_mm=self.points_mm, normals=self.normals, pitch_mm=pitch, closed=np.array(self.closed))
 
     @property
     def lines(self) -> tuple[int, int]:
+        """Rows and columns."""
         return self.points_mm.shape[0], self.points_mm.shape[1]
 
     @overload

@@ -63,6 +63,7 @@ class Hello:
     sheet: Sheet
     fingerprint: bytes
     name: str
+    """Name of the Skin."""
     clock_hz: int
     baud: int
     send: str
@@ -85,6 +86,7 @@ class Hello:
 
     @property
     def self_test(self) -> bool:
+        """Whether the board can test its lines."""
         return SELF_TEST in self.commands
 
     @property

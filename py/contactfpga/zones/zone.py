@@ -61,7 +61,7 @@ class Zone:
     sum_y: int | None
     """Sum of the cells' rows, exact; None with ``report = "barycenter"``."""
     area_mm2: float
-    """Area of the cells on the sheet in mm2."""
+    """Area of the cells in mm2, measured on the sheet."""
     x_mm: float | None
     """Barycenter along the columns in mm, on the sheet laid flat, within :attr:`Zones.rounding_mm`; column 0 lies at 0.
     On a sheet whose ends meet, x is from 0 to the circumference. None for a zone that is :attr:`winding`, and for one
@@ -74,7 +74,7 @@ class Zone:
     normal: Vector | None
     """Outward unit normal at the point. None without an x."""
     ghost: bool = False
-    """Whether, on a sheet without diodes, other pressed switches may have made the whole zone."""
+    """On a sheet without diodes: other pressed switches may have made the whole zone."""
     winding: str = ""
     """On a sheet whose ends meet: ``ring`` if a path of the zone's cells closes around the cylinder; ``wound`` if none
     does, but the cells lie on more than two turns. Otherwise ""."""
@@ -136,7 +136,7 @@ class Zones(Sequence[Zone]):
         self.sheet = sheet
         """The sheet, from the board's hello."""
         self.time_us = frame.time_us if time_us is None else time_us
-        """Device time of the sample of the first row since power-up, in us."""
+        """Device time of the sample of the frame's first row in us, since power-up."""
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
         """Faults that the board noticed, sorted. With guard lines or a self-test these are names: ``row 3 open``,
         ``column 7 open``, ``column 2 stuck`` (it read pressed while no row was driven), ``guard row open`` (all columns
@@ -240,6 +240,7 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def suspects(self) -> list[bool]:
+        """:attr:`Zone.ghost` of each of :attr:`records`."""
         if not self.sheet.ghosts:
             return [False] * len(self)
         if self.frame.bitmap is None:
