@@ -1,5 +1,5 @@
 """Gateware: from switch samples to bytes on a serial line.
 
-A part that only some Skins have is imported in the method that adds it, so that a Skin loads only its board's parts: a
-default one is understood without guard lines, units, self-test, shift registers or a second copy.
+Parts that only some Skins have are imported in the method that adds them, so that a default board is understood without
+them. In lists of ports a *pulse* is a level that is high for one clock.
 """

@@ -13,16 +13,15 @@ from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.top import Top, receiver_of
 
 BYTES, RECORDS = "m_axis", "m_axis_records"
-"""Beginnings of the names of the streams' ports."""
+"""Prefixes of the streams' port names."""
 
 
 def _stream(name: str, bits: int) -> dict[str, wiring.Member]:
-    """Ports of an AXI4-Stream."""
     return {f"{name}_tdata": Out(bits), f"{name}_tvalid": Out(1), f"{name}_tready": In(1), f"{name}_tlast": Out(1)}
 
 
 class StreamTop(Top):
-    """A Skin's gateware with ``bytes`` (out), a stream, in place of the transmit pin, and ``records`` beside it."""
+    """A Skin's gateware with streams: ``bytes`` (out) instead of the transmit pin, and ``records`` (out)."""
 
     LINE: ClassVar = {"bytes": Out(stream.Signature(8)), "rx": In(1, init=1)}
 
@@ -55,16 +54,14 @@ class StreamTop(Top):
 class Core(wiring.Component):
     """A Skin's gateware between the pins of the sheet and two streams, in one clock domain.
 
-    The pins of the sheet, ``rx``, ``contact`` and the pins of options are those of :class:`Top`.
+    Other pins are those of :class:`Top`. A Skin with ``dual`` has no core: its copies are compared at the transmit pin.
 
-    rx (in): requests and commands; while it stays high, the board sends what it does by itself.
-    m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): the packets of docs/protocol.md as an
-    AXI4-Stream of bytes. ``m_axis_tlast`` is high with the delimiter, a packet's last byte. A frame that is ready
-    while another one waits takes its place, so the reader may take its time and gets the newest one.
-    m_axis_records_tdata, m_axis_records_tvalid, m_axis_records_tlast (out), m_axis_records_tready (in): the same
-    frames as an AXI4-Stream of words, see :class:`~contactfpga_hdl.link.records.Records`.
-
-    A Skin with ``dual`` has none: its two copies are compared at the transmit pin.
+    rx (in): requests and commands; while it stays high, the board sends unrequested packets.
+    m_axis_tdata, m_axis_tvalid, m_axis_tlast (out), m_axis_tready (in): packets as an AXI4-Stream of bytes;
+        ``m_axis_tlast`` is high with the delimiter. A new frame replaces a waiting one, so a slow reader gets the
+        newest.
+    m_axis_records_tdata, m_axis_records_tvalid, m_axis_records_tlast (out), m_axis_records_tready (in): the same frames
+        as an AXI4-Stream of words, see :class:`~contactfpga_hdl.link.records.Records`.
     """
 
     def __init__(self, skin: Skin):

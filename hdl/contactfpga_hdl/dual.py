@@ -7,20 +7,20 @@ from amaranth.lib.wiring import Out
 from contactfpga.skin import Skin
 
 PAUSE_BITS = 16
-"""Bits for which the line is broken, and then for which it rests: more than a byte."""
+"""Bits for which the line is broken, and then for which the line rests: more than a byte."""
 
 
 class Dual(wiring.Component):
     """The gateware ``first``, as long as ``second`` gives the same a clock later.
 
-    Each input reaches ``second`` a clock after ``first``, and it starts a clock later, so that no two registers are
-    equal by construction and synthesis cannot merge them. The outputs are those of ``first``, in the same clock, except
-    ``contact`` with ``fail_safe``, a clock later, as copies give it without a register. At most two clocks after the
-    first difference ``tx`` is low, for longer than a byte: the packet on the line ends without its check. Then it
-    rests, both copies start from reset, and the host sees a restarted board. With ``fail_safe`` the pin ``contact`` is
-    high from the difference until a scan after the restart.
+    ``second`` starts and gets each input a clock later, so that no two registers are equal by construction and merged
+    in synthesis. The outputs are those of ``first`` in the same clock; ``contact`` with ``fail_safe`` comes a clock
+    later, as copies give it without a register. From at most two clocks after the first difference ``tx`` is low for
+    longer than a byte, so that the packet on the line ends without its check. Then ``tx`` rests, both copies start from
+    reset, and the host sees a restarted board. With ``fail_safe`` ``contact`` is high from the difference until a scan
+    after the restart.
 
-    The only state here is the restart's counter, which always ends, and the register at ``contact``, written in every
+    The only state here is the restart's counter, which always ends, and the register at ``contact``, written every
     clock.
 
     first (component): may have probes, which are passed on.
@@ -62,7 +62,6 @@ class Dual(wiring.Component):
             m.d.comb += [inside.eq(outside), getattr(self.second, name).eq(later)]
 
     def _compare(self, m: Module) -> Value:
-        """High in the clock after one in which the copies' outputs differ."""
         names = [name for name, member in self.second.signature.members.items() if member.flow == Out]
         said = Cat(getattr(self.first, name) for name in names)
         before = Signal(len(said))

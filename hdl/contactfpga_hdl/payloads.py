@@ -10,33 +10,31 @@ from contactfpga.wire.framing import DIGIT_BITS
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
-    """A sampled row: one bit per column, whether it is the frame's last, and its number if the scan skips rows."""
+    """A sampled row: a bit per column, whether the row is the frame's last, and its number if the scan skips rows."""
     number = {"y": row_bits(derived)} if derived.skips else {}
     return data.StructLayout({"cells": derived.skin.columns, "last": 1, **number})
 
 
 def row_bits(derived: Derived) -> int:
-    """Width in bits of a row number."""
     return max(1, (derived.skin.rows - 1).bit_length())
 
 
 def moments_layout(derived: Derived) -> data.StructLayout:
-    """Exact moments of a set of cells."""
     return data.StructLayout({"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits})
 
 
 def zone_layout(derived: Derived) -> data.StructLayout:
-    """A zone; with ``report = "moments"`` as bits, lowest first, a zone record on the wire.
+    """A zone; with ``report = "moments"`` the bits of a zone record on the wire, lowest first.
 
-    ``turned``, for a sheet whose ends meet, counts the cells past the seam: fewer than all, or as many in a ``ring``,
-    or all ones in a zone that is ``wound``.
+    ``turned``, on a sheet whose ends meet, counts the cells past the seam: fewer than all, all in a ``ring``, or all
+    ones for a zone that is ``wound``.
     """
     moments = moments_layout(derived).members
     return data.StructLayout(moments | ({"turned": derived.area_bits} if derived.skin.closed else {}))
 
 
 def record_layout(derived: Derived) -> data.StructLayout:
-    """A zone, or with ``end`` the mark after a frame's last."""
+    """A zone, or with ``end`` the mark after a frame's last zone."""
     return data.StructLayout({"zone": zone_layout(derived), "end": 1})
 
 
@@ -46,17 +44,17 @@ def passed_layout(derived: Derived) -> data.StructLayout:
 
 
 def item_layout(derived: Derived) -> data.StructLayout:
-    """A part of a frame that is packed unchanged: a zone record or a bitmap row, or the mark after the last."""
+    """A part of a frame that is packed unchanged: a zone record or a bitmap row, or the end mark."""
     return data.StructLayout({"data": 8 * derived.item_bytes, "end": 1})
 
 
 def tag_layout(derived: Derived) -> data.StructLayout:
-    """The scanner's data of a frame besides its cells; ``slots``, if they vary and the link counts them, are its row
-    times.
+    """The scanner's data of a frame besides its cells.
 
-    ``heard`` is of the last request before the frame's first sample; ``requested``: it came since the previous frame's.
-    ``fault``: columns are stuck, or other faults were reported. ``motion``, if the scan reads rows, is complete with
-    the frame's last row: a row read touched as the frame began, and empty when driven.
+    ``slots``: row times, if they vary and the link counts them. ``heard``: number of the last request before the
+    frame's first sample. ``requested``: whether that request came since the previous frame's. ``fault``: columns are
+    stuck, or other faults are reported. ``motion``, if the scan reads rows, complete with the last row: a row read
+    touched as the frame began, and empty when driven.
     """
     uneven = not derived.scan.even and not derived.scan.waits
     slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
@@ -66,9 +64,8 @@ def tag_layout(derived: Derived) -> data.StructLayout:
 
 
 def faults_layout(derived: Derived) -> data.StructLayout:
-    """The fault word of a Skin with ``guard`` or ``self_test``: rows and columns open before their far ends; columns,
-    the guard column last, that read pressed while no row was driven; and whether the self-test found joined lines or
-    directions."""
+    """The fault word of a Skin with ``guard`` or ``self_test``: open rows; open columns; columns, the guard column
+    last, that read pressed while no row was driven; and whether the self-test found joined lines."""
     skin = derived.skin
     lines = {"rows": skin.rows, "columns": skin.columns, "stuck": skin.column_lines} if skin.guard else {}
     return data.StructLayout(lines | ({"joined": 1} if skin.self_test else {}))
@@ -81,7 +78,7 @@ def slots_layout(derived: Derived) -> data.StructLayout:
 
 
 def summary_layout(derived: Derived) -> data.StructLayout:
-    """A frame's trailer, valid when its end mark is packed."""
+    """A frame's trailer, valid when the end mark is packed."""
     return data.StructLayout(
         {
             "cells": derived.area_bits,
@@ -94,7 +91,7 @@ def summary_layout(derived: Derived) -> data.StructLayout:
 
 
 def row_number(m: Module, derived: Derived, row: data.View, taken: Value) -> Value:
-    """The number of the offered row: part of it if the scan skips rows, otherwise counted as rows are ``taken``."""
+    """The number of the offered row: carried by it if the scan skips rows, otherwise counted as rows are ``taken``."""
     if derived.skips:
         return row.y
     y_next = Signal(range(max(2, derived.skin.rows)))
@@ -107,7 +104,7 @@ def labeller_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of a labeller.
 
     rows (in): a frame's rows in ascending order.
-    records (out): its zones, then an end mark.
+    records (out): the frame's zones, then an end mark.
     """
     return {
         "rows": In(stream.Signature(row_layout(derived))),

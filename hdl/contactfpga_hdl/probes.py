@@ -1,4 +1,4 @@
-"""Probes: the transfers at stage boundaries as outputs of a Skin's gateware, for co-simulation."""
+"""Probes: transfers at stage boundaries as outputs of a Skin's gateware, for co-simulation."""
 
 from amaranth.hdl import Module, Value
 from amaranth.lib import stream, wiring
@@ -9,9 +9,9 @@ from contactfpga_hdl.payloads import zone_layout
 
 
 def probe_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """The ports of the probes. Each ``transfer`` is high in the clocks in which the others hold the payload.
+    """Ports of the probes; each ``transfer`` is high in clocks in which the others hold a payload.
 
-    row_transfer, row_cells, row_last (out): rows handed to the labeller.
+    row_transfer, row_cells, row_last (out): rows at the labeller.
     record_transfer, record_data, record_end (out): zone records, or with ``report = "cells"`` bitmap rows.
     item_transfer, item_data, item_end (out): with ``report = "barycenter"``, the divided records.
     byte_transfer, byte_data (out): bytes.
@@ -34,7 +34,7 @@ def probe_ports(derived: Derived) -> dict[str, wiring.Member]:
 def connect_probe(
     m: Module, probes: wiring.PureInterface, name: str, boundary: stream.Interface, **fields: Value
 ) -> None:
-    """Connect the probe ``name``: a transfer at the boundary, and its other ports by field."""
+    """Connect the probe ``name`` to a boundary's transfers, and its other ports by field."""
     m.d.comb += getattr(probes, f"{name}_transfer").eq(boundary.valid & boundary.ready)
     for field, value in fields.items():
         m.d.comb += getattr(probes, f"{name}_{field}").eq(value)

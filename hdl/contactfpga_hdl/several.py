@@ -1,4 +1,4 @@
-"""Several sheets on one FPGA: a whole chain for each, and one UART."""
+"""Several sheets on one FPGA, each with its own gateware, and one UART."""
 
 from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring
@@ -10,14 +10,13 @@ from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 
 _INSIDE = ("bits", "bytes", "grant", "holds", "contact")
-"""Internal ports of a sheet's :class:`Top`."""
 
 
 class SeveralTop(wiring.Component):
-    """A :class:`Top` for each sheet, its pins and probes with the sheet's number appended, as ``row_data_0``; ``tx``,
-    ``rx`` and ``contact`` are shared. ``contact`` is high in the clock after one in which any sheet's is.
+    """A :class:`Top` per sheet; pins and probes end with the sheet's number, as ``row_data_0``. ``tx``, ``rx`` and
+    ``contact`` are shared; ``contact`` is high in the clock after one in which any sheet's is.
 
-    Sheets share nothing but the right to send. Each keeps its newest frame until then.
+    A sheet keeps its newest frame until it may send.
     """
 
     def __init__(self, several: Several, probes: bool = False):
@@ -57,7 +56,6 @@ class SeveralTop(wiring.Component):
         return m
 
     def _outside(self):
-        """(number, name, member) of each external port of a sheet."""
         for number, sheet in enumerate(self.sheets):
             for name, member in sheet.signature.members.items():
                 if name not in _INSIDE:
@@ -65,10 +63,11 @@ class SeveralTop(wiring.Component):
 
 
 class RoundRobin(wiring.Component):
-    """Grants the line to the sheets in turn. The sheet with the grant may begin a packet, and keeps it to its end; one
-    with nothing to send passes it on in the same clock. So a sheet waits for at most one packet of each other sheet.
+    """Grants the line to the sheets in turn. A sheet with the grant may begin a packet, and has the grant to its end; a
+    sheet with nothing to send passes the grant on in the same clock. So a sheet waits for at most one packet of each
+    other sheet.
 
-    holds (in), by sheet: a packet begins in this clock, or does not end in it; only considered with the grant.
+    holds (in), by sheet: a packet begins in this clock, or does not end in it; ignored without the grant.
     grant (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
     """
 

@@ -1,4 +1,4 @@
-"""The whole chain for one Skin: wiring only."""
+"""The gateware of one Skin: connections of its stages."""
 
 from typing import Any, ClassVar, TypeVar
 
@@ -26,26 +26,24 @@ _SHARED_LINE = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "grant
 class Top(wiring.Component):
     """A Skin's gateware between the pins of the sheet and those of the host.
 
-    rows (out), columns (in): one pin per row and column; or those of the shift registers, see
+    rows (out), columns (in): one pin per row and column, or those of shift registers, see
         :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
     tx (out), rx (in): the UART.
-    contact (out): high while something touches the sheet; with units a clock later, and while a threshold is reached;
-        with ``fail_safe`` a clock later, too, and while a fault is known or units have no threshold.
-    spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, those at their converter.
+    contact (out): high while something touches the sheet. With units a clock later, and while a threshold is reached;
+        with ``fail_safe`` a clock later, and while a fault is known or units have no threshold.
+    spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, pins at their converter.
     alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
-    With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: see
-    :func:`~contactfpga_hdl.probes.probe_ports`.
+    ``probes`` adds the outputs of :func:`~contactfpga_hdl.probes.probe_ports`.
 
-    If the scan or the link finds that one of its registers flipped by itself, everything except the transmitter
-    restarts within two clocks: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin
-    ``contact`` is high until a frame after that is packed.
+    If scan or link find that a register flipped by itself, everything except the transmitter restarts within two
+    clocks: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin ``contact`` is high
+    until a later frame is packed.
 
-    A Skin with ``dual`` has two copies, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``, whose ``contact``
-    is not from a register with ``fail_safe``.
-
-    With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): instead of the UART
-    it has ``bits`` (in), ``bytes`` (out), and ``grant`` (in) and ``holds`` (out) of its link.
+    A Skin with ``dual`` has two copies (:class:`~contactfpga_hdl.dual.Dual`); a ``copy`` has ``contact`` with
+    ``fail_safe`` without a register. With a ``place`` among several sheets
+    (:class:`~contactfpga_hdl.several.SeveralTop`), ``bits`` (in), ``bytes`` (out), ``grant`` (in) and ``holds`` (out)
+    of the link replace the UART.
     """
 
     LINE: ClassVar = {"tx": Out(1, init=1), "rx": In(1, init=1)}
@@ -126,7 +124,6 @@ class Top(wiring.Component):
         connect_lines(m, self.skin, scan.pins, self)
 
     def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
-        """Add the request reader, and the UART unless it is shared."""
         if self.place is None:
             m.submodules.transmitter = transmitter = Transmitter(self.derived.bit_clocks)
             receiver = self._put(m, "receiver", receiver_of(self.derived))
@@ -141,8 +138,8 @@ class Top(wiring.Component):
         m.d.comb += [link.grant.eq(self.grant), self.holds.eq(link.holds)]
 
     def _put(self, m: Module, name: str, stage: _Stage) -> _Stage:
-        """Add a stage that restarts when a register is found wrong. The transmitter is not reset, so that the byte on
-        the line is completed and a hello follows it."""
+        """Add a stage that restarts when a register is found wrong. The transmitter is not reset, to complete the byte
+        on the line."""
         m.submodules[name] = stage if self.skin.dual else ResetInserter(self._restarts)(stage)
         return stage
 
@@ -156,7 +153,6 @@ class Top(wiring.Component):
         return units
 
     def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: wiring.Component | None) -> None:
-        """Connect faults to the pins, and the units."""
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
@@ -191,7 +187,6 @@ class Top(wiring.Component):
         return m
 
     def _debounced(self, m: Module, scan: Any) -> stream.Interface:
-        """The scanner's rows without bounce."""
         if not self.derived.debounced:
             return scan.rows
         even = self.derived.scan.even
@@ -204,7 +199,7 @@ class Top(wiring.Component):
         return debounce.rows
 
     def _hand_over(self, m: Module, rows: stream.Interface, taken: stream.Interface, free: Value) -> None:
-        """If the scan waits, a row also waits until it can be counted; otherwise rows are never that close."""
+        """Pass rows on; if the scan waits, a row also waits until it can be counted."""
         if not self.derived.scan.waits:
             wiring.connect(m, rows, taken)
             return
@@ -215,7 +210,6 @@ class Top(wiring.Component):
         ]
 
     def _zones(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
-        """Items of a frame's zones, and its summary."""
         label = self._put(m, "label", self.derived.labeller.load_gateware()(self.skin))
         audit = self._put(m, "audit", Audit(self.skin))
         backlog = self._put(m, "backlog", Backlog(self.skin))
@@ -238,7 +232,6 @@ class Top(wiring.Component):
         return divide.items
 
     def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
-        """Items of a frame's rows, unchanged, and its summary."""
         from contactfpga_hdl.report.bitmap import Bitmap
 
         bitmap = self._put(m, "bitmap", Bitmap(self.skin))
@@ -257,7 +250,6 @@ class Top(wiring.Component):
 
 
 def receiver_of(derived: Derived) -> wiring.Component:
-    """The reader of the receive pin."""
     if not derived.pulsed:
         return Receiver(derived.bit_clocks)
     from contactfpga_hdl.link.pulses import PulseReceiver
@@ -274,6 +266,5 @@ def _unit_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def _packed(packer: Packer) -> Value:
-    """High when a frame is packed or dropped."""
     frames = packer.frames
     return frames.commit | frames.decide & ~frames.verdict.send

@@ -7,8 +7,8 @@
 400.0 55.0 75.0
 400.0 95.0 75.0
 
-``read_zones()`` takes the board that is plugged in, and ``open()`` gives every frame of it. ``help(contactfpga.Zone)``
-shows what a zone has.
+``read_zones()`` reads the board that is plugged in; ``open()`` gives its frames. ``help(contactfpga.Zone)`` lists a
+zone's fields.
 """
 
 # What it offers is imported when it is used first: so the command `contactfpga` takes Ctrl-C before numpy is loaded.
@@ -128,7 +128,7 @@ _NAMES = {
     "zones.units": "UnitHistory UnitSamples",
     "zones.zone": "Zone Zones",
 }
-"""Modules, and the public names that each of them defines."""
+"""Public names by the module that defines them."""
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 

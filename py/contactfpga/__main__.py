@@ -6,7 +6,7 @@ from contactfpga.tools.console import signals
 
 
 def main() -> NoReturn:
-    """Run the command; a signal ends it quietly also while it is still being loaded."""
+    """Run the command. A signal ends it quietly even while it is being loaded."""
     signals.end_all_at_once()
     from contactfpga.tools import cli
     from contactfpga.tools.console import interrupt

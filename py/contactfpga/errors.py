@@ -1,4 +1,4 @@
-"""Everything this package raises on purpose. Each message names what was met and the next step."""
+"""Every exception that this package raises on purpose. Each message names the problem and the next step."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import sys
 from typing import Any
 
 UNSOLVED = 3
-"""Exit status of a command whose answer is that there is no solution."""
+"""Exit status of a command that finds no solution."""
 
 
 class ContactFPGAError(Exception):
-    """Base of every error of this package.
+    """Base class of every error of this package.
 
     >>> try:
     ...     contactfpga.open("sim://?scene=elbow")
@@ -23,11 +23,11 @@ class ContactFPGAError(Exception):
 
 
 class SkinError(ContactFPGAError, ValueError):
-    """A Skin that cannot work; the message names the field, its value and the limit."""
+    """A Skin that cannot work. The message names the field, its value and the limit."""
 
 
 class AddressError(ContactFPGAError):
-    """A port's name that names no port, such as one with an option or a scene that does not exist."""
+    """A port name that is invalid, for example because an option or a scene does not exist."""
 
 
 class PortNotFound(ContactFPGAError):
@@ -35,11 +35,11 @@ class PortNotFound(ContactFPGAError):
 
 
 class PortBusy(ContactFPGAError):
-    """The port is there, and open in this program or another one."""
+    """The port exists but is already open, in this program or another one."""
 
 
 class PortLost(ContactFPGAError):
-    """The port was there and is gone: unplugged, or its other end closed it."""
+    """The open port is gone: it was unplugged, or its other end closed it."""
 
 
 class BoardClosed(ContactFPGAError):
@@ -47,24 +47,24 @@ class BoardClosed(ContactFPGAError):
 
 
 class ReadTimeout(ContactFPGAError, TimeoutError):
-    """The board answered, but no complete frame came in time."""
+    """The board answered, but no complete frame arrived in time."""
 
 
 class NoData(ReadTimeout):
-    """No frame came for longer than the reader allows; ``silence`` says how long, and what came last."""
+    """No frame arrived for longer than the reader allows."""
 
     def __init__(self, message: str, silence: Any):
         super().__init__(message)
         self.silence = silence
-        """A :class:`~contactfpga.Silence`."""
+        """A :class:`~contactfpga.Silence`: its duration, and the last frame."""
 
 
 class BoardSilent(ReadTimeout):
-    """Not one byte came in time."""
+    """No byte arrived in time."""
 
 
 class OnlyNoise(ReadTimeout):
-    """Bytes came, and not one valid packet among them."""
+    """Bytes arrived in time, but no valid packet."""
 
 
 class NoSuchCommand(ContactFPGAError):
@@ -76,24 +76,24 @@ class ReplayEnded(ContactFPGAError, EOFError):
 
 
 class SkinMismatch(ContactFPGAError):
-    """The board was built from another Skin than the one given or the one it had before."""
+    """The board was built from a different Skin than the given one or its previous one."""
 
 
 class VersionMismatch(ContactFPGAError):
-    """The board speaks another version of the protocol."""
+    """The board uses another version of the protocol."""
 
 
 class MissingExtra(ContactFPGAError, ImportError):
-    """A command needs a part of contactfpga that is not installed."""
+    """A command needs an optional part of contactfpga that is not installed."""
 
     def __init__(self, what: str, extra: str):
         self.what = what
-        """What needs it."""
+        """The command or function that needs the extra."""
         super().__init__(f"{what} needs more than is installed; install it with: {pip_install(extra)}")
 
 
 def pip_install(extra: str) -> str:
-    """The command that adds an extra to what is installed for this Python, from a wheel or from a source tree."""
+    """The command that adds an extra to this Python's installation, from a wheel or from a source tree."""
     quote = '"' if sys.platform == "win32" else "'"
     python = sys.executable or "python"
     if os.sep in (inside := python.removeprefix(os.getcwd() + os.sep)):

@@ -1,4 +1,4 @@
-"""What `help()` shows of a class: its docstring, and below that the fields with theirs, which Python does not keep."""
+"""The text that `help()` shows of a class: its docstring, and its fields with theirs, which Python drops."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _MADE = {"property", "cached_property", "functools.cached_property"}
 
 
 class Field(NamedTuple):
-    """An attribute of a class."""
+    """An attribute of a class, with its docstring."""
 
     name: str
     declared: str
-    """With its type and default, where they are stated."""
+    """Name, type and default, as far as the source states them."""
     text: str
 
 
 class _Completed:
-    """A docstring that gets its fields when it is read first."""
+    """A docstring that reads the fields from the source on first access."""
 
     def __init__(self, kind: type):
         self._kind, self._own = kind, kind.__doc__
@@ -39,7 +39,7 @@ class _Completed:
 
 
 def complete(kind: type) -> None:
-    """Have this class show its fields in its docstring."""
+    """Make the docstring of a class list its fields."""
     later = _Completed(kind)
     # Of a class whose own class is in Python, as those of ABCMeta, `help()` takes what is stored and asks nothing.
     kind.__doc__ = later if type(kind) is type else later.__get__(None, kind)  # type: ignore[assignment]
@@ -61,7 +61,7 @@ def _with_fields(own: str, kind: type) -> str:
 
 
 def fields(kind: type) -> Iterator[Field]:
-    """Those that the source of a class declares, none where there is no source."""
+    """The fields that the source of a class declares; none if the source is not available."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(kind)))
     except (OSError, TypeError, SyntaxError):
@@ -85,7 +85,7 @@ def _declared(body: list[ast.stmt]) -> Iterator[Field]:
 
 
 def _assigned(body: list[ast.stmt]) -> Iterator[Field]:
-    """Attributes that ``__init__`` makes and describes."""
+    """Attributes that ``__init__`` assigns and documents."""
     for statement, following in itertools.pairwise(body):
         if not isinstance(statement, ast.Assign | ast.AnnAssign) or not _text(following):
             continue
@@ -96,6 +96,6 @@ def _assigned(body: list[ast.stmt]) -> Iterator[Field]:
 
 
 def _text(statement: ast.stmt) -> str:
-    """A docstring; "" where this is none."""
+    """The docstring in a statement; "" if the statement is none."""
     value = statement.value if isinstance(statement, ast.Expr) else None
     return value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""

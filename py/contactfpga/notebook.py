@@ -1,4 +1,4 @@
-"""How frames, contacts and recordings draw themselves in a notebook: as SVG and HTML, with nothing to import."""
+"""SVG and HTML by which frames, contacts and recordings show themselves in a notebook, without further imports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Circle = tuple[float, float, float]
 """x, y and radius of a zone in mm."""
 
 SMALLEST_PX = 3.0
-"""Of a cell's side: the lines between smaller ones are left out."""
+"""Smallest side of a cell in pixels that is drawn with lines between cells."""
 
 
 def sheet(
@@ -27,8 +27,9 @@ def sheet(
     cells: np.ndarray | None = None,
     width_px: int = WIDTH_PX,
 ) -> str:
-    """A sheet laid flat as SVG, row 0 at the bottom. ``shape``: rows and columns; ``cells``: (rows,
-    columns) bool where pressed cells are known."""
+    """SVG of a sheet laid flat, row 0 at the bottom. ``shape``: rows and columns; ``cells``: (rows, columns) bool, the
+    pressed cells if known.
+    """
     (rows, columns), (pitch_x, pitch_y) = shape, pitch_mm
     width_mm, height_mm = columns * pitch_x, rows * pitch_y
     scale = width_px / width_mm
@@ -61,7 +62,7 @@ def sheet(
 
 
 def _box(x: float, y: float, columns: int, rows: int, pitch_mm: tuple[float, float], color: str) -> str:
-    """Of cells, by its lower left corner."""
+    """A block of cells, by its lower left corner."""
     pitch_x, pitch_y = pitch_mm
     place = f'x="{x * pitch_x:g}" y="{y * pitch_y:g}"'
     return f'<rect {place} width="{columns * pitch_x:g}" height="{rows * pitch_y:g}" fill="{color}"/>'
@@ -76,7 +77,7 @@ def _grid(rows: int, columns: int, pitch_x: float, pitch_y: float, width: float)
 
 
 def over_the_seam(circles: Iterable[Circle], around_mm: float, pitch_mm: float) -> list[Circle]:
-    """On a sheet whose ends meet, a circle that leaves it at one end is drawn at the other one, too."""
+    """Circles of a closed sheet: one that crosses the seam is also drawn at the other end."""
     left, right = -pitch_mm / 2, around_mm - pitch_mm / 2
     return [
         (x + shift, y, radius)
@@ -87,12 +88,12 @@ def over_the_seam(circles: Iterable[Circle], around_mm: float, pitch_mm: float) 
 
 
 def radius_mm(area_mm2: float) -> float:
-    """Of the circle that has this area."""
+    """Radius of the circle with this area."""
     return math.sqrt(area_mm2 / math.pi)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """As HTML. Cells are text."""
+    """HTML table; cells are plain text."""
     lines = [f"<caption>{html.escape(caption)}</caption>"] if caption else []
     lines.append(_row(head, "th"))
     lines += [_row(row, "td") for row in rows]
@@ -104,6 +105,6 @@ def _row(cells: Sequence[str], tag: str) -> str:
 
 
 def beside(pictures: Iterable[tuple[str, str]]) -> str:
-    """Pictures with titles, side by side as far as there is room, as HTML."""
+    """HTML of pictures with titles, side by side as far as there is room."""
     shown = (f"<figure><figcaption>{html.escape(title)}</figcaption>{svg}</figure>" for title, svg in pictures)
     return f'<div style="display:flex;flex-wrap:wrap">{"".join(shown)}</div>'

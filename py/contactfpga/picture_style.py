@@ -1,6 +1,6 @@
-"""How every picture looks: on one card, in one palette, with letters that can be read on a page 720 pixels wide.
+"""The common style of all pictures: background, palette, and letters legible on a page 720 pixels wide.
 
-matplotlib is imported only where something is drawn with it.
+matplotlib is imported only for drawing.
 """
 
 from __future__ import annotations
@@ -16,21 +16,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CARD = "#f6f7f9"
-"""What everything is drawn on: nearly white on a white page, and without a rim on a dark one."""
+"""Background: nearly white on a white page, and without a rim on a dark one."""
 
 INK, SOFT, GRID = "#1d232b", "#545d68", "#d5d9df"
-"""Words and axes; words that come second; lines that help to read a value."""
+"""Colors of main words and axes, of secondary words, and of grid lines."""
 
 SHEET, PRESSED = "#e3e6eb", "#8fbcd4"
-"""A sheet of switches, and what is pressed of it."""
+"""Colors of a sheet of switches, and of its pressed part."""
 
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GRAY, BROWN = PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c8c8c", "#7a4b1e"),
 )
-"""Colors that the color-blind tell apart, after Okabe and Ito: without their yellow, which a light card swallows."""
+"""Colors that color-blind readers can tell apart, after Okabe and Ito, without their yellow, which is too pale for a
+light card.
+"""
 
 DASHES: tuple[Any, ...] = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
-"""For lines that may lie on one another: what is under a dashed line shows in its gaps."""
+"""Line styles for coinciding curves: the lower one shows in the gaps of the upper one."""
 
 DARK = {
     CARD: "#14181d",
@@ -54,16 +56,15 @@ DARK = {
     "#fbecc8": "#4d3d14",
     "#f4e1ec": "#4b2e42",
 }
-"""What takes the place of a color on a dark page; the last are tints. Orange and purple are seen on either."""
+"""Colors on a dark page, by their light ones; the last are tints. Orange and purple are visible on both."""
 
 WIDTH_PX = 720
-"""Of a picture, and of the page that it is made for."""
 
 WIDTH_IN = WIDTH_PX / 96
-"""The same for matplotlib, whose SVG has 72 points an inch where a browser sees 96 pixels."""
+""":data:`WIDTH_PX` for matplotlib, whose SVG has 72 points per inch where a browser has 96 pixels."""
 
 SMALL, NORMAL, LARGE = 8.5, 9.0, 10.0
-"""Sizes of letters in points; small ones are 11 pixels high on the page."""
+"""Font sizes in points; the small one is 11 pixels high."""
 
 SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "contactfpga",
@@ -91,11 +92,11 @@ SETTINGS: dict[str, Any] = {
     "grid.linewidth": 0.7,
     "legend.frameon": False,
 }
-"""matplotlib's, under which a picture is made and saved; the same input gives the same file."""
+"""matplotlib settings for drawing and saving; equal input gives an equal file."""
 
 
 def new(height_in: float) -> Figure:
-    """A figure of the page's width whose parts make room for one another, on a card."""
+    """A figure of the page's width on a card, whose parts make room for one another."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.patches import FancyBboxPatch
@@ -111,7 +112,7 @@ def new(height_in: float) -> Figure:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a picture without the time at which it was drawn."""
+    """Write a picture without the time of drawing."""
     kind = path.suffix.lower()
     with replaced(path) as new:
         if kind == ".svg":
@@ -124,10 +125,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def numbered(svg: str) -> str:
-    """A picture whose ids are numbers in the order in which they come.
-
-    matplotlib's are hashes of coordinates, whose last digit is not the same on every processor.
-    """
+    """The SVG with ids numbered in order; matplotlib's ids hash coordinates that differ between processors."""
     names: dict[str, str] = {}
     return re.sub(
         r'(?<=[#"])[a-z][0-9a-f]{10}(?=[")])', lambda found: names.setdefault(found[0], f"i{len(names)}"), svg
@@ -135,7 +133,7 @@ def numbered(svg: str) -> str:
 
 
 def for_dark_pages(svg: str) -> str:
-    """A picture that shows :data:`DARK` where a reader prefers dark pages: rules for the colors that it has."""
+    """The SVG with rules that apply :data:`DARK` where a reader prefers dark pages."""
     rules = []
     for light, dark in DARK.items():
         for what in ("fill", "stroke"):

@@ -1,4 +1,4 @@
-"""Files that come with the package, and pages that do not."""
+"""Example files of the package, and addresses of pages outside the package."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 PAGES = "https://github.com/contactfpga/contactfpga/blob/main/"
-"""Where the pages of the source tree can be read."""
+"""Address of the pages of the source tree."""
 _PAGE = re.compile(r"\bdocs/[\w-]+\.md\b")
 
 
@@ -21,7 +21,7 @@ def examples() -> Path:
 
 
 def with_pages(text: str) -> str:
-    """The text, in which ``docs/NAME.md`` is an address where there is no such file, as in an installed wheel."""
+    """The text with an address in place of each ``docs/NAME.md`` that does not exist, as in an installed wheel."""
     if (_package().parents[1] / "docs").is_dir():
         return text
     return _PAGE.sub(lambda page: PAGES + page[0], text)

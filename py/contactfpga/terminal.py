@@ -1,7 +1,6 @@
-"""What the place that a command writes to can show: how wide it is, which characters, whether it can be rewritten.
+"""Abilities of the stream to which a command writes: width, characters, and rewriting.
 
-Every command asks here, so that all of them agree. Text that goes to a file or a pipe is not wrapped, and no character
-is sent that the encoding has no place for.
+Text for a file or a pipe is not wrapped. Characters that the encoding lacks are replaced.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 PIPE_WIDTH = 160
-"""Of tables and pictures that go where nothing has a width."""
+"""Width in characters of tables and pictures that go to a file or a pipe."""
 
 USUAL_WIDTH, USUAL_HEIGHT = 80, 24
-"""Of a terminal that does not tell its size."""
+"""Columns and lines of a terminal of unknown size."""
 
 NARROWEST = 20
-"""Less than this is taken for this."""
+"""Least assumed width in characters."""
 
 _NEAREST = {
     "·": "|",
@@ -46,28 +45,28 @@ _NEAREST = {
     "≤": "<=",
     "≥": ">=",
 }
-"""What stands for a character in an encoding that lacks it."""
+"""Replacements of characters that an encoding lacks."""
 
 _ERRORS = "contactfpga.nearest"
 
 
 @dataclasses.dataclass(frozen=True)
 class Terminal:
-    """What a stream can show."""
+    """Abilities of an output stream."""
 
     width: int
     height: int | None
-    """Lines; None where there is no end of them."""
+    """Lines; None: unlimited."""
     unicode: bool
-    """All characters, not ASCII alone."""
+    """Whether the stream takes all characters, not only ASCII."""
     wraps: bool
-    """Long lines are to be broken at the width, as somebody reads along."""
+    """Whether to break long lines at the width, because a person reads them."""
     live: bool
-    """What was written can be written over."""
+    """Whether written text can be overwritten."""
 
 
 def of(stream: IO[str] | None = None) -> Terminal:
-    """What standard output, or another stream, can show now."""
+    """The abilities of a stream, by default standard output, at this moment."""
     stream = sys.stdout if stream is None else stream
     size = _size(stream)
     asked = _columns_asked()
@@ -85,7 +84,7 @@ def of(stream: IO[str] | None = None) -> Terminal:
 
 
 def _size(stream: IO[str]) -> os.terminal_size | None:
-    """None where the stream is no terminal."""
+    """Size of the terminal; None if the stream is no terminal."""
     try:
         return os.get_terminal_size(stream.fileno()) if stream.isatty() else None
     except (OSError, ValueError):
@@ -98,7 +97,7 @@ def _columns_asked() -> int | None:
 
 
 def prepare() -> None:
-    """From now on no character ends a command because the encoding of its output lacks it."""
+    """Replace unencodable characters from now on, so that none ends a command."""
     codecs.register_error(_ERRORS, _nearest)
     if sys.stdout is None:  # closed by a shell's >&-
         sys.stdout = _nowhere()
@@ -110,7 +109,7 @@ def prepare() -> None:
 
 
 def drop_unwritable() -> None:
-    """Drop what standard output does not take, or Python tries again at its exit and ends with status 120."""
+    """Discard output that standard output refused; otherwise Python retries it at exit and ends with status 120."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -137,9 +136,8 @@ def _ascii(character: str) -> str:
 
 
 def wrapped(text: str, width: int, hang: int = 0) -> str:
-    """The text in lines no longer than the width, but for words that are; all but the first are indented by ``hang``.
-
-    Lines of the text stay lines, and those after the first stay whole: they are there to be copied.
+    """The text with its first line broken into lines of at most ``width`` characters, except for longer words; all but
+    the first are indented by ``hang``. Further lines of the text are for copying and stay whole.
     """
     first, *rest = text.split("\n")
     lines = textwrap.wrap(first, width, subsequent_indent=" " * hang, break_long_words=False, break_on_hyphens=False)
@@ -147,21 +145,21 @@ def wrapped(text: str, width: int, hang: int = 0) -> str:
 
 
 def say(text: str, stream: TextIO | None = None, hang: int = 0) -> None:
-    """Print, wrapped where somebody reads along."""
+    """Print a text, wrapped if a person reads the stream."""
     stream = sys.stdout if stream is None else stream
     shown = of(stream)
     print(wrapped(text, shown.width, hang) if shown.wraps else text, file=stream, flush=True)
 
 
 def listed(start: str, items: Iterable[str], width: int, between: str = ", ") -> str:
-    """``start`` and the items with ``between`` between them, wrapped so that no item is broken."""
+    """``start`` and the items with ``between`` between them, wrapped between items only."""
     # Spaces of an item hold together as these do; they are spaces again in the end.
     text = between.join(item.replace(" ", "\xa0") for item in items)
     return wrapped(f"{start}{text}", width, 2).replace("\xa0", " ")
 
 
 def console(stream: TextIO | None = None) -> Console:
-    """Rich's console for standard output, or another stream, with what is known here."""
+    """Rich's console for a stream, by default standard output, with the stream's abilities."""
     from rich.console import Console
 
     class Ours(Console):
@@ -175,15 +173,16 @@ def console(stream: TextIO | None = None) -> Console:
 
 
 SOON_S = 1.0
-"""What takes no longer says nothing."""
+"""Duration in s up to which no progress is shown."""
 LIVE_S, LINES_S = 0.2, 10.0
-"""How often it is said: on a terminal that can be rewritten, and in lines."""
+"""Intervals of progress in s: on a terminal that can be rewritten, and elsewhere in lines."""
 
 
 @contextlib.contextmanager
 def reading(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Shows on standard error how far a long file is read. Yields what is to be called now and then with the bytes that
-    have been read of the file, and those in it."""
+    """Context that shows on standard error how far a long file is read. It yields a function of the bytes read and the
+    file's size.
+    """
     live = of(sys.stderr).live
     due_s, said = time.monotonic() + SOON_S, False
 

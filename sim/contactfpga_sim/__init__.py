@@ -1,6 +1,6 @@
-"""The simulation: what the gateware is held against, what shows that both agree, and the studies behind the pages.
+"""The simulation: golden model, virtual board, verification, and studies.
 
-``VirtualBoard`` is loaded when it is used first: the golden model needs no gateware.
+``VirtualBoard`` is imported on first use, because the golden model needs no gateware.
 """
 
 from typing import TYPE_CHECKING, Any

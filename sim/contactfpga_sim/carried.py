@@ -1,9 +1,7 @@
-"""The WebAssembly files of the package: boards, and the C header for a page in a browser.
+"""The package's WebAssembly files: boards, and the C header for a page in a browser.
 
-    python -m contactfpga_sim.carried
-
-builds the outdated ones, in a clone and with the extra ``release``, which is not needed if only the gateware's text
-changed.
+``python -m contactfpga_sim.carried`` builds the outdated files. It needs a clone and, unless only the gateware's text
+changed, the extra ``release``.
 """
 
 from __future__ import annotations
@@ -24,31 +22,31 @@ _DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
 
 
 def skins() -> dict[str, Skin]:
-    """Skins by name: those of ``sim://``, ``view`` and ``make sim``, and the kits."""
+    """Skins of the packaged boards, by name."""
     kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
     shown = {"reference": Skin(), "view": opening.own_skin(), "view-flat": opening.own_skin(flat=True)}
     return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
 
 
 def keys() -> dict[str, str]:
-    """The key that each file must have, by name."""
+    """Required key of each file, by name."""
     boards = {name: compiled.carried_key(skin) for name, skin in skins().items()}
     return boards | {DECODER: webassembly.c_key(_DECODER_C)}
 
 
 def stale() -> list[str]:
-    """Names of files that are missing, damaged, or not built from these sources."""
+    """Names of missing, damaged and outdated files."""
     return [name for name, key in keys().items() if webassembly.file(key) is None]
 
 
 def check() -> None:
-    """End the program if the package would be released with a stale file."""
+    """End the program if a file is stale."""
     if names := stale():
         sys.exit(f"{', '.join(names)}: not built from these sources; run python -m contactfpga_sim.carried")
 
 
 def build(name: str) -> bytes:
-    """The content of a file."""
+    """Content of a file."""
     with tempfile.TemporaryDirectory() as folder:
         if name == DECODER:
             return webassembly.build_c(_DECODER_C, Path(folder))
@@ -56,7 +54,7 @@ def build(name: str) -> bytes:
 
 
 def main() -> int:
-    """Build the files of changed designs, and write the list."""
+    """Build the files of changed designs and write the list."""
     files, late = dict(webassembly.listed()["files"]), stale()
     for name, key in keys().items():
         if name in late:
@@ -67,7 +65,7 @@ def main() -> int:
 
 
 def _renewed(name: str, before: dict[str, str]) -> str:
-    """The key of a file's design; the file is rebuilt if it is of another design."""
+    """Key of a file's design; a file of another design is rebuilt."""
     design = webassembly.c_key(_DECODER_C) if name == DECODER else compiled.design_key(skins()[name])
     path = webassembly.path_of(name)
     whole = path.is_file() and webassembly.sum_of(path.read_bytes()) == before.get("sha256")

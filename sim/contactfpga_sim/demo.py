@@ -28,13 +28,13 @@ from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_nat
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 FORCED = "pushing"
-"""The scene with force, which runs on a board with pressure units."""
+"""Scene with force, for pressure units."""
 
 LOOKS = 240
-"""Clocks between two samples of the scene's forces."""
+"""Clocks between two samples of the forces."""
 
 SCANS = 4
-"""An untouched scan, then the scene; the first touched frame is complete after the second scan."""
+"""Scans per run: an untouched one, then the scene."""
 
 TOUCH_SCAN = 1
 
@@ -48,31 +48,31 @@ RUNS = {
     "fingertip": ("compiled", "Amaranth", "cocotb, Verilator"),
     **{name: ("compiled",) for name in (*scenes.NAMES,) if name not in ("fingertip", "nothing")},
 }
-"""Engines of each scene."""
+"""Engines by scene."""
 
 
 @dataclasses.dataclass(frozen=True)
 class DemoResult:
-    """One scene through one engine."""
+    """Result of one scene in one engine."""
 
     skin: Skin
     scene: str
     engine: str
     cells: np.ndarray
     frame: Frame | None
-    """The first touched frame as received."""
+    """First touched frame, as received."""
     last_record: int | None
     """Clocks from the frame's last row to its last record."""
     first_byte_us: float
     last_byte_us: float
     size: int
     events: int
-    """Events at the stage boundaries, equal to the golden model's."""
+    """Compared events at the stage boundaries."""
     difference: str
 
 
 def run(name: str, engine: str, skin: Skin) -> DemoResult:
-    """Run the scene from the second scan on; all cycles are compared."""
+    """Run the scene, and compare all cycles from the second scan on."""
     scan = skin.derived.frame_clocks
     scene = scenes.scene(skin, name)
     untouched = np.zeros((skin.rows, skin.columns), bool)
@@ -103,7 +103,6 @@ def run(name: str, engine: str, skin: Skin) -> DemoResult:
 
 
 def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]]]:
-    """Readings of a Skin's pressure units by cycle under the scene."""
     if not skin.units:
         return []
     read = UnitReadings(scenes.CONTACTS[name](skin), load_cells(), skin)
@@ -111,29 +110,29 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
 
 
 def skin_of(name: str) -> Skin:
-    """The Skin of a scene's board."""
+    """Skin of a scene's board."""
     if name in scenes.AROUND:
         return forearm()
     return with_force() if name == FORCED else Skin()
 
 
 def with_force() -> Skin:
-    """The reference sheet on pressure units."""
+    """Reference sheet with pressure units."""
     return Skin.load(examples() / "force.toml")
 
 
 def forearm() -> Skin:
-    """A sheet of the reference size whose ends meet."""
+    """Closed sheet of the reference size."""
     return Skin.load(examples() / "forearm.toml")
 
 
 def load_cells() -> LoadCells:
-    """The pressure units of the scene with force."""
+    """Pressure units of the scene with force."""
     return LoadCells.load(examples() / "units-flat.toml")
 
 
 def feel() -> str:
-    """Run the scene with force through the driver; returns the contacts' pushes, true and estimated."""
+    """Run the scene with force through the driver; returns true and estimated forces as text."""
     skin, cells = with_force(), load_cells()
     with driver.open(VirtualBoard(skin, FORCED, units=cells), skin) as board:
         frames = WithReadings(board)
@@ -146,7 +145,7 @@ def feel() -> str:
 
 
 def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
-    """Cycle of the start bit of its first byte, end of its last one, its bytes on the wire, the frame."""
+    """Cycle of the frame's first start bit, cycle of its last byte's end, bytes on the wire, and the frame."""
     for got in frames_in(skin, trace.bytes):
         if got.frame.cells:
             return got.first + 1, got.last + 1 + 10 * skin.derived.bit_clocks, got.size, got.frame
@@ -165,7 +164,7 @@ LEGEND = (
     'touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is '
     "the median and the worst of touches at any instant of a scan.",
 )
-"""Explanation of the table's numbers."""
+"""Explanation of the table."""
 
 TITLE = (
     "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud; "
@@ -180,7 +179,7 @@ VERDICT = HEADS.index("verdict")
 
 
 def rows_of(outcomes: list[DemoResult]) -> list[list[str]]:
-    """The head, and a line per scene and engine."""
+    """Rows of the table: its head, then one per scene and engine."""
     rows = [list(HEADS)]
     for out in outcomes:
         zones = "-" if out.frame is None else str(out.frame.zones)
@@ -192,7 +191,7 @@ def rows_of(outcomes: list[DemoResult]) -> list[list[str]]:
 
 
 def main() -> int:
-    """Run every scene; 1 if gateware and golden model differ anywhere."""
+    """Run every scene; returns 1 if gateware and golden model differ."""
     parser = argparse.ArgumentParser(prog="make sim", description=__doc__)
     parser.add_argument("--picture", type=Path, default=Path("build/scenes.png"), help="where the scenes are drawn")
     picture = parser.parse_args().picture

@@ -1,1 +1,1 @@
-"""From a Skin to a bitstream on a board (contactfpga.boards)."""
+"""Bitstreams for boards."""

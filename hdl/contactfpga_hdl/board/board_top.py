@@ -18,11 +18,11 @@ from contactfpga_hdl.top import Top
 from contactfpga_hdl.units.ports import unit_pins
 
 _UART = 1
-"""Number of our UART; the platform's own is 0."""
+"""Number of the Skin's UART; the platform's own is 0."""
 
 
 def platform_for(board: BoardSpec) -> Platform:
-    """A fresh platform of the board, as amaranth-boards has it."""
+    """A new platform of the board from amaranth-boards."""
     module, _, name = board.platform.partition(":")
     return getattr(importlib.import_module(module), name)()
 
@@ -30,8 +30,8 @@ def platform_for(board: BoardSpec) -> Platform:
 class BoardTop(Elaboratable):
     """Requests the pins and connects the Skin's :class:`Top` to them.
 
-    The sheet must have passed :meth:`BoardSpec.check`. Rows are plain outputs: the diode at each switch separates them.
-    Without diodes a row is low or floats, since two may meet. Bidirectional lines have a buffer each.
+    The sheet must have passed :meth:`BoardSpec.check`. Rows are plain outputs, which the diode at each switch
+    separates; without diodes a row is low or floats, since two may meet. Bidirectional lines have a buffer each.
     """
 
     def __init__(self, board: BoardSpec, skin: Skin):
@@ -104,7 +104,6 @@ class BoardTop(Elaboratable):
             m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
 
     def _pulls(self, name: str) -> Mapping[str, object]:
-        """Pulls: columns to the released level, rows that are read to the other."""
         up = self.skin.selects_low == (name == "columns")
         needs = name == "columns" or f"{name}_read" in self._sheet
         return self.board.pulls["col2row" if up else "row2col"] if needs else {}
@@ -129,7 +128,7 @@ class BoardTop(Elaboratable):
 
 
 class SheetsTop(BoardTop):
-    """A board top for several sheets. All of their lines are on shift registers, which drive their outputs."""
+    """A board top for several sheets, whose lines are all on shift registers."""
 
     def __init__(self, board: BoardSpec, several: Several):
         super().__init__(board, several.skins[0])

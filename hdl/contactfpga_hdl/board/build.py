@@ -1,4 +1,4 @@
-"""From a Skin to a bitstream for a board, with tools from PyPI."""
+"""Build of a bitstream with tools from PyPI."""
 
 from __future__ import annotations
 
@@ -29,20 +29,19 @@ _TOOLS = {
 _NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"
 
 LIMIT_S = 900
-"""Timeout: for some seeds the router never ends; successful builds need up to two minutes."""
+"""Timeout: for some seeds the router never ends; successful builds take up to two minutes."""
 
 LOG = f"{NAME}.tim"
-"""Log file of nextpnr."""
 
 CROWDED = 0.8
 """Used share of a resource above which it is blamed for a failed placement."""
 
 
 def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
-    """Build the bitstream of one or several sheets in ``folder``; raises BitstreamFailed if it does not fit or misses
-    its timing.
+    """Build the bitstream of one or several sheets in ``folder``. Raises BitstreamFailed if the design does not fit or
+    misses its timing.
 
-    ``seed`` is the start of place and route; the same one gives the same bitstream.
+    ``seed``: start of place and route; equal seeds give equal bitstreams.
     """
     plan = plan_for(board, skin, seed)
     folder = folder.resolve()
@@ -73,7 +72,6 @@ def plan_for(board: BoardSpec, skin: Skin | Several, seed: int = 1) -> BuildPlan
 
 
 def _described(skin: Skin | Several) -> dict[str, str]:
-    """Sources of the bitstream, by file."""
     if isinstance(skin, Skin):
         return {"skin.toml": skin.to_toml()}
     files = {f"sheet-{number}.toml": one.to_toml() for number, one in enumerate(skin.skins)}
@@ -106,7 +104,6 @@ def _run(folder: Path, board: BoardSpec, seed: int) -> None:
 
 
 def _stop(run: subprocess.Popen) -> None:
-    """Stop the script and its children."""
     if os.name == "nt":
         run.kill()
     else:

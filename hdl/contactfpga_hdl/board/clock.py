@@ -1,4 +1,4 @@
-"""A clock whose frequency differs from the board's crystal, from the FPGA's PLL."""
+"""A clock from the FPGA's PLL."""
 
 from amaranth.hdl import (
     ClockDomain,
@@ -19,13 +19,13 @@ from contactfpga.boards import pll
 from contactfpga.boards.spec import BoardSpec
 
 RESET_US = 15
-"""Reset after the PLL's lock. The block RAMs of an iCE40 are unreadable in the first 3 us; this is five times that, as
-in Amaranth's reset for a crystal."""
+"""Reset after the PLL's lock: five times the 3 us in which an iCE40's block RAMs are unreadable, as in Amaranth's reset
+for a crystal."""
 
 
 class HeldReset(wiring.Component):
-    """Reset at power-up and until the asynchronous ``locked`` has been high for ``clocks``, plus two of synchronizer. A
-    lost lock restarts it."""
+    """Reset at power-up and until the asynchronous ``locked`` has been high for ``clocks`` and two synchronizer clocks.
+    A lost lock restarts it."""
 
     def __init__(self, clocks: int):
         self.clocks = clocks

@@ -1,6 +1,6 @@
-"""Writes what follows from the boards' pin tables: constraints/ and the tables in docs/boards.md.
+"""Writes constraints/ and the pin tables in docs/boards.md from the boards' pins.
 
-``python -m contactfpga_hdl.board.constraints`` in the project's folder, or ``make constraints``.
+Run ``python -m contactfpga_hdl.board.constraints`` in the project's folder, or ``make constraints``.
 """
 
 import itertools
@@ -17,7 +17,7 @@ FOLDER = Path("constraints")
 
 
 def constraints(board: BoardSpec) -> str:
-    """The constraints of the board's default sheet, as place and route gets them."""
+    """The constraints of the board's default sheet for place and route."""
     skin = board.skin
     suffix = board.constraints.partition(".")[2]
     made = plan_for(board, skin).files[f"{NAME}.{suffix}"]
@@ -28,7 +28,7 @@ def constraints(board: BoardSpec) -> str:
 
 
 def pin_tables(board: BoardSpec) -> str:
-    """Which lines are on which pins, as Markdown. Wires to shift registers use the same pins in the same order."""
+    """Lines by pin as Markdown. Wires to shift registers use the same pins in the same order."""
     rows, columns = board.row_side, board.column_side
     sides = {
         f"rows 0 to {len(rows) - 1}": rows,
@@ -46,13 +46,12 @@ def _named(ports: Iterable[str]) -> str:
 
 
 def _listed(labels: Sequence[str]) -> str:
-    """Each connector once, and the numbers of its pins."""
     groups = itertools.groupby((label.rpartition(" ")[::2] for label in labels), key=lambda found: found[0])
     return "; ".join(f"{connector} {', '.join(number for _, number in group)}" for connector, group in groups)
 
 
 def page_with_tables(page: str) -> str:
-    """The page with the tables between ``<!-- pins: BOARD -->`` and ``<!-- end -->`` made again."""
+    """The page with new tables between ``<!-- pins: BOARD -->`` and ``<!-- end -->``."""
 
     def table(found: re.Match) -> str:
         return f"{found[1]}\n{pin_tables(BOARDS[found[2]])}\n<!-- end -->"

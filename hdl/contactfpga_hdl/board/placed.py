@@ -8,19 +8,16 @@ import re
 from pathlib import Path
 
 FILE = "report.json"
-"""Output of ``nextpnr --report``."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """FPGA resources and maximum clock of a design."""
-
     luts: tuple[int, int]
     """4-input look-up tables, used and available."""
     flip_flops: int
     block_rams: tuple[int, int]
     logic_cells: tuple[int, int] | None
-    """iCE40 only: cells of one LUT and one flip-flop, used and available; the limiting resource."""
+    """Cells of one LUT and one flip-flop, used and available, the limiting resource of an iCE40; otherwise None."""
     fmax_mhz: float
     needed_mhz: float
 
@@ -29,7 +26,6 @@ class Report:
         return self.fmax_mhz >= self.needed_mhz
 
     def lines(self) -> list[str]:
-        """The report as a table."""
         rows = [("LUT4", f"{self.luts[0]} of {self.luts[1]}"), ("flip-flops", str(self.flip_flops))]
         if self.logic_cells is not None:
             rows.append(("logic cells", f"{self.logic_cells[0]} of {self.logic_cells[1]}"))
@@ -39,7 +35,7 @@ class Report:
 
 
 def read(folder: Path, log: str) -> Report:
-    """The results of nextpnr in ``folder``: its report, and for an iCE40 its log of that name."""
+    """Results of nextpnr in ``folder``: its report, and for an iCE40 its log."""
     figures = json.loads((folder / FILE).read_text(encoding="utf-8"))
     cells = {name: (cell["used"], cell["available"]) for name, cell in figures["utilization"].items()}
     clock = min(figures["fmax"].values(), key=lambda clock: clock["achieved"] / clock["constraint"])
@@ -62,5 +58,4 @@ def read(folder: Path, log: str) -> Report:
 
 
 def _packed(log: str, kind: str) -> int:
-    """LUTs or flip-flops, from nextpnr's packing lines."""
     return sum(int(count) for count, kinds in re.findall(r"(\d+) LCs used as (.*)", log) if kind in kinds)

@@ -1,4 +1,4 @@
-"""The FPGA pin of each wire, by amaranth-boards."""
+"""FPGA pins of wires, from amaranth-boards."""
 
 from __future__ import annotations
 
@@ -10,19 +10,17 @@ from contactfpga_hdl.board.board_top import platform_for
 
 
 def connector_sites(board: BoardSpec) -> dict[str, str]:
-    """FPGA pin of every connector pin of the platform."""
     platform = platform_for(board)
     return {name: pin for connector in platform.connectors.values() for name, pin in connector}
 
 
 def wire_sites(board: BoardSpec, wires: list[Wire]) -> list[str]:
-    """FPGA pin of each of these wires."""
     connected, own = connector_sites(board), own_sites(board)
     return [connected[wire.pin] if wire.pin else own[wire.port] for wire in wires]
 
 
 def own_sites(board: BoardSpec) -> dict[str, str]:
-    """FPGA pins that the board itself connects, by port of the wire."""
+    """FPGA pins that the board itself connects, by port."""
     platform = platform_for(board)
     (clock,) = platform.resources[platform.default_clk, 0].ios
     found = {"clock": clock.names[0]}

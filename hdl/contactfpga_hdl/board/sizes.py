@@ -32,7 +32,7 @@ class Device:
     fpga: str
     place: tuple[str, ...]
     counts: tuple[str, str, str]
-    """Log entries with LUT4, flip-flops and block RAMs after packing."""
+    """Patterns of LUT4, flip-flops and block RAMs in the log after packing."""
 
 
 UP5K = Device(
@@ -50,8 +50,8 @@ ECP5 = Device(
 DEVICES = (UP5K, ECP5)
 SEEDS = 5
 LIMIT_S = 200
-"""CPU time limit, independent of load where the system supports it: for some seeds the router never ends, and they are
-skipped. Successful runs need up to a minute."""
+"""CPU time limit, where the system supports it; seeds for which the router never ends are skipped, others take up to a
+minute."""
 
 
 class _NoEnd(BitstreamFailed):
@@ -61,7 +61,7 @@ class _NoEnd(BitstreamFailed):
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """Fmax is the median over the first seeds whose place and route ends; the rest does not depend on them."""
+    """Size and speed; Fmax is the median over the first seeds whose place and route ends."""
 
     luts: int
     flip_flops: int
@@ -82,14 +82,14 @@ class Netlists:
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
-    """Synthesize ``component``, and place and route it once a seed; needs seconds to minutes."""
+    """Synthesize ``component``, and place and route it once per seed; takes seconds to minutes."""
     return measure_netlists(Netlists.of(component), device, seeds)
 
 
 def measure_netlists(
     netlists: Netlists, device: Device, seeds: int = SEEDS, before: tuple[str, ...] | None = None
 ) -> Size:
-    """:func:`measure` for a design that need not come from Amaranth.
+    """:func:`measure` for a design of any origin.
 
     ``before``: first Yosys commands, instead of the FPGA family's.
     """
@@ -108,7 +108,7 @@ def measure_netlists(
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """LUT4 of :func:`measure`, in seconds: synthesized and packed, but not placed or routed."""
+    """LUT4 of :func:`measure`, in seconds: without place and route."""
     return _packed(_rtlil(component()), device)[0]
 
 
@@ -118,7 +118,6 @@ def _rtlil(design: Elaboratable) -> str:
 
 
 def _packed(design: str, device: Device, before: tuple[str, ...] | None = None) -> list[int]:
-    """LUT4, flip-flops and block RAMs."""
     with _folder() as folder:
         _synthesize(design, device, folder, before)
         log = _run(folder, *device.place, "--json", "netlist.json", "--pack-only")
@@ -165,7 +164,7 @@ def _limited() -> dict[str, Any]:
 
 
 class Registered(wiring.Component):
-    """A component between registers, with two pins, as a wide one has more ports than an FPGA has pins."""
+    """A component between registers, with two pins: a wide component has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):
         self.inner = inner

@@ -1,12 +1,11 @@
-"""Commands of yosys and nextpnr, common to bitstreams, simulated netlists and figures."""
+"""Commands of yosys and nextpnr for bitstreams, simulated netlists and figures."""
 
 import dataclasses
 
 NO_COLLISIONS = "setparam -set COLLISION_X_MASK 1'1 t:$memrd_v2"
 """Option for memories whose words are never used from a clock in which they are written.
 
-Amaranth promises the word before the write, an FPGA's memory does not: the promise would need an address comparison and
-two registers per bit.
+Amaranth promises the word before the write; on an FPGA this takes an address comparison and two registers per bit.
 """
 
 _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'
@@ -14,14 +13,11 @@ _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'
 
 @dataclasses.dataclass(frozen=True)
 class Family:
-    """Commands for the FPGAs of a family."""
-
     command: str
     options: str
     before: tuple[str, ...]
-    """Yosys commands that precede it."""
+    """Yosys commands before synthesis."""
     route: str = ""
-    """Options of nextpnr."""
 
 
 FAMILIES = {
@@ -41,7 +37,6 @@ FAMILIES = {
     # The products have a few bits each; the way to a multiplier and back takes longer than they do.
     "LFE5U": Family("synth_ecp5", "-nodsp", (NO_COLLISIONS,)),
 }
-"""Families by the beginning of the FPGA's name."""
 
 
 def overrides(fpga: str) -> dict[str, str]:

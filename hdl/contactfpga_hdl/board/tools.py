@@ -1,4 +1,4 @@
-"""Programs that make bitstreams of gateware."""
+"""Programs that make bitstreams."""
 
 import shutil
 import sysconfig
@@ -9,7 +9,7 @@ class BitstreamFailed(Exception):
 
 
 def tool(name: str) -> str:
-    """Path of a program of the extra ``boards``."""
+    """Path of a program of the extra ``boards``. Raises ModuleNotFoundError."""
     # Beside this Python first: an environment need not be on the PATH.
     found = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
     if found is None:

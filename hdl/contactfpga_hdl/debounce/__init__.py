@@ -1,1 +1,1 @@
-"""Debounce: keeps contact bounce from the later stages."""
+"""Debounce between scan and labeller."""

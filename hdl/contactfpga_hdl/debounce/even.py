@@ -29,13 +29,13 @@ class Phase:
 
 
 class Debounce(wiring.Component):
-    """Raw rows in, debounced rows out; C columns need C + 3 clocks, one column per clock.
+    """Raw rows in, debounced rows out; one column per clock, C columns take C + 3 clocks.
 
-    Each switch has one word in a memory: with ``sym_defer_pk`` its state and for how many samples the raw one has
-    differed, with ``asym_eager_defer_pk`` the samples until it counts as released, 0 when it does.
+    A memory has a word per switch: with ``sym_defer_pk`` its state and the samples for which the raw one has differed,
+    with ``asym_eager_defer_pk`` the samples until the switch counts as released, or 0.
 
-    raw (in): a frame's rows in ascending order; taken when the one before has left.
-    rows (out): the rows without bounce.
+    raw (in): a frame's rows in ascending order; taken when the row before has left.
+    rows (out): debounced rows.
     """
 
     def __init__(self, skin: Skin):
@@ -93,7 +93,7 @@ def walk_columns(
 ) -> Value:
     """Pass each switch of a raw row through ``switch``, with its word from a memory and back; offer the resulting row.
 
-    Returns whether the row is a frame's last. ``row`` is its number, until ``phase.finish``.
+    Returns whether the row is a frame's last; ``row``: its number, until ``phase.finish``.
     """
     columns = skin.columns
     column_bits, row_bits = (columns - 1).bit_length(), (skin.rows - 1).bit_length()

@@ -1,4 +1,4 @@
-"""Debounce for rows that are not sampled at even times: delays are counted in row times."""
+"""Debounce for rows sampled at uneven times: delays are counted in row times."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
@@ -10,15 +10,15 @@ from contactfpga_hdl.payloads import row_layout
 
 
 class TimedDebounce(wiring.Component):
-    """Raw rows in, debounced rows out; a row that was driven alone needs C + 3 clocks, others none.
+    """Raw rows in, debounced rows out; a row that was driven alone takes C + 3 clocks, other rows none.
 
-    Others are quiet: no cell reads pressed, and no switch counts as pressed or has a time running.
+    Other rows are quiet: no cell reads pressed, and no switch counts as pressed or has a time running.
 
     raw (in): a frame's rows in ascending order.
     alone (in): the offered row was driven alone.
-    now (in): the row time of its sample; must hold for C + 4 clocks, unless the scan waits.
-    rows (out): the rows without bounce.
-    busy (out): a bit per row that was not quiet after its last sample, as soon as it is offered.
+    now (in): row time of its sample, constant for C + 4 clocks unless the scan waits.
+    rows (out): debounced rows.
+    busy (out): a bit per row that was not quiet after its last sample, from the row's offer on.
     """
 
     def __init__(self, skin: Skin):
@@ -119,7 +119,7 @@ class _TimedWalk(wiring.Component):
 
 
 def _defer_both(m: Module, switch: _TimedSwitch, press: int, release: int) -> None:
-    """State: whether it counts as pressed, and whether its reading has differed since."""
+    """State: whether the switch counts as pressed, and whether its reading has differed since."""
     pressed, differed = switch.state
     differs = switch.raw ^ pressed
     time = Mux(pressed, release, press)

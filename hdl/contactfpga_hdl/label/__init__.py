@@ -1,1 +1,1 @@
-"""Labellers: rows in, zone records out, behind one interface (contactfpga.choices.labellers)."""
+"""Labellers with common ports: rows in, zone records out (contactfpga.choices.labellers)."""

@@ -1,12 +1,11 @@
-"""Turns of clusters, runs and cells around a cylinder, for sheets whose ends meet.
+"""Turns of clusters, runs and cells of a sheet whose ends meet (docs/labelling.md).
 
 Columns count on past the seam, over two adjacent turns. A zone's runs, from left to right, are on one turn, or from
-some run on a turn back, because their path to the first one crosses the seam: one bit tells which. The same holds for
-clusters of a group. If two paths disagree by a turn, the zone goes round the cylinder, as a ring.
+some run on a turn back: one bit tells which. The same holds for clusters of a group. If two paths disagree by a turn,
+the zone is a ring around the cylinder.
 
 A group's cells are on the turn of its first cluster and on an adjacent one, the next or the one *back*; ``turned``
-counts those on the upper one of the two. When groups merge, their counts move to the turn where they are now. A group
-that needs a third turn is ``wound``.
+counts the cells on the upper one. A group that needs a third turn is ``wound``.
 """
 
 from typing import Protocol
@@ -19,11 +18,8 @@ from contactfpga_hdl.label.steps import kept_layout, nesting, over_the_seam, tur
 
 
 class Turns:
-    """The turn of the walked cluster.
-
-    It follows from the zone of a previous row's run that has an earlier one, and at the seam: the first cluster is the
-    neighbor of the last, which therefore is a turn back.
-    """
+    """The turn of the walked cluster: from the zone of a run of the row before that has an earlier run, and at the
+    seam, where the last cluster is a turn back from the first."""
 
     def __init__(self, derived: Derived):
         self.seam = Signal(name="joins_seam")  # the last cluster is joined with the first one
@@ -35,10 +31,10 @@ class Turns:
     def find(self, m: Module, turn: Value, goes_on: Value, pop: Value, apart: Value, linked: Value) -> None:
         """Determine the turn.
 
-        turn: as known so far.
-        goes_on: a previous row's run has an earlier one of its zone, and is a turn further back than that if
-            ``linked``.
-        pop: what it or the seam joins was waiting.
+        turn: the turn as known so far.
+        goes_on: a run of the row before has an earlier one of its zone; ``linked``: it is a turn further back than that
+            one.
+        pop: the run or the seam joins a waiting group.
         apart: the run does not touch the cluster before it, though the group continues.
         """
         m.d.comb += [
@@ -52,7 +48,7 @@ class Turns:
             m.d.comb += self.turn.eq(self._zones[0] | linked)
 
     def keep(self, m: Module, passes: Value, earlier: Value, later: Value) -> None:
-        """Store the turn for the zone of a previous row's run that ``passes``."""
+        """Store the turn for the zone of a run of the row before that ``passes``."""
         with m.If(passes):
             kept = Mux(earlier, self._zones >> 1, self._zones)
             m.d.sync += self._zones.eq(Mux(later, Cat(self.turn, kept), kept))
@@ -62,10 +58,10 @@ class Unwrap(Elaboratable):
     """The turns of a group while cells and found groups are added.
 
     kept, down (in): the group so far, and whether all of it is now known to be a turn back.
-    found, joins, zone (in): what joins it, if anything: a zone of the row before, or a waiting group, which gives the
-        group its first cluster; all zeros for none.
+    found, joins, zone (in): the group that joins, or zeros: a zone of the row before, or a waiting group, whose first
+        cluster becomes the group's.
     turn, cells (in): turn of the walked cluster, and number of its new cells.
-    ring (in): this makes the group a ring.
+    ring (in): the group becomes a ring.
     group (out): the resulting group.
     """
 
@@ -102,7 +98,6 @@ class Unwrap(Elaboratable):
 
 
 def stored_turns() -> dict[str, int]:
-    """Fields of a waiting group: the turns of its first and its last run."""
     return {"first_turn": 1, "last_turn": 1}
 
 
@@ -126,8 +121,6 @@ def unwrapped(
 
 
 class Acts(Protocol):
-    """Actions of the labeller in a clock."""
-
     enable: Signal
     joins: Signal
     apart: Signal
@@ -136,8 +129,7 @@ class Acts(Protocol):
 class SerialTurns:
     """Turns of the labeller ``serial``: registers and memory for the walked group.
 
-    The seam is one more zone of the row before: it begins before the first column, outermost in its group, and ends
-    after the last column, in two clocks like every run of the row before. Turns are determined as in ``run``.
+    The seam is one more zone of the row before, which begins before the first column and ends after the last column.
     """
 
     def __init__(self, derived: Derived):
@@ -152,7 +144,6 @@ class SerialTurns:
         self.linked_runs = memory.Memory(shape=1, depth=derived.open_zones, init=[])
 
     def walk(self, m: Module, handed: Value, row: Value, before: Value, last_column: Value, advance: Value) -> None:
-        """Walk the seam in the clocks after the last column."""
         m.d.comb += self.begins.eq(handed & over_the_seam(self.derived, row, before))
         with m.If(handed):
             m.d.sync += self.meets.eq(self.begins)
@@ -181,12 +172,11 @@ class SerialTurns:
 
     def link(self, has_run: Value, starts: Value, found: data.View) -> Value:
         """Whether a run is a turn further back than its earlier one: the run that ``starts``, or the group's first as
-        ``found`` joins it."""
+        ``found`` joins."""
         onto = has_run & self.turn & ~self.last_turn
         return Mux(starts, onto, (self.first_turn | self.turns.down) & ~found.last_turn)
 
     def unwrap(self, m: Module, kept: data.View, found: data.View, joins: Value, zone: Value, adds: Value) -> data.View:
-        """The turns of the group after this clock."""
         m.submodules.unwrap = unwrap = Unwrap(self.derived)
         m.d.comb += [
             unwrap.kept.eq(kept),

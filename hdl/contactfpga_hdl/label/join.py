@@ -1,4 +1,4 @@
-"""Steps to zones: runs of one zone, found by brackets and a stack."""
+"""Steps to zones: brackets and a stack find the runs of one zone."""
 
 import math
 from typing import TYPE_CHECKING
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def _marks_layout(derived: Derived) -> data.StructLayout:
-    """Runs of the new row that a step finds to be one zone, by their numbers: ``last`` and the later ``first`` when
-    two groups become one, ``onto`` and the step's run ``number`` when that one follows."""
+    """Runs of the new row, by number, that a step finds to be one zone: ``last`` and the later ``first`` when two
+    groups become one, ``onto`` and the step's run ``number`` when that run follows."""
     number = range(_runs(derived))
     back = {"over_back": 1, "onto_back": 1} if derived.skin.closed else {}  # the later one is a turn further back
     return data.StructLayout(
@@ -35,18 +35,17 @@ def _marks_layout(derived: Derived) -> data.StructLayout:
 
 
 def _runs(derived: Derived) -> int:
-    """The most runs of a row."""
     return max(1, math.ceil(derived.skin.columns / 2))
 
 
 class Brackets(wiring.Component):
-    """Which runs of a row have an earlier or a later one of their zone in it.
+    """Whether runs of a row have an earlier or a later run of their zone in this row.
 
     enable (in): nothing changes without it.
-    marks (in): of a step, all zeros for none. They count from the next clock on.
+    marks (in): marks of a step, zeros for none; they count from the next clock.
     passes (in): the run of the row before is passed.
-    earlier, later (out): it has an earlier, or a later, run of its zone in its row.
-    turned (out): on a sheet whose ends meet, it is a turn further back than the earlier one.
+    earlier, later (out): that run has an earlier, or a later, run of its zone in its row.
+    turned (out): on a sheet whose ends meet, the run is a turn further back than the earlier one.
     """
 
     def __init__(self, derived: Derived):
@@ -195,7 +194,6 @@ class Join(wiring.Component):
     def _take_in(
         self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: "Turns | None"
     ) -> data.View:
-        """The current group, merged with the one on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
         with m.If(pop):
@@ -240,7 +238,6 @@ class Join(wiring.Component):
         number: Value,
         turns: "Turns | None",
     ) -> Value:
-        """The new row's runs that the step finds to be one zone."""
         layout = _marks_layout(self.derived)
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
         follows = self.step.has_run & joined.has_run  # the new run follows one of its zone
@@ -274,7 +271,7 @@ class Join(wiring.Component):
         return decided
 
     def _run_moments(self, m: Module, run: data.View) -> list:
-        """Moments of the new run, whose column sum is a difference of triangular numbers."""
+        """Moments of the new run; its column sum is a difference of triangular numbers."""
         step = self.step
         below = Array(math.comb(column, 2) for column in range(self.derived.skin.columns + 1))
         return [

@@ -1,8 +1,8 @@
 """Zones from their shadows on the two axes: small, and wrong where shadows cross.
 
-Rows with a pressed cell form *bands* of adjacent rows. Within a band the columns with a pressed cell, its shadow, form
-runs; the cells above one run are one zone. So two contacts in one band whose shadows touch are merged, and a ring
-includes its interior. A connected contact is never split, and the moments of a zone so defined are exact.
+Adjacent rows with a pressed cell form a *band*; the columns with a pressed cell in a band, its shadow, form runs. The
+cells above one run are one zone. So two contacts whose shadows touch are merged, and a ring includes its interior. A
+connected contact is never split; the moments of these zones are exact.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -13,18 +13,14 @@ from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
 def _step_layout() -> data.StructLayout:
-    """A column of a row, or the end mark after a frame's last row."""
     return data.StructLayout({"valid": 1, "cell": 1, "shadow": 1, "stop": 1, "closes": 1, "end": 1})
 
 
 class ProjectionLabeller(wiring.Component):
-    """Rows in, zone records out; one column per clock.
+    """Rows in, zone records out, one column per clock; ports as in :func:`~contactfpga_hdl.payloads.labeller_ports`.
 
-    A row of C columns needs C + 1 clocks, an empty one outside a band one. A band closes with the empty row after it or
+    A row of C columns takes C + 1 clocks, an empty row outside a band one. A band closes with the empty row after it or
     with the frame's last row, handed over in clock h; the zone whose shadow ends in column x leaves in clock h + x + 3.
-
-    rows (in): a frame's rows in ascending order.
-    records (out): its zones, then an end mark.
     """
 
     def __init__(self, skin: Skin):
@@ -41,7 +37,6 @@ class ProjectionLabeller(wiring.Component):
         return m
 
     def _walk_columns(self, m: Module, enable: Value) -> tuple[data.View, Value, Value]:
-        """Step through the columns of a row; returns the step, its column and its row."""
         step = Signal(_step_layout())
         column = Signal(range(max(2, self.derived.skin.columns)))
         y = Signal(range(max(2, self.derived.skin.rows)))
@@ -109,7 +104,6 @@ class ProjectionLabeller(wiring.Component):
         return added, total
 
     def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
-        """Add up the columns of a run in a closing band, one clock after their sums."""
         kept, zone = Signal.like(total), Signal.like(total)
         closes = step.valid & step.closes
         leaves = closes & (step.cell | step.shadow) & step.stop

@@ -1,14 +1,11 @@
-"""Contact zones and their moments, in one pass over the rows as they arrive.
+"""Contact zones and their moments, in one pass over the rows as they arrive (docs/labelling.md).
 
-Two adjacent rows are combined. The connected pieces of these rows alone, *clusters*, are walked from left to right, one
-run of each row per clock. The connections of the row before further up are in two bits per run: whether a run of the
-same zone precedes it in its row, and whether one follows. Zones never cross in the plane, so these bits nest like
-brackets, and a stack replaces equivalence tables: a zone with more runs to the right waits on the stack, and the
-innermost one is always needed next.
+The connected pieces of two adjacent rows alone, *clusters*, are walked from left to right, one run of each row per
+clock. Two bits per run tell whether a run of the same zone precedes it in its row, and whether one follows. Zones never
+cross in the plane, so these bits nest like brackets, and a stack replaces equivalence tables.
 
-A zone's moments are in a table at the start column of its first run in the row (halved with 8-connectivity). Two runs
-of different zones in the same or adjacent rows never share such a place, so the table cannot overflow and needs no
-allocation.
+A zone's moments are in a table at the start column of its first run in the row (halved with 8-connectivity). Runs of
+different zones in the same or adjacent rows never share a place, so the table cannot overflow.
 """
 
 from amaranth.hdl import Module, Mux, Signal
@@ -23,14 +20,12 @@ from contactfpga_hdl.payloads import labeller_ports, record_layout
 
 
 class RunLabeller(wiring.Component):
-    """Rows in, zone records out; work follows the runs of pressed cells.
+    """Rows in, zone records out, by runs of pressed cells; ports as in
+    :func:`~contactfpga_hdl.payloads.labeller_ports`.
 
-    A row with n steps needs n + 2 clocks, two empty rows one; a zone leaves three clocks after the last step with one
-    of its cells (docs/timing.md). With C columns a row needs at most ceil(C/2) steps with 8-connectivity and C with 4.
-    Each step passes walk, join and sum in three clocks.
-
-    rows (in): a frame's rows in ascending order.
-    records (out): its zones, then an end mark.
+    A row with n steps takes n + 2 clocks, two empty rows one; a zone leaves three clocks after the last step with one
+    of its cells (docs/timing.md). Of C columns a row has at most ceil(C/2) steps with 8-connectivity and C with 4. Each
+    step passes walk, join and sum in three clocks.
     """
 
     def __init__(self, skin: Skin):
@@ -61,7 +56,7 @@ class Sum(wiring.Component):
 
     enable (in): nothing changes without it.
     valid, join (in): a step's addition to its zone, and the zone's fate.
-    lookup (in): one clock ahead of ``join``, the place of what it loads.
+    lookup (in): one clock before ``join``, the place of the data that it loads.
     records (out): in the clock of the step that closes the zone.
     """
 

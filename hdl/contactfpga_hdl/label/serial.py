@@ -1,9 +1,8 @@
 """Contact zones and their moments, one cell per clock, in little more than an adder and three memories.
 
-Rows, clusters and brackets are those of ``docs/labelling.md``, walked a column at a time. A column needs one clock, in
-which its cell is added to the walked cluster's group. At the beginning of a run of the row before, a second clock adds
-its zone's moments: from the table, or from a waiting group. Waiting groups are in the table, too, each at a place in
-its cluster, linked to the one that began to wait before it.
+Rows, clusters and brackets are those of docs/labelling.md. Each column takes a clock, in which its cell is added to the
+walked cluster's group. At the start of a run of the row before, a second clock adds its zone's moments, from the table
+or from a waiting group. Waiting groups are in the table, too, each linked to the group that began to wait before.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -44,8 +43,6 @@ class _Columns:
 
 
 class _Step:
-    """Actions of this clock."""
-
     def __init__(self) -> None:
         self.enable = Signal()  # anything at all: no record waits
         self.advance = Signal()  # it is the last one of the column
@@ -58,8 +55,6 @@ class _Step:
 
 
 class _Group:
-    """The group of the walked cluster."""
-
     def __init__(self, derived: Derived, place_bits: int):
         self.whole = Signal(init=1)  # none of its zones has runs of the row before to come
         self.has_run = Signal()  # in the new row
@@ -70,21 +65,17 @@ class _Group:
 
 
 def _stored_layout(derived: Derived, place_bits: int) -> data.StructLayout:
-    """A waiting group, or a zone of the row before; ``below`` is the place of the next waiting group."""
     places = {"first": place_bits, "end": place_bits, "below": place_bits}
     turns = stored_turns() if derived.skin.closed else {}
     return data.StructLayout({"moments": kept_layout(derived), "has_run": 1, **places, **turns})
 
 
 class SerialLabeller(wiring.Component):
-    """Rows in, zone records out; one cell per clock.
+    """Rows in, zone records out, one cell per clock; ports as in :func:`~contactfpga_hdl.payloads.labeller_ports`.
 
-    A row of C columns needs C + e + 2 clocks, and a zone leaves a clock after the last column of its last cluster
-    (docs/timing.md). e is the number of runs in the row before, at most ceil(C/2) with 8-connectivity, C with 4. If the
-    ends of the sheet meet, a row joined over the seam needs two clocks more.
-
-    rows (in): a frame's rows in ascending order.
-    records (out): its zones, then an end mark.
+    A row of C columns takes C + e + 2 clocks, and a zone leaves a clock after the last column of its last cluster
+    (docs/timing.md). e is the number of runs in the row before, at most ceil(C/2) with 8-connectivity, C with 4. A row
+    that is joined over the seam takes two clocks more.
     """
 
     def __init__(self, skin: Skin):
@@ -275,7 +266,6 @@ class SerialLabeller(wiring.Component):
         earlier: Value,
         around: SerialTurns,
     ) -> None:
-        """Update the turns of group, runs and cells."""
         over = acts.closes | ~walk.active
         joins, zone = acts.joins & (~earlier | group.whole), acts.joins & ~earlier
         unwrapped = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)
@@ -286,7 +276,7 @@ class SerialLabeller(wiring.Component):
     def _read_group(
         self, m: Module, walk: _Columns, acts: _Step, group: _Group, groups: memory.Memory, earlier: Value
     ) -> data.View:
-        """The zone or group that joins this one, requested in the clock before; 0 without one."""
+        """The zone or group that joins this one, requested in the clock before; 0 for none."""
         read = groups.read_port()
         wanted = Signal()
         m.d.comb += [

@@ -8,13 +8,11 @@ from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
 class SingleLabeller(wiring.Component):
-    """Rows in, at most one zone record per frame out; one column per clock.
+    """Rows in, at most one zone record per frame out, one column per clock; ports as in
+    :func:`~contactfpga_hdl.payloads.labeller_ports`.
 
-    A row of C columns needs C + 2 clocks, an empty one needs one, unless it is the last row of a frame with a pressed
-    cell. If that is handed over in clock h, the zone leaves in clock h + C + 2.
-
-    rows (in): a frame's rows in ascending order.
-    records (out): its zone, if any, then an end mark.
+    A row of C columns takes C + 2 clocks, an empty one one, unless it is the last row of a frame with a pressed cell.
+    If that is handed over in clock h, the zone leaves in clock h + C + 2.
     """
 
     def __init__(self, skin: Skin):

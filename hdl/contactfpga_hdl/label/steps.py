@@ -1,4 +1,4 @@
-"""Two adjacent rows cut into steps; their layouts, and sizes that follow from the columns."""
+"""Two adjacent rows cut into steps, with layouts and sizes."""
 
 import math
 
@@ -59,8 +59,7 @@ def nesting(derived: Derived) -> int:
 
 
 def waiting(derived: Derived) -> int:
-    """The most waiting groups: one for each such zone, or for a sheet whose ends meet one of them for the last
-    cluster."""
+    """The most waiting groups: one for each such zone; on a sheet whose ends meet, one of them for the last cluster."""
     if not derived.skin.closed:
         return nesting(derived)
     columns = derived.skin.columns
@@ -68,7 +67,7 @@ def waiting(derived: Derived) -> int:
 
 
 def place_bits(derived: Derived) -> int:
-    """Width of a place in each half of the table: of zones in the row before, and of waiting groups."""
+    """Bits of a place in each half of the table: of zones in the row before, and of waiting groups."""
     return max(1, (derived.open_zones - 1).bit_length(), waiting(derived).bit_length())
 
 
@@ -78,14 +77,12 @@ def place_of(derived: Derived, column: Value) -> Value:
 
 
 def _without_lowest(m: Module, bits: Value) -> Value:
-    """All bits but the lowest one that is set."""
     others = Signal.like(bits, name_suffix="_others")
     m.d.comb += others.eq(bits & (bits - 1))
     return others
 
 
 def _index(one_hot: Value, width: int) -> Value:
-    """Number of the set bit."""
     return Cat(
         Cat(one_hot[i] for i in range(len(one_hot)) if i >> bit & 1).any() if len(one_hot) > 1 else Const(0, 1)
         for bit in range(width)
@@ -93,13 +90,12 @@ def _index(one_hot: Value, width: int) -> Value:
 
 
 def kept_layout(derived: Derived) -> data.StructLayout:
-    """Stored data of a group of cells: moments, and for a sheet whose ends meet their turns."""
+    """Stored data of a group of cells: moments, and on a sheet whose ends meet their turns."""
     turned = turned_layout(derived) if derived.skin.closed else {}
     return data.StructLayout(moments_layout(derived).members | turned)
 
 
 def zone_of(derived: Derived, group: data.View) -> Value:
-    """The zone record of a complete group."""
     moments = Cat(group[name] for name in moments_layout(derived).members)
     if not derived.skin.closed:
         return moments
@@ -108,7 +104,6 @@ def zone_of(derived: Derived, group: data.View) -> Value:
 
 
 def turned_layout(derived: Derived) -> dict[str, int]:
-    """Data of a group's cells besides their moments."""
     return {
         "turned": derived.area_bits,  # cells on the upper of two turns
         "two": 1,  # there are cells on two turns
@@ -128,8 +123,8 @@ def over_the_seam(derived: Derived, row: Value, before: Value) -> Value:
 class _Left:
     """The part of two rows still to be walked.
 
-    An edge is the first column of a run or the one past its last: the new row's runs in one word. What is left
-    without the lowest bits is in registers, so that no clock finds a bit and then decides with it.
+    An edge is the first column of a run or the one past its last: the new row's runs in one word. Words without the
+    lowest bits are in registers, so that no clock finds a bit and then decides with it.
     """
 
     def __init__(self, derived: Derived):
@@ -152,7 +147,7 @@ class _Left:
 class Walk(wiring.Component):
     """Cuts two adjacent rows into steps, one per clock while ``enable`` is high.
 
-    rows (in): taken when the one before is cut. The first step is cut two clocks later.
+    rows (in): taken when the row before is cut; the first step is cut two clocks later.
     step_valid, step (out): one clock after the step is cut.
     """
 

@@ -1,1 +1,1 @@
-"""Frames to bytes on the wire, and requests from it."""
+"""The serial link: frames to bytes, and requests from bytes."""

@@ -1,4 +1,4 @@
-"""A pin for a watchdog or a safety relay: it toggles as long as whole, fault-free frames come."""
+"""A pin that toggles while whole, fault-free frames come."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,9 +8,9 @@ TICK_US = 1000
 
 
 class Alive(wiring.Component):
-    """Toggles every :data:`TICK_US` if the sheet was well since the last chance to toggle.
+    """Toggles every :data:`TICK_US` if the sheet was well since the last chance, for a watchdog or a safety relay.
 
-    well (in): high for a clock when a whole frame is packed, or an untouched sheet was checked.
+    well (in): pulse when a whole frame is packed, or an untouched sheet was checked.
     fault (in): high while a fault is reported, which cancels an earlier ``well``.
     pin (out): from a register.
     """

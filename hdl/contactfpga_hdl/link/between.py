@@ -1,8 +1,7 @@
 """Packets of some Skins between frames: fault reports, and readings of units (docs/protocol.md).
 
-A hello goes first, then a report, then a frame; but a waiting frame is next after a report, so that it waits for at
-most one, and one more per hello. Readings go when nothing else waits, and at the latest after
-:data:`FRAMES_BEFORE_UNITS` frames, so that frames that fill the line do not hold them back.
+A hello goes first, then a report, then a frame, but a frame that waits is next after a report. Readings go when nothing
+else waits, and at the latest after :data:`FRAMES_BEFORE_UNITS` frames, so that frames cannot hold them up.
 """
 
 from typing import Protocol
@@ -32,8 +31,8 @@ class Wire(Protocol):
 class Reports:
     """Fault reports, and slots of a self-test, among a link's packets.
 
-    sent: the last packet taken is one of these.
-    byte: its offered byte.
+    sent: whether the last packet taken is one of these.
+    byte: offered byte.
     """
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
@@ -60,16 +59,11 @@ class Reports:
         return taken
 
     def begin(self, end: Signal) -> list:
-        """Assignments when one is taken; ``end`` is the offset after its last byte."""
         return [end.eq(self._reporter.length)]
 
 
 class Readings:
-    """Readings of units among a link's packets, one for each sweep.
-
-    sent: the last packet taken is one of these.
-    byte: its offered byte.
-    """
+    """Readings of units, a packet per sweep, among a link's packets; ``sent`` and ``byte`` as in :class:`Reports`."""
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
         self._wire = wire
@@ -91,5 +85,4 @@ class Readings:
         return taken
 
     def begin(self, end: Signal) -> list:
-        """Assignments when one is taken; ``end`` is the offset after its last byte."""
         return [self._frames.eq(0), end.eq(self._length)]

@@ -1,5 +1,4 @@
-"""Packets that the link sends unrequested: a hello every half second for frames of uneven times, and a frame after a
-long pause."""
+"""Unrequested packets: a hello every half second for frames of uneven times, and a frame after a long pause."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -8,7 +7,7 @@ from contactfpga.skin.derived import HELLO_BIT, KEEP_ALIVE_BIT
 
 
 def hello_period(m: Module, link: wiring.Component) -> Value:
-    """High for a clock every half second."""
+    """Pulse every half second."""
     if link.derived.scan.waits:
         return _toggles(m, link, HELLO_BIT)
     period = link.derived.hello_frames
@@ -20,7 +19,7 @@ def hello_period(m: Module, link: wiring.Component) -> Value:
 
 
 def keep_alive(m: Module, link: wiring.Component) -> None:
-    """Set ``link.due``: a frame is to be sent though nothing has changed."""
+    """Set ``link.due``: a frame is to be sent although nothing has changed."""
     decide, sends = link.frames.decide, link.frames.verdict.send
     if link.derived.scan.waits:
         most = link.derived.keep_alive_toggles
@@ -40,14 +39,14 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
 
 
 def _toggles(m: Module, link: wiring.Component, bit: int) -> Value:
-    """High for a clock every 2^bit us."""
     before = Signal(name=f"time_{bit}")
     m.d.sync += before.eq(link.time[bit])
     return link.time[bit] ^ before
 
 
 def _wait(link: wiring.Component, waited: Value, limit: int) -> tuple[Value, Value]:
-    """A waiting time including this frame's, and whether it is ``limit``: in scans, adaptive ones in row times."""
+    """A waiting time with this frame's, and whether it has reached ``limit``: in scans, or in row times of uneven
+    scans."""
     if link.derived.scan.even:
         return waited + 1, waited == limit - 1
     longer = waited + link.tag.slots

@@ -1,4 +1,4 @@
-"""Packets about the lines, byte by byte: fault reports, and slots of the self-test (docs/protocol.md)."""
+"""Fault reports and slots of the self-test, byte by byte (docs/protocol.md)."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import memory, stream, wiring
@@ -11,21 +11,19 @@ from contactfpga_hdl.payloads import faults_layout, slots_layout
 
 
 class Reporter(wiring.Component):
-    """The packets of kind 9 without their check. A report is due after each hello, and when it would differ from the
-    last one sent: while none is on the wire, a byte is compared in each clock.
+    """Packets of kind 9 without their check. A report is due after each hello, and when it would differ from the last
+    report: while none is on the wire, a byte is compared in each clock. Each digit is read in the clock before its byte
+    is offered, so a report may mix the words before and after a change; then another follows.
 
-    Each digit is read in the clock before its byte is offered, so a report may mix the word before and after a change;
-    then it differs from the current word, and another follows.
-
-    word (in): the scan's fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`.
-    slots (in): with ``self_test``, slots to be sent; ``ready`` in the clock after the last byte of one was taken.
-    greeted (in): high for a clock when a hello is sent.
-    taken (in): high for a clock when the packet that is ``due`` is sent.
-    sends (in): high from the next clock on until the wire is idle again.
-    place (in), fetches (in): of the byte offered from the next clock on; at its end ``place`` is ``length``.
+    word (in): fault word, see :func:`~contactfpga_hdl.payloads.faults_layout`.
+    slots (in): with ``self_test``, slots to be sent; ``ready`` in the clock after a slot's last byte was taken.
+    greeted (in): pulse when a hello is sent.
+    taken (in): pulse when the packet that is ``due`` is sent.
+    sends (in): high from the next clock until the wire is idle again.
+    place, fetches (in): place of the byte offered from the next clock; at the end ``place`` is ``length``.
     due (out): a packet waits.
-    length (out): length of the packet that is due.
-    byte (out): the offered byte.
+    length (out): length of that packet.
+    byte (out): offered byte.
     """
 
     def __init__(self, skin: Skin):
@@ -69,7 +67,6 @@ class Reporter(wiring.Component):
         return m
 
     def _compare(self, m: Module, at: Value, is_slot: Value) -> Value:
-        """Whether a byte of a report differs from the one sent last."""
         init = [*self._report, *[0] * ((1 << len(at)) - len(self._report))]
         m.submodules.sent = sent = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = sent.read_port(), sent.write_port()
@@ -80,7 +77,6 @@ class Reporter(wiring.Component):
         return watched & ~self.sends & (read.data != self.byte)
 
     def _put_slots(self, m: Module, is_slot: Value, report_due: Value, report: Value) -> Value:
-        """Send slots while no report is due; returns the byte of either."""
         slot = self.slots.payload
         m.d.comb += self.due.eq(report_due | self.slots.valid)
         with m.If(~report_due):
@@ -93,7 +89,6 @@ class Reporter(wiring.Component):
 
 
 def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value:
-    """The byte at a place of ``empty`` with these digits inserted."""
     found = Signal(8)
     with m.Switch(place):
         for index, value in enumerate([Const(empty[0], 8), *digits, Const(empty[-1], 8)]):
@@ -103,13 +98,11 @@ def _select(m: Module, place: Value, empty: bytes, digits: list[Value]) -> Value
 
 
 def _digits(word: Value) -> list[Value]:
-    """Bits of the word, seven in each byte, lowest first."""
     cut = [word[start : start + DIGIT_BITS] for start in range(0, len(word), DIGIT_BITS)]
     return [Cat(bits, Const(0, DIGIT_BITS - len(bits)), Const(1, 1)) for bits in cut]
 
 
 def report_of(bits: int, word: int) -> bytes:
-    """A report of faults, stuffed."""
     return cobs_encode(faults.encode_faults(word, bits))
 
 

@@ -1,4 +1,4 @@
-"""Whole frames from the packer to the wire, newest first, and hellos between them."""
+"""Frames from the packer to the wire, newest first, with hellos between them."""
 
 from typing import TYPE_CHECKING
 
@@ -19,14 +19,11 @@ if TYPE_CHECKING:
     from contactfpga_hdl.link.between import Readings, Reports
 
 HELLO_REGION = 3
-"""Region of the hello; the others hold frames."""
 
 STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
 
 class _Wire:
-    """The packet on the wire, and the choice of the next one."""
-
     def __init__(self, offset_bits: int):
         self.idle = Signal()  # there is none
         self.take_frame = Signal()  # the frame that waits is next
@@ -39,8 +36,6 @@ class _Wire:
 
 
 class _Regions:
-    """Assignment of the memory's regions to the frames being written, waiting, and on the wire."""
-
     def __init__(self, offset_bits: int):
         self.filling = Signal(2, init=0)
         self.waiting = Signal(2, init=1)
@@ -52,25 +47,23 @@ class _Regions:
 class Link(wiring.Component):
     """Keeps one frame on the wire, the newest complete one waiting, and one being written.
 
-    Three regions of one memory rotate among the three frames; a fourth holds the hello. A new frame drops a waiting
-    one, counted, in the clock its end mark is packed, and waits in its place when complete. Nothing here can block the
-    stages before.
+    Three regions of one memory rotate among the three frames; a fourth holds the hello. As its end mark is packed, a
+    new frame drops and counts a waiting one, whose place it takes when complete. Nothing here blocks the stages before.
+    The hello is fixed except for the digits of its state, each read in the clock before its byte is offered.
+    :mod:`contactfpga_hdl.link.between` has the order of packets.
 
-    The hello is fixed except for the digits of its state: each is read in the clock before its byte is offered. A hello
-    precedes frames; for reports of faults and readings of units see :mod:`contactfpga_hdl.link.between`.
-
-    frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`.
+    frames (in): see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
-    asked (in): high for a clock when a hello is wanted.
-    epoch (in): high for a clock every 2^22 us.
-    time (in): of a scan that waits, its clock in us.
-    due (out): a frame is to be sent though nothing has changed.
+    asked (in): pulse when a hello is wanted.
+    epoch (in): pulse every 2^22 us.
+    time (in): device time in us, of a scan that waits.
+    due (out): a frame is to be sent although nothing has changed.
     number (in): number of the last request.
-    faults, slots (in): of a Skin with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
-    units (in): of a Skin with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
-    bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
-    upset (out): high while two frames share a region, because a bit of its number flipped by itself: one would be sent
-        while another is written over it. Never with ``dual``, which finds more.
+    faults, slots (in): with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
+    units (in): with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
+    bytes (out): stuffed packets; a byte is offered two clocks after the one before was taken.
+    upset (out): high while two frames share a region because a bit of its number flipped by itself; never with
+        ``dual``, which finds more.
     grant (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
         packets then include the sheet's number.
     """
@@ -99,7 +92,6 @@ class Link(wiring.Component):
         )
 
     def _hello_period(self, m: Module) -> Value:
-        """High for a clock every half second."""
         if not self.derived.scan.even:
             from contactfpga_hdl.link.due import hello_period
 
@@ -112,7 +104,6 @@ class Link(wiring.Component):
         return self.frames.decide & due
 
     def _optional_ports(self) -> dict[str, wiring.Member]:
-        """Ports for packets of some Skins besides frames."""
         ports: dict[str, wiring.Member] = {}
         if (faults := faults_layout(self.derived)).size:
             ports["faults"] = In(faults)
@@ -144,7 +135,6 @@ class Link(wiring.Component):
         return m
 
     def _others(self, m: Module, wire: _Wire) -> "list[Reports | Readings]":
-        """Packets of some Skins: reports before readings."""
         if not self._optional_ports():
             return []
         from contactfpga_hdl.link.between import Readings, Reports
@@ -170,10 +160,7 @@ class Link(wiring.Component):
             ]
 
     def _decide(self, m: Module, wire: _Wire, regions: _Regions) -> Value:
-        """Decide whether a frame is sent, and its numbers. It goes next, so its sequence number is known.
-
-        Returns the number of sent frames, in the digits that are not the odometer's.
-        """
+        """Decide whether a frame is sent, and its numbers. Returns the count of sent frames in its low digits."""
         verdict, decide = self.frames.verdict, self.frames.decide
         frames_sent = Signal(LIVE_DIGITS * protocol.DIGIT_BITS)
         overwritten = Signal(self.derived.overwritten_bits)
@@ -190,7 +177,6 @@ class Link(wiring.Component):
         return frames_sent
 
     def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
-        """The offered byte, from the memory or, in a hello's state, from the counters."""
         init = [0] * (HELLO_REGION << self._offset_bits) + list(self._hello)
         m.submodules.store = store = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = store.read_port(), store.write_port()
@@ -274,8 +260,7 @@ class Link(wiring.Component):
             m.d.comb += self.holds.eq(~ends & (~wire.idle | either))
 
     def _closing(self, crc: Value) -> list[Value]:
-        """The bytes after the stuffed ones: the sheet's number, if any, then the CRC in pieces of seven bits, so that
-        no byte is zero."""
+        """The sheet's number, if any, and the CRC in pieces of seven bits, so that no byte is zero."""
         number = b"" if self.place is None else numbered.closing(self.place.number)
         return [
             *(Const(byte, 8) for byte in number),
@@ -285,7 +270,7 @@ class Link(wiring.Component):
         ]
 
     def _state_digit(self, m: Module, wire: _Wire, frames_sent: Value) -> Value:
-        """The digit at each place of a hello's state. The counters' high digits are stable while a hello is sent."""
+        """The digit at each place of a hello's state; high digits are stable while a hello is sent."""
         m.submodules.odometer = odometer = Odometer()
         place = wire.offset[:STATE_PLACE_BITS]
         high = frames_sent[-1]
@@ -312,7 +297,6 @@ class Link(wiring.Component):
 
 
 def hello_words(skin: Skin) -> range:
-    """The hello's words in the memory."""
     first = HELLO_REGION << offset_bits(skin)
     return range(first, first + len(stored_hello(skin)))
 
@@ -323,5 +307,5 @@ def stored_hello(skin: Skin, place: SheetPlace | None = None) -> bytes:
 
 
 def offset_bits(skin: Skin, place: SheetPlace | None = None) -> int:
-    """Bits of a place in a region of the memory, which holds any frame or the hello."""
+    """Bits of an offset in a region of the memory."""
     return max(skin.derived.max_stored_bytes, len(stored_hello(skin, place))).bit_length()

@@ -7,22 +7,20 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS, STATE_DIGITS
 
 LIVE_DIGITS = 2
-"""Low digits of the count of sent frames, kept by the link: more than a frame's sequence number has."""
+"""Low digits of the count of sent frames, kept by the link; they contain a frame's sequence number."""
 
 _EPOCH = SENT_DIGITS
 _LAST = (_EPOCH - 1, _EPOCH + EPOCH_DIGITS - 1)
 
 
 class Odometer(wiring.Component):
-    """The high digits of the frames sent, and all of the epoch, at their places in a hello's state.
+    """The high digits of the count of sent frames, and all of the epoch, at their places in a hello's state.
 
-    Each carry needs two clocks per changing digit. At first all digits are set to 0, a clock each, as memory cannot be
-    reset.
+    A carry takes two clocks per changing digit. At first all digits are set to 0, a clock each, as memory has no reset.
 
-    sent, epoch (in): high for a clock to count one more. One carry of each kind may wait.
+    sent, epoch (in): pulses to count one more; one carry of each kind may wait.
     hold (in): no carry begins.
-    place (in), digit (out): the digit of the previous clock's place, when no carry is under way; 0 at places of other
-        counters.
+    place (in), digit (out): the digit at the previous clock's place while no carry is under way; 0 at other places.
     """
 
     def __init__(self):

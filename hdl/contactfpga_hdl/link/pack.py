@@ -1,4 +1,4 @@
-"""Items to the bytes of a frame: items and trailer, COBS-stuffed while written."""
+"""Items to the bytes of a frame, with trailer and COBS stuffing."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
@@ -10,7 +10,6 @@ from contactfpga.wire import protocol
 from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 
 FULL_BLOCK = 255
-"""Length of a full COBS block."""
 
 
 def verdict_layout(derived: Derived) -> data.StructLayout:
@@ -21,11 +20,11 @@ def verdict_layout(derived: Derived) -> data.StructLayout:
 def frames_signature(derived: Derived, offset_bits: int) -> wiring.Signature:
     """Frames from the packer, the initiator, to the link.
 
-    write: a byte and its offset in the region of this frame.
-    decide: high for the clock in which an end mark is taken.
-    verdict (in): in that clock, and its numbers until ``commit``, the link's decision on this frame.
-    commit: high for the clock in which the frame's last byte is written.
-    end: in that clock the offset after its last byte. Later writes belong to another frame.
+    write: a byte and its offset in the frame's region.
+    decide: pulse as an end mark is taken.
+    verdict (in): the link's decision in that clock, with its numbers until ``commit``.
+    commit: pulse as the frame's last byte is written; later writes belong to another frame.
+    end: in that clock, the offset after the last byte.
     """
     return wiring.Signature(
         {
@@ -57,11 +56,11 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
 
 
 class Packer(wiring.Component):
-    """Writes each frame, stuffed, into a region of a memory, from offset 0 on; one byte per clock.
+    """Writes each frame, stuffed, into a region of a memory from offset 0, one byte per clock.
 
-    An item is taken with its last byte. COBS writes a block's length in front of it. Every zero byte is the place of
-    the next length, so a byte needs one write: itself, or, for a zero, the length of the block that it ends. Only a
-    block of 254 bytes without a zero needs one more.
+    An item is taken with its last byte. A zero byte is the place of the next COBS block's length, so each byte needs
+    one write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero
+    needs one more.
 
     items (in): a frame's items and its end mark.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
@@ -89,7 +88,6 @@ class Packer(wiring.Component):
         return m
 
     def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
-        """Sequence items as they come, each taken with its last byte, then the trailer."""
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
         decide, send = self.frames.decide, self.frames.verdict.send
         index = Signal(range(max(item_bytes, trailer_bytes + 1)))

@@ -14,10 +14,11 @@ LONGEST_ONE, LONGEST_MARK = 3, 7
 class PulseReceiver(wiring.Component):
     """Line level in, bits out, each in the clock in which the line is high again after a pulse.
 
-    A mark is a byte of no bits, which is ``good``; within a byte it first makes that one ``bad``, a clock earlier.
+    A mark is a byte without bits, which is ``good``; a mark within a byte first makes that byte ``bad``, a clock
+    earlier.
 
-    pin (in): the line; it passes two synchronizer stages.
-    bits (out): see :data:`~contactfpga_hdl.link.uart.LINE_BITS`. ``good`` comes in the clock after a byte's last bit.
+    pin (in): the line, through two synchronizer stages.
+    bits (out): see :data:`~contactfpga_hdl.link.uart.LINE_BITS`; ``good`` comes in the clock after a byte's last bit.
     """
 
     def __init__(self, bit_clocks: int):

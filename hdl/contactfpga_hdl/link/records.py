@@ -1,4 +1,4 @@
-"""A frame's records side by side, for a design that reads zones and not packets."""
+"""Zone records of frames as words, for a design that reads no packets."""
 
 import math
 
@@ -14,9 +14,9 @@ NUMBER_BITS = 16
 
 
 def closing_layout(derived: Derived) -> data.StructLayout:
-    """What closes a frame: the trailer of docs/protocol.md without what only the host needs.
+    """The closing word of a frame: the trailer of docs/protocol.md without fields that only the host needs.
 
-    ``number`` counts frames from 0 on, those that are replaced among them.
+    ``number`` counts frames from 0, replaced ones included.
     """
     motion = {"motion": 1} if derived.skin.reads_rows else {}
     counted = {"cells": derived.area_bits, "zones": derived.zones_bits}
@@ -25,26 +25,24 @@ def closing_layout(derived: Derived) -> data.StructLayout:
 
 
 def word_bits(derived: Derived) -> int:
-    """Width of a record and of a frame's closing word, in whole bytes, as bits."""
+    """Bits of a record and of a closing word, in whole bytes."""
     return 8 * max(derived.item_bytes, math.ceil(closing_layout(derived).size / 8))
 
 
 class Records(wiring.Component):
-    """Offers whole frames: records, then a last word with what closes the frame (:func:`closing_layout`).
+    """Offers whole frames: records, then a closing word (:func:`closing_layout`).
 
-    Of two halves of a memory one is filled while the other is read. A frame that is whole waits until the reader has
-    the one before; if the next frame's first record comes earlier, it takes its place. A reader that never takes
-    anything holds up nothing and keeps the frame that it was offered. With ``send = "on_change"`` the frame after a
-    replaced one counts as changed, so that the newest cells always arrive.
+    One half of a memory is filled while the other is read. A whole frame waits until the reader has the one before; if
+    the next frame's first record comes earlier, it replaces the frame that waits, so a slow reader holds up nothing.
+    With ``send = "on_change"`` the frame after a replaced one counts as changed, so that the newest cells always
+    arrive. A bit of registers or memory that flips may spoil a frame or two unnoticed.
 
-    item (in), taken (in): what the packer takes, and when: a frame's items and its end mark.
-    send (in): with the end mark, that the frame is sent.
+    item (in), taken (in): a frame's items and its end mark, and the clocks in which the packer takes them.
+    send (in): with the end mark, whether the frame is sent.
     tag, summary (in): describe the frame in that clock.
-    restart (in): what was filled of a frame is forgotten.
-    words (out): records and closings. The first word of a frame is offered three clocks after its end mark is taken if
-    the reader has the frame before, and each further one in the clock after the one before is taken.
-
-    A flipped bit of its own registers or memory may spoil a frame or two, which nothing tells.
+    restart (in): drops the frame being filled.
+    words (out): records and closing words. A frame's first word is offered three clocks after its end mark is taken, if
+        the reader has the frame before; each further word in the clock after the one before is taken.
     """
 
     def __init__(self, skin: Skin):
@@ -96,7 +94,6 @@ class Records(wiring.Component):
         return m
 
     def _read(self, m: Module, read: memory.ReadPort, half: Value, reads: Signal, hands: Value, end: Value) -> None:
-        """Offer the words of the half that is read."""
         words = self.words
         place, last = Signal.like(end), Signal.like(end)
         closes = Signal()  # the word that is offered

@@ -1,4 +1,4 @@
-"""Requests and commands of the host among the bytes at the receive pin (docs/protocol.md)."""
+"""Requests and commands of the host among the received bytes (docs/protocol.md)."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from contactfpga.wire.command import KIND_COMMAND, VALUE_DIGITS, WHAT_DIGITS
 from contactfpga_hdl.link.uart import LINE_BITS
 
 _NUMBER, _WHAT = 1, 1 + protocol.HEARD_DIGITS
-"""Places in a packet, counted from the COBS code on: the number's first digit, and a command's kind."""
+"""Places in a packet from its COBS code: the number's first digit, and a command's kind."""
 _VALUE = _WHAT + WHAT_DIGITS
 _ARGUMENTS = WHAT_DIGITS + VALUE_DIGITS
 _LONG_BIT = 3
@@ -20,14 +20,15 @@ _LONG_BIT = 3
 
 
 class RequestReader(wiring.Component):
-    """Finds requests bit by bit, storing only the number and the check's state. With ``commands`` it finds these as
-    well, with kind and value after the number; requests lack these places. With ``sheet`` it accepts only those for
-    this sheet number.
+    """Finds requests bit by bit and stores only the number and the check's state. With ``commands`` it also finds
+    commands, with kind and value after the number; with ``sheet`` it accepts only packets for this sheet number.
 
-    ``received`` is high with ``good`` of a request's closing delimiter, which as a pulse has no bits; ``hello`` then
-    tells whether it requests one. From the next clock on ``heard`` holds the lowest bits of its number, and ``number``
-    all of it. ``number`` is 0 again from the clock after the first digit's first bit of any later packet. For a command
-    ``command`` is high with ``received``, and ``what`` and ``value`` are its own until the next packet's.
+    received (out): high with ``good`` of the closing delimiter of a request or command.
+    hello (out): in that clock, whether a hello is requested.
+    heard, number (out): lowest bits, and all bits, of the packet's number, from the next clock; ``number`` is 0 from
+        the clock after the first bit of the first digit of any later packet.
+    command (out): with ``received``, whether the packet is a command.
+    what, value (out): of the command, until the next packet.
     """
 
     def __init__(self, commands: bool = False, sheet: int | None = None):
@@ -78,7 +79,6 @@ class RequestReader(wiring.Component):
         return m
 
     def _read_code(self, m: Module, place: Value, bit: Value) -> Value:
-        """Whether the packet is as long as a command."""
         if not self.commands:
             return Const(0, 1)
         is_command = Signal()
@@ -129,6 +129,5 @@ class RequestReader(wiring.Component):
         m.d.comb += self.number.eq(number & whole.replicate(len(number)))
 
     def _keep(self, m: Module, kept: Value, first: int, end: int, place: Value, bit: Value, *also: Any) -> None:
-        """Shift the digits' bits at these places into a register."""
         with m.If(self.bits.bit & (place >= first) & (place < end) & (bit != 7)):
             m.d.sync += [kept.eq(kept >> 1), kept[-1].eq(self.bits.level), *also]

@@ -7,9 +7,9 @@ from amaranth.lib.wiring import In, Out
 
 
 class Transmitter(wiring.Component):
-    """Bytes in, line level out. A byte needs ten bits of ``bit_clocks``; the next one follows without a gap.
+    """Bytes in, line level out. A byte takes ten bits of ``bit_clocks``; the next one follows without a gap.
 
-    bytes (in): one is taken in the last clock of the stop bit before, or whenever nothing is sent.
+    bytes (in): a byte is taken in the last clock of the stop bit before, or when nothing is sent.
     pin (out): the line; the start bit begins in the clock after a byte is taken.
     """
 
@@ -42,17 +42,17 @@ class Transmitter(wiring.Component):
 
 
 LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "index": Out(3), "good": Out(1), "bad": Out(1)})
-"""Output of a receiver: ``bit`` is high for a clock in each data bit, with its ``level`` and its ``index`` in the byte.
-After the last one ``good`` or ``bad`` is high for a clock."""
+"""Output of a receiver: ``bit`` is a pulse in each data bit, with its ``level`` and its ``index`` in the byte; ``good``
+or ``bad`` is a pulse after the last bit."""
 
 
 class Receiver(wiring.Component):
     """Line level in, bits out, each sampled in its middle; ``good`` and ``bad`` in that of the stop bit.
 
-    Bit n, the lowest is 1 and the stop bit 9, is sampled ``2 + bit_clocks // 2 + n * bit_clocks`` clocks after the pin
-    fell. A start bit that is over in its middle is ignored.
+    Bit n, from 1 for the lowest to 9 for the stop bit, is sampled ``2 + bit_clocks // 2 + n * bit_clocks`` clocks after
+    the pin fell. A start bit that is over in its middle is ignored.
 
-    pin (in): the line; it passes two synchronizer stages.
+    pin (in): the line, through two synchronizer stages.
     bits (out): see :data:`LINE_BITS`.
     """
 

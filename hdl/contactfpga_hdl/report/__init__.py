@@ -1,1 +1,1 @@
-"""A frame's content: its summary checked against its cells, and barycenters divided on the board."""
+"""Contents of frames."""

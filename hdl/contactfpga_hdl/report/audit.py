@@ -19,7 +19,7 @@ from contactfpga_hdl.payloads import (
 from contactfpga_hdl.util.bits import popcount
 
 GROUPS = 4
-"""The most groups of a row. Each of a row's steps may delay the counting, and the next row comes six clocks later."""
+"""The most groups of a row: a row's steps may each delay the counting, and the next row comes six clocks later."""
 
 
 class Audit(wiring.Component):
@@ -28,9 +28,9 @@ class Audit(wiring.Component):
     taken, row (in): a row, in the clock in which the labeller takes it.
     free (out): that row can be counted.
     records (in): from the labeller.
-    items (out): the records without delay, but no more than the frame can carry.
-    summary (out): valid until the next frame's. ``zones``, ``overflow`` and ``changed`` are valid one clock after the
-        end mark, ``cells`` and ``mismatch`` after at most seven, before the packer can reach them.
+    items (out): the records without delay, up to the frame's capacity.
+    summary (out): valid until the next frame's; ``zones``, ``overflow`` and ``changed`` from one clock after the end
+        mark, ``cells`` and ``mismatch`` from at most seven, before the packer can reach them.
     """
 
     def __init__(self, skin: Skin):
@@ -88,12 +88,10 @@ class Audit(wiring.Component):
 
 
 class Tally(wiring.Component):
-    """Moments of each row, one group of columns per clock.
+    """Moments of each row, one group of columns per clock; an empty row has no group, others up to :data:`GROUPS`.
 
-    A row has at most :data:`GROUPS` groups, an empty one none.
-
-    taken (in): high for the clock in which ``row`` (in) is taken. Only empty rows may be taken while ``busy``.
-    moments (out): a group's share in each clock without ``hold``, from two clocks after ``taken`` on; otherwise zero.
+    taken (in): pulse as ``row`` (in) is taken; only empty rows may be taken while ``busy``.
+    moments (out): a group's share in each clock without ``hold``, from two clocks after ``taken``; otherwise zero.
     hold (in): no group is counted.
     busy (out): falls after the last group.
     """
@@ -147,7 +145,6 @@ class Tally(wiring.Component):
 
 
 def _count_offsets(bits: Value) -> Value:
-    """The sum of the numbers of the set bits: for each bit of the numbers, how many have it."""
     return sum(
         popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place
         for place in range((len(bits) - 1).bit_length())
@@ -157,9 +154,9 @@ def _count_offsets(bits: Value) -> Value:
 class Counts(wiring.Component):
     """Content of a frame's rows, and whether its zones explain all of its cells.
 
-    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to. ``ends`` is
-    the clock of the end mark. ``changed`` is captured in it, ``cells`` and ``mismatch`` once the last row is counted as
-    well; all hold until the next frame's.
+    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when ``free``. ``ends`` is the clock of
+    the end mark, which captures ``changed``; ``cells`` and ``mismatch`` follow when the last row is counted. All hold
+    until the next frame's.
     """
 
     def __init__(self, skin: Skin):
@@ -195,7 +192,7 @@ class Counts(wiring.Component):
         return m
 
     def _explain(self, m: Module, tally: Tally) -> None:
-        """Add counted cells and, a clock after they pass, subtract zones, which pauses the counting."""
+        """Add counted cells; a clock after zones pass, subtract them, which pauses the counting."""
         cells = Signal.like(self.cells)
         unexplained = Signal(moments_layout(self.derived))
         passed, zone = Signal(), Signal.like(self.zone)

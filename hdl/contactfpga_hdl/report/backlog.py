@@ -1,4 +1,4 @@
-"""Queues of a frame's zones or bitmap rows before the next stage."""
+"""Queues of a frame's zones or bitmap rows."""
 
 from amaranth.hdl import Module, Signal
 from amaranth.lib import memory, stream, wiring
@@ -9,13 +9,13 @@ from contactfpga_hdl.payloads import passed_layout
 
 
 class Queue(wiring.Component):
-    """Holds ``depth`` items, a power of two, and passes them on in order.
+    """Queue of ``depth`` items, a power of two.
 
-    It is empty when the places of the next item in and the next out are equal. There is no other fill count, so after a
-    flip in one of them items are lost or repeated, and then the places meet.
+    The queue is empty when the places of the next item in and the next out are equal. There is no other count, so a
+    flip in one of them loses or repeats items until the places meet.
 
-    items (in): taken unless all places are. An item is offered two clocks later at the earliest.
-    waiting (out): the items in order.
+    items (in): taken unless all places are.
+    waiting (out): the items in order; each is offered two clocks later at the earliest.
     """
 
     def __init__(self, width: int, depth: int):
@@ -48,13 +48,11 @@ class Queue(wiring.Component):
 
 
 class Backlog(wiring.Component):
-    """A queue for data faster than the division or packing.
-
-    Its places, ``Derived.backlog`` or more, suffice for any frame, so ``passed`` is always ready. An item is offered
-    two clocks later at the earliest.
+    """Queue before the division or packing. Its places, ``Derived.backlog`` or more, suffice for any frame, so
+    ``passed`` is always ready.
 
     passed (in): zones, or items if nothing is divided, and end marks.
-    waiting (out): the same in order.
+    waiting (out): the same in order, each two clocks later at the earliest.
     """
 
     def __init__(self, skin: Skin):

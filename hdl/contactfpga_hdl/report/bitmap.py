@@ -1,4 +1,4 @@
-"""Rows that enter a frame unchanged."""
+"""Bitmap rows of a frame."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import stream, wiring
@@ -14,7 +14,7 @@ class Bitmap(wiring.Component):
 
     rows (in): a frame's rows in ascending order.
     free (out): the offered row can be counted.
-    items (out): the rows without delay; the end mark follows the last one three clocks later, when that is counted.
+    items (out): the rows without delay; the end mark follows the last one three clocks later, when it is counted.
     summary (out): as of :class:`Audit`, without zones.
     """
 

@@ -1,4 +1,4 @@
-"""Whether a frame differs from the one before."""
+"""Comparison of a frame with the one before."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import memory, wiring
@@ -9,10 +9,10 @@ from contactfpga_hdl.payloads import row_layout
 
 
 class Change(wiring.Component):
-    """Whether the rows since ``clear`` differ from those of a frame before; one clock after ``taken``.
+    """Whether the rows since ``clear`` differ from those of a frame before, one clock after ``taken``.
 
-    If the scan skips rows, only rows with a pressed cell count: they are compared with their numbers, and their count
-    is compared at the last one.
+    If the scan skips rows, only rows with a pressed cell are compared, with their numbers, and at the last one their
+    count.
     """
 
     def __init__(self, skin: Skin):

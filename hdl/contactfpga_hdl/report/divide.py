@@ -1,12 +1,12 @@
 """Barycenters: each zone's sums divided by its area, while later rows arrive and bytes are sent.
 
 x = floor(sum_x 2^k / area + 1/2), k being the Skin's ``barycenter_bits``, and y likewise: the nearest step of 1/2^k of
-a cell. Restoring division (shift, subtract if possible) computes one bit more, x and y in parallel; adding that bit
-rounds. A barycenter is on the sheet, so all bits of a sum beyond those of a row or column number are less than the
-area, and are the division's initial remainder.
+a cell. Restoring division (shift, subtract if possible) computes x and y in parallel, with one bit more; adding that
+bit rounds. A barycenter is on the sheet, so the bits of a sum beyond those of a row or column number are less than the
+area, and are the initial remainder.
 
 One divider for x and y in turn would save 18 LUT4 on an iCE40UP5K with 16x16 cells and 4 fraction bits (71, not 89), 22
-with 64x64 (91, not 113), but need twice the clocks, too many for a dense frame's zones.
+with 64x64 (91, not 113), but take twice the clocks, too many for a dense frame's zones.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -19,16 +19,16 @@ from contactfpga_hdl.payloads import item_layout, record_layout
 
 
 def barycenter_layout(derived: Derived) -> data.StructLayout:
-    """Area, without the bits that all areas of the sheet share, and barycenter; the bits of a record on the wire with
-    ``report = "barycenter"``."""
+    """Area, without the bits that all areas of the sheet share, and barycenter: a record on the wire with ``report =
+    "barycenter"``."""
     return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits, strict=True)))
 
 
 class Divider(wiring.Component):
-    """One zone at a time, one bit per clock: offered in clock t, its item is offered from ``t + Q + 1`` on, with Q =
-    ``Derived.quotient_bits``, and the next zone can begin in that clock.
+    """One zone at a time, one bit per clock: the item of a zone offered in clock t is offered from ``t + Q + 1``, with
+    Q = ``Derived.quotient_bits``, and the next zone can begin in that clock.
 
-    While an item waits, the next zone is divided up to its last bit. A zone is taken with that bit; an end mark passes
+    While an item waits, the next zone is divided up to its last bit, with which a zone is taken. An end mark passes
     without delay when no item is before it.
 
     records (in): zones and end marks.
@@ -95,6 +95,5 @@ class Divider(wiring.Component):
         return Cat(fits, bits)
 
     def _rounded(self, m: Module, quotients: data.View) -> Value:
-        """The bits of x and y on the wire."""
         layout = barycenter_layout(self.derived)
         return Cat(((quotients[name] + 1) >> 1)[: layout[name].width] for name in ("x", "y"))

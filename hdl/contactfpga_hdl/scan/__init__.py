@@ -1,1 +1,1 @@
-"""Driven rows and their samples: raster and adaptive scans, pins or shift registers."""
+"""Scans of the sheet, and drivers of its pins."""

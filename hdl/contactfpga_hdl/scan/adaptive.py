@@ -1,4 +1,4 @@
-"""Drives rows together while nothing is touched, one by one where something is."""
+"""Adaptive scan: drives untouched rows together."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -14,8 +14,6 @@ from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
 
 
 class _Reading:
-    """The columns in this clock, and the clock's meaning."""
-
     def __init__(self, derived: Derived):
         self.read = Signal(derived.skin.columns)  # columns that read pressed
         self.pressed = Signal(derived.skin.columns)  # and are not masked in the row that is driven alone
@@ -24,23 +22,19 @@ class _Reading:
 
 
 class AdaptiveScanner(wiring.Component):
-    """Adaptive scan: a diode at each switch makes the columns the OR of the driven rows.
+    """Adaptive scan: with a diode at each switch the columns are the OR of the driven rows.
 
-    Rows are offered in ascending order, each once it and those before it are known: one driven alone three clocks after
-    its sample, those that a probe found empty in the clocks after that, one per clock. Untouched, all rows are driven
-    continuously and the columns read in each clock; the slots after a touch find it.
+    Rows are offered in ascending order, each when all up to it are known: a row driven alone three clocks after its
+    sample, rows that a probe found empty in the clocks after that, one per clock. Untouched, all rows are driven and
+    the columns read in each clock; the slots after a touch find its rows.
 
-    pins: those of the row driver and of the column reader.
-    rows (out): rows in ascending order.
-    tag (out): of the frame whose last strobe was; complete three clocks after that, until the next frame's.
-    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
-    heard (in): copied into that tag.
-    epoch (out): high for a clock every 2^22 us.
-    contact (out): rises three clocks after a touch, and falls two clocks after the last strobe of a frame in which no
-        row had a pressed switch.
+    The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`, and:
+
+    tag (out): complete from three clocks after a frame's last strobe to the next frame's.
+    contact (out): rises three clocks after a touch, and falls two clocks after the last strobe of an empty frame.
     alone (out): the offered row was driven alone.
-    sampled (out): its slot, counted from power-up on.
-    busy (in): a bit per row, with debounce; keeps that row on the list.
+    sampled (out): slot of the offered row, counted from power-up.
+    busy (in): with debounce, a bit per row that must stay on the list.
     """
 
     def __init__(self, skin: Skin):
@@ -92,8 +86,8 @@ class AdaptiveScanner(wiring.Component):
                 m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
     def _time_slots(self, m: Module, driver: DirectRows | RowChain, seek: Seek, sample: _Reading) -> None:
-        """Slots as in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait at once: it
-        is the slot's strobe, and the release begins after it."""
+        """Time slots as in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait with
+        the slot's strobe; the release begins after it."""
         derived = self.derived
         slot, settled, shifting = derived.row_clocks, derived.settle_clocks, derived.row_shift_clocks
         clock = Signal(range(slot), init=(slot - shifting) % slot)
@@ -132,7 +126,7 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += [clock.eq(settled), row_due.eq(0)]
 
     def _offer_rows(self, m: Module, seek: Seek, sample: _Reading) -> None:
-        """Offer known rows in order; at most one that was driven alone waits."""
+        """Offer known rows in order; at most one row that was driven alone waits."""
         rows = self.rows
         place = Signal(self.skin.rows, init=1)  # of the next row to go, one-hot
         alone = Signal(self.skin.rows)  # of the row that waits
@@ -154,7 +148,6 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += [alone.eq(seek.pattern), cells.eq(sample.pressed), self.sampled.eq(slot)]
 
     def _keep_listed(self, m: Module, seek: Seek) -> None:
-        """Keep a row on the list if it or a switch state in it was pressed."""
         if self.skin.debounce != "none":
             m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
             return
@@ -176,7 +169,6 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += self.contact.eq(0)
 
     def _tag_frame(self, m: Module, seek: Seek, driver: wiring.Component) -> None:
-        """Tag a frame from its first strobe, with the number of slots up to the last."""
         m.submodules.frame_clock = clock = FrameClock(self.skin)
         slots = Signal.like(self.tag.slots)
         m.d.comb += [

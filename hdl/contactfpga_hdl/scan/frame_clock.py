@@ -1,4 +1,4 @@
-"""Device time in microseconds, and a frame's share of it and of requests."""
+"""Device time in us, and its value at the start of a frame."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -13,17 +13,17 @@ RETRY_BIT = 16
 
 
 class FrameClock(wiring.Component):
-    """Counts microseconds, and stores the values at the beginning of the last frame.
+    """Counts microseconds, and stores values as a frame begins.
 
-    runs (in): the time advances. At power-up it is ``ahead`` clocks above 0, or below.
-    request (in): high for a clock when one is received.
+    runs (in): the time advances, at power-up from ``ahead`` clocks after, or before, 0.
+    request (in): pulse when a request is received.
     heard (in): lowest bits of the number of the last request.
-    frame_begins (in): high for a clock.
-    time (out): in us.
-    epoch (out): high in the first clock of each further 2^``EPOCH_BITS`` us.
-    waiting (out): a request was received, and no frame has begun since.
+    frame_begins (in): pulse.
+    time (out): device time in us.
+    epoch (out): pulse in the first clock of each further 2^``EPOCH_BITS`` us.
+    waiting (out): a request was received since the last frame began.
     begun, requested, known (out): ``time``, ``waiting`` and ``heard`` as the last frame began.
-    upset (out): a bit of the time flipped by itself, see :func:`~contactfpga_hdl.util.upset.upset`; not with ``dual``.
+    upset (out): a bit of the time flipped by itself (:mod:`contactfpga_hdl.util.upset`); not with ``dual``.
     """
 
     def __init__(self, skin: Skin, ahead: int = 0):
@@ -70,7 +70,7 @@ class FrameClock(wiring.Component):
 
 
 def watch_epoch(m: Module, time: Signal, epoch: Signal, late: bool = False) -> None:
-    """Set ``epoch`` high in the first clock of each further 2^``EPOCH_BITS`` us; ``late``: the time begins below 0."""
+    """Drive ``epoch``; ``late``: the time begins below 0."""
     highest = time[EPOCH_BITS - 1]
     counts = Signal(init=not late)  # not when 0 is first reached
     before = Signal(name="before_epoch")

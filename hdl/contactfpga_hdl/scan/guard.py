@@ -1,6 +1,6 @@
-"""Lines reported as faulty, from the checks of the guard lines and the released columns, held for a while.
+"""Faulty lines, from checks of guard lines and released columns.
 
-Guard switches are permanently closed. So a whole row reaches the guard column, and a whole column the guard row.
+Guard switches are always closed, so a whole row reaches the guard column, and a whole column the guard row.
 """
 
 from amaranth.hdl import Module, Mux, Signal
@@ -18,15 +18,15 @@ def checked_rows(skin: Skin) -> int:
 
 
 class LineFaults(wiring.Component):
-    """A faulty line is reported from the next clock until a check in a *renewing* round finds it good; that is the
-    first whole round of checks after ``retry`` toggles, so intermittent faults change the report at most twice per
-    toggle. Fully masked lines are not reported.
+    """Holds reported lines. A faulty line is reported from the next clock until a check in the first whole round after
+    ``retry`` toggles finds it good, so an intermittent fault changes the report at most twice per toggle. Fully masked
+    lines are not reported.
 
-    rows, columns, stuck (in): lines that a check of this clock finds faulty.
-    checks_rows, checks_columns, checks_stuck (in): lines that are checked in this clock; of columns all or none.
-    round (in): high for a clock in which a round of checks ends, with its last check or later.
+    rows, columns, stuck (in): lines that a check finds faulty in this clock.
+    checks_rows, checks_columns, checks_stuck (in): lines checked in this clock; columns all or none.
+    round (in): pulse as a round of checks ends, with its last check or later.
     retry (in): bit ``RETRY_BIT`` of a clock in us.
-    faults (out): the reported lines.
+    faults (out): reported lines.
     """
 
     def __init__(self, skin: Skin):

@@ -1,4 +1,4 @@
-"""Rows and columns in the order of their soldered lines, if that is not the sheet's."""
+"""Rows and columns in the order of their soldered lines."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from contactfpga.skin import Skin
 
 
 def connect_lines(m: Module, skin: Skin, scan: wiring.PureInterface, lines: wiring.PureInterface) -> None:
-    """Connect a scanner's pins to those of the same names at the lines, each row and column to its own."""
+    """Connect a scanner's pins to those at the lines."""
     for name, member in scan.signature.members.items():
         inside, outside = getattr(scan, name), getattr(lines, name)
         order = line_order(skin, name)
@@ -21,19 +21,19 @@ def connect_lines(m: Module, skin: Skin, scan: wiring.PureInterface, lines: wiri
 
 
 def line_order(skin: Skin, name: str) -> tuple[int, ...]:
-    """The line of each bit of a port with one per row or column; of any other port ()."""
+    """The line of each bit of a port with one bit per row or column; otherwise ()."""
     if name in ("rows", "rows_drive", "rows_read"):
         return skin.line_of_row
     return skin.line_of_column if name in ("columns", "columns_drive") else ()
 
 
 def on_lines(word: Value, order: Sequence[int]) -> Value:
-    """A word of rows or columns in line order; () leaves it unchanged."""
+    """A word of rows or columns in line order."""
     return word if _in_order(order) else Cat(word[order.index(line)] for line in range(len(order)))
 
 
 def of_lines(word: Value, order: Sequence[int]) -> Value:
-    """A word of lines in the order of rows or columns; inverse of :func:`on_lines`."""
+    """Inverse of :func:`on_lines`."""
     return word if _in_order(order) else Cat(word[line] for line in order)
 
 

@@ -1,8 +1,6 @@
-"""Pins between scanner and sheet, and the drivers for one pin per row and per column.
+"""Pins between scanner and sheet, and drivers for one pin per row and per column.
 
-A scanner counts rows and columns as the sheet does, the guard lines last. Its direct pins are in that order too;
-:func:`~contactfpga_hdl.scan.lines.connect_lines` maps them to the soldered lines. Pins of shift registers are already
-in line order.
+A scanner and its direct pins are in the sheet's order, guard lines last; pins of shift registers are in line order.
 """
 
 from amaranth.hdl import Module, Signal
@@ -20,10 +18,8 @@ from contactfpga_hdl.util.upset import upset
 
 
 def row_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that drive the rows: one per row, or those of the shift registers with one ``row_data`` per chain.
-
-    A scan that reads the rows drives ``rows`` while ``rows_drive``, both bit by bit, and reads ``rows_read``.
-    """
+    """Pins that drive the rows: one per row, or those of shift registers with one ``row_data`` per chain. A scan that
+    reads the rows drives each bit of ``rows`` while that of ``rows_drive`` is high, and reads ``rows_read``."""
     if skin.reads_rows:
         return {"rows": Out(skin.row_lines), "rows_drive": Out(skin.row_lines), "rows_read": In(skin.row_lines)}
     if skin.row_drive == "direct":
@@ -32,11 +28,11 @@ def row_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def column_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
-    chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit.
+    """Pins that read the columns: one per column, or those of shift registers with one ``column_data`` per chain.
 
-    A scan that reads the rows and has guard lines or a self-test drives columns to ``columns_level``, and a guard
-    column, the last one, to the other level.
+    With precharge a column is driven to the released level while its bit of ``columns_drive`` is high. A scan that
+    reads rows and has guard lines or a self-test drives columns to ``columns_level``, and the last one, the guard
+    column, to the other level.
     """
     if skin.precharge_us:
         level = {"columns_level": Out(1, init=int(skin.selects_low))} if drives_columns_both_ways(skin) else {}
@@ -45,7 +41,6 @@ def column_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def drives_columns_both_ways(skin: Skin) -> bool:
-    """Whether columns are driven to either level."""
     return skin.reads_rows and (skin.guard or skin.self_test)
 
 
@@ -56,29 +51,28 @@ def _read_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 
 def connect_pins(m: Module, inner: wiring.PureInterface, outer: wiring.PureInterface) -> None:
-    """Connect the pins of ``inner`` to those of the same names in ``outer``."""
+    """Connect pins of ``inner`` to those of the same names in ``outer``."""
     for name, member in inner.signature.members.items():
         inside, outside = getattr(inner, name), getattr(outer, name)
         m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
 
 
 def first_row(skin: Skin) -> int:
-    """The row of a raster's first slot, in which a guard row is driven."""
+    """The row of a raster's first slot: the guard row, if any."""
     return skin.rows if skin.guard else 0
 
 
 def row_driver(skin: Skin) -> wiring.Signature:
-    """The row driver's interface to the scanner.
+    """Interface of a row driver to the scanner. Direct rows drive the first row at power-up; in an adaptive scan, all
+    rows.
 
-    Direct rows drive row 0 after power-up, or the guard row; in an adaptive scan all rows.
-
-    pins (out): those at the sheet.
-    pattern (in): the rows of the next slot as ones. It must be stable from ``shift`` until ``drive``.
-    shift (in): high for a clock, ``Derived.row_shift_clocks`` before the slot; direct rows need none. A pattern that is
-        already driven may be shifted again.
-    drive (in): high in the last clock before the slot; the rows are driven from the next clock on.
-    release (in): high in the last clock in which they are driven.
-    upset (out): see :func:`~contactfpga_hdl.scan.pins.scan_ports`.
+    pins (out): pins at the sheet.
+    pattern (in): rows of the next slot as ones, stable from ``shift`` until ``drive``.
+    shift (in): pulse ``Derived.row_shift_clocks`` before the slot, unused by direct rows. A driven pattern may be
+        shifted again.
+    drive (in): pulse in the last clock before the slot.
+    release (in): pulse in the last clock in which rows are driven.
+    upset (out): see :func:`scan_ports`.
     """
     return wiring.Signature(
         {
@@ -93,12 +87,12 @@ def row_driver(skin: Skin) -> wiring.Signature:
 
 
 def column_reader(skin: Skin) -> wiring.Signature:
-    """The column reader's interface to the scanner.
+    """Interface of a column reader to the scanner.
 
-    pins (out): those at the sheet.
-    begin (in): high for a clock; the columns are sampled ``Derived.column_load_clocks`` later.
-    levels (out): of the columns, while ``done``.
-    done (out): high for a clock, ``2 + Derived.column_shift_clocks`` after they were sampled.
+    pins (out): pins at the sheet.
+    begin (in): pulse ``Derived.column_load_clocks`` before the columns are sampled.
+    levels (out): levels of the columns while ``done``.
+    done (out): pulse ``2 + Derived.column_shift_clocks`` after the sample.
     """
     return wiring.Signature(
         {
@@ -116,8 +110,7 @@ def released_levels(skin: Skin, lines: int) -> int:
 
 
 class DirectRows(wiring.Component):
-    """Row pins from registers, so that no glitch selects a row; they follow ``drive`` and ``release`` by a clock.
-    Nothing is shifted."""
+    """Row pins from registers, so that no glitch selects a row; they follow ``drive`` and ``release`` by a clock."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -139,7 +132,7 @@ class DirectRows(wiring.Component):
 
 
 class DirectColumns(wiring.Component):
-    """Two synchronizer stages: levels are delayed by two clocks from the pins."""
+    """Column pins through two synchronizer stages, a delay of two clocks."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -155,18 +148,18 @@ class DirectColumns(wiring.Component):
 
 
 def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Ports between the sheet, the stages that take its rows, and the link.
+    """Ports of every scan to the sheet, the stages that take its rows, and the link.
 
-    pins: those of the row driver and of the column reader.
+    pins: pins of row driver and column reader.
     rows (out): rows in ascending order.
-    tag (out): of the frame whose last row's strobe was; the scan's rule tells when it is complete.
-    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
+    tag (out): data of the frame whose last row had a strobe; each scan states when the tag is complete.
+    request (in): pulse that the tag of the next frame to start answers with ``requested``.
     heard (in): copied into that tag.
-    epoch (out): high for a clock every 2^22 us.
-    faults (out): with ``guard`` or ``self_test``, the fault word.
-    upset (out): high for a clock when a register was found to have flipped by itself, see
-        :func:`~contactfpga_hdl.util.upset.upset`; never with ``dual``, which finds more.
-    contact (out): high while any switch reads pressed; the scan's rule tells when it rises and falls.
+    epoch (out): pulse every 2^22 us.
+    faults (out): fault word, with ``guard`` or ``self_test``.
+    upset (out): pulse when a register flipped by itself (:mod:`contactfpga_hdl.util.upset`); never with ``dual``, which
+        finds more.
+    contact (out): high while any switch reads pressed; each scan states when it rises and falls.
     """
     skin = derived.skin
     faults = faults_layout(derived)
@@ -185,14 +178,13 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
 
 
 def moves_sample(derived: Derived) -> bool:
-    """Whether the scan obeys the command "sample at"."""
     return SAMPLE_AT in derived.commands
 
 
 def sample_at_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of a scan that obeys the command "sample at".
 
-    moves (in): high for a clock when the command comes, with the request.
-    clocks (in): its value, in that clock.
+    moves (in): pulse with each command.
+    clocks (in): value of the command, in that clock.
     """
     return {"moves": In(1), "clocks": In(DIGIT_BITS * VALUE_DIGITS)} if moves_sample(derived) else {}

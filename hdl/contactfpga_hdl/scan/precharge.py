@@ -1,4 +1,4 @@
-"""Drives the columns to the released level, except those held by something else."""
+"""Precharge of columns to the released level."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -8,29 +8,25 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.stuck import watched
 
 LOOKS = 4
-"""Separated samples of a column. It is stuck only if it reads pressed in all of them."""
+"""Separated samples of a window; a column is stuck only if it reads pressed in all of them."""
 LEAST_BITS = 4
-"""Two of these samples are at least 2 to this power clocks apart, so that a disturbance of a few clocks spoils only
-one."""
+"""Log2 of the least clocks between two of these samples, so that a short disturbance spoils only one."""
 
 
 class Precharge(wiring.Component):
-    """Columns that are masked in every row are never driven. A column is *stuck*, and not driven, if it reads pressed
-    in a whole window, which lasts for :data:`LOOKS` separated samples, and counts all samples between them. Two of the
-    :data:`LOOKS` are ``2 ** apart_bits`` clocks apart: longer than driving a column to its level, and longer than a
-    projection.
-
-    A stuck column is *tried* in the first window that begins after ``retry`` toggles: it is driven, and then judged by
-    the same rule.
+    """Drives columns, except stuck ones and those masked in every row. A column is *stuck* if it reads pressed
+    throughout a window of :data:`LOOKS` separated samples and all samples between. Two of the :data:`LOOKS` are ``2 **
+    apart_bits`` clocks apart, longer than driving a column to its level, and than a projection. In the first window
+    after ``retry`` toggles a stuck column is driven and judged again.
 
     drive (in): in the next clock the columns are driven.
-    columns (in): those that read pressed.
-    looks (in): high for a clock in which these are a sample, taken when all that are not stuck had been driven.
+    columns (in): columns that read pressed.
+    looks (in): pulse with a sample in ``columns``; all columns that are not stuck were driven before.
     retry (in): bit ``RETRY_BIT`` of a clock in us.
-    guard_pressed (in): of a scan that reads the rows: high for a clock in which the guard column is stuck, which it is
-        until ``retry`` toggles. Other scans treat it like other columns.
+    guard_pressed (in): of a scan that reads rows: pulse when the guard column is found stuck, until ``retry`` toggles;
+        other scans treat it as any column.
     others (in): with a self-test, columns driven in the next clock whatever they read.
-    held (out): stuck columns, from the clock after a window on.
+    held (out): stuck columns, from the clock after a window.
     pins (out): driven columns, from registers.
     """
 

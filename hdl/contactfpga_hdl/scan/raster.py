@@ -1,4 +1,4 @@
-"""Drives one row after the other and samples all columns of it at once."""
+"""Raster scan."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -28,13 +28,10 @@ class _Slots:
 
     @property
     def begins_rows(self) -> Value:
-        """High in the first clock of row 0."""
         return self.following[1 % len(self.following)] & (self.clock == 0)
 
 
 class _Sample:
-    """The sampled columns, and their row."""
-
     def __init__(self, derived: Derived):
         self.begins = Signal()  # the next one, of a row
         self.early = Const(0)  # before the settle time is over
@@ -51,25 +48,19 @@ class _Sample:
 
 
 class Scanner(wiring.Component):
-    """Raster scan: each row for the settle time, then no row for the release time.
+    """Raster scan: each row in turn is driven for the settle time, then no row for the release time.
 
-    A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchronizer
-    stages and the row register), plus the shift time of columns on shift registers. With ``guard`` a frame begins with
-    the guard row, which is not offered.
+    A row's columns are sampled in the last clock in which the row is driven. The row is offered three clocks later (two
+    synchronizer stages and the row register), plus the shift time of columns on shift registers. With ``guard`` a frame
+    begins with the guard row, which is not offered. The command "sample at" moves the samples of all other rows to an
+    earlier clock; these then do not check the guard column.
 
-    The command "sample at" moves the samples of rows earlier, and nothing else. The guard row's is not moved, and the
-    others then do not check the guard column.
+    The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`:
 
-    pins: those of the row driver and of the column reader.
-    rows (out): rows in ascending order.
-    tag (out): of the frame whose last row was offered; complete one clock after that, until the next frame's last row.
-    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
-    heard (in): copied into that tag.
-    epoch (out): high for a clock every 2^22 us.
-    faults (out): with ``guard``; a row's bit one clock after its sample is available, those of all columns one clock
-        after the guard row's, and of stuck columns one clock after the last row's.
-    contact (out): rises with the offer of the first row with a pressed switch, and falls with the last row of a scan
-        without one.
+    tag (out): complete from one clock after the offer of a frame's last row to the next frame's.
+    faults (out): changes one clock after a row's sample is available, for columns after the guard row's sample, for
+        stuck columns after the last row's.
+    contact (out): rises with the first row with a pressed switch, and falls with the last row of a scan without one.
     """
 
     def __init__(self, skin: Skin):
@@ -139,8 +130,7 @@ class Scanner(wiring.Component):
         ]
 
     def _sample_columns(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """A slot has two samples: in the last clock its row is driven, and in the last one without a row. Returns the
-        sampled levels."""
+        """Sample in the last clock of a row, and in the last clock without a row; returns the sampled levels."""
         derived = self.derived
         lead = derived.column_load_clocks + 1
         begins_released = Signal()
@@ -165,7 +155,6 @@ class Scanner(wiring.Component):
         return reader.levels
 
     def _sample_clock(self, m: Module, slots: _Slots, sample: _Sample) -> Value | int:
-        """Sample clock of the next row, counted from 1."""
         if not moves_sample(self.derived):
             return self.derived.settle_clocks
         from contactfpga_hdl.scan.sample_at import SampleAt
@@ -175,7 +164,6 @@ class Scanner(wiring.Component):
         return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
 
     def _keep_sample(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """Hold an early sample until its usual time."""
         derived = self.derived
         counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks
         due, kept = Signal(name="sample_due"), Signal.like(reader.levels)
@@ -186,7 +174,7 @@ class Scanner(wiring.Component):
         return Mux(reader.done, reader.levels, kept)
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
-        """Drive columns while no row is driven, except for a clock after the last one and a clock before the next."""
+        """Drive columns while no row is driven, except for a clock at either end."""
         from contactfpga_hdl.scan.precharge import Precharge
 
         m.submodules.precharge = precharge = Precharge(self.skin)
@@ -201,8 +189,8 @@ class Scanner(wiring.Component):
         ]
 
     def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
-        """Check lines: a whole row reads the guard column, the guard row all columns. Returns whether a fault was
-        reported as the frame ended, valid with the number of stuck columns."""
+        """Check lines. Returns whether a fault was reported as the frame ended, valid with the number of stuck
+        columns."""
         from contactfpga_hdl.scan.guard import LineFaults
 
         skin = self.skin
@@ -255,7 +243,7 @@ class Scanner(wiring.Component):
             ]
 
     def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> FrameClock:
-        """The frame clock. The tag takes its data of the frame, and its time, with the last row's strobe."""
+        """The frame clock; the tag takes its values with the last row's strobe."""
         late = self.derived.column_shift_clocks
         # The time starts with the first slot of the last row, so that at this row's strobe it gives the time of row
         # 0's sample: no register has to keep that.

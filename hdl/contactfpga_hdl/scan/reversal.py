@@ -1,4 +1,4 @@
-"""Drives all columns and reads the rows; then drives only the touched rows, one by one."""
+"""Scan by line reversal."""
 
 from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
@@ -21,26 +21,26 @@ class ReversalScanner(wiring.Component):
     """Line reversal: the board *listens*, with columns driven and rows released, and then drives the rows that read
     touched.
 
-    With ``guard`` a frame with a driven row ends with a check of guard lines, and a resting sheet is checked now and
-    then. Otherwise the guard column is driven to the selecting level, the guard row to the released one.
-
     Untouched rows are read in each clock, and no level changes. A row's columns are sampled in the last clock in which
-    it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is not
-    driven before this one is taken, and the next frame does not begin before this one is packed.
+    the row is driven, or earlier by the command "sample at"; the row is offered three clocks later. The next row is
+    driven when this row is taken; the next frame begins when this frame is packed. With ``guard`` a frame with a driven
+    row ends with a check of guard lines, and a resting sheet is checked now and then; otherwise the guard column is
+    driven to the selecting level, the guard row to the released level.
 
-    rows (out): the driven rows in ascending order, and an empty row after one whose neighbor was not driven; an
-        untouched sheet has one empty row. With ``report = "cells"`` all rows.
-    tag (out): of the current frame; ``fault`` and the number of stuck columns from three clocks after it began.
-    faults (out): with ``guard``; a check's from the clock after its sample is available.
-    watched (out): high for a clock when the rows of a resting sheet were watched for another 256 us; with ``guard``
-        when it was checked.
-    packed (in): high for a clock when the frame is packed.
-    time (out): in us.
-    due (in): a frame is wanted, though nothing is touched.
+    The ports are those of :func:`~contactfpga_hdl.scan.pins.scan_ports`, and:
+
+    rows (out): driven rows in ascending order, and an empty row after a row whose neighbor was not driven; an untouched
+        sheet has one empty row. With ``report = "cells"`` all rows.
+    tag (out): of the current frame; ``fault`` and stuck columns from three clocks after the frame began.
+    faults (out): with ``guard``, from the clock after a check's sample is available.
+    watched (out): pulse when a resting sheet was watched for another 256 us; with ``guard`` when it was checked.
+    packed (in): pulse when the frame is packed.
+    time (out): device time in us.
+    due (in): a frame is wanted without a touch.
     contact (out): rises three clocks after a touch of an untouched sheet; falls with a frame without a pressed switch.
     alone (out): the offered row was driven.
-    sampled (out): the time of its sample.
-    busy (in): with debounce, a bit per row; that row is driven in the next frame, touched or not.
+    sampled (out): time of its sample.
+    busy (in): with debounce, a bit per row that is driven in the next frame, touched or not.
     """
 
     def __init__(self, skin: Skin):
@@ -89,7 +89,6 @@ class ReversalScanner(wiring.Component):
         return m
 
     def _read_sheet(self, m: Module, pressed: Signal) -> Value:
-        """Returns rows that read touched, including fully masked ones."""
         skin = self.skin
         rows = Signal(skin.rows)
         at_pins = self.pins.rows_read[: skin.rows]
@@ -102,7 +101,6 @@ class ReversalScanner(wiring.Component):
         return rows if skin.selects_low else ~rows
 
     def _hand_on(self, m: Module, cycle: ReversalCycle, wakes: Value, read: Value, pressed: Value) -> None:
-        """Connect driven rows, the contact pin, and motion."""
         skin = self.skin
         m.submodules.offer = offer = DrivenRows(skin) if self.derived.skips else AllRows(skin)
         m.submodules.contact = contact = Contact()
@@ -136,7 +134,6 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _mask(self, m: Module, cycle: ReversalCycle, pressed: Value) -> Value:
-        """Columns that read pressed and are unmasked in the row."""
         masked = Signal(self.skin.columns)
         m.d.comb += masked.eq(pressed)
         with m.Switch(cycle.y):
@@ -146,10 +143,8 @@ class ReversalScanner(wiring.Component):
         return masked
 
     def _tag_frame(self, m: Module, cycle: ReversalCycle, clock: FrameClock) -> Value:
-        """A frame's tag, taken at its beginning; its faults are those reported when its stuck columns are counted.
-
-        Returns a level that is high for a clock when bit ``CHECK_BIT`` of the time has toggled.
-        """
+        """Take a frame's tag as it begins; faults follow when stuck columns are counted. Returns a pulse when bit
+        ``CHECK_BIT`` of the time has toggled."""
         before, toggles = Signal(), Signal()
         m.d.sync += before.eq(clock.time[CHECK_BIT])
         m.d.comb += [
@@ -177,7 +172,6 @@ class ReversalScanner(wiring.Component):
     def _drive_sheet(
         self, m: Module, cycle: ReversalCycle, precharge: Precharge, pressed: Value, test: SelfTest | None
     ) -> None:
-        """Drive all pins from registers; at power-up none is driven."""
         skin = self.skin
         begun = Signal()
         m.d.sync += begun.eq(cycle.begins)
@@ -198,7 +192,7 @@ class ReversalScanner(wiring.Component):
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
 
     def _let_go(self, m: Module, cycle: ReversalCycle, precharge: Precharge, test: SelfTest | None) -> None:
-        """Driven rows: all or none, and a guard row except in a self-test, which drives single lines."""
+        """Drive all rows or none, and the guard row; a self-test drives single lines."""
         skin = self.skin
         if test is None:
             drives_rows = Signal()
@@ -232,7 +226,6 @@ class ReversalScanner(wiring.Component):
         ]
 
     def _test_lines(self, m: Module, cycle: ReversalCycle, test: SelfTest, read: Value, pressed: Value) -> None:
-        """Connect the self-test, whose slots delay a wanted frame."""
         m.submodules.test = test
         wiring.connect(m, test.slots, wiring.flipped(self.slots))
         m.d.comb += [

@@ -1,4 +1,4 @@
-"""Line reversal: the states that share the sheet. A state's effect is visible at the pins a clock later."""
+"""Line reversal: the states that share the sheet. Pins follow a state by a clock."""
 
 from amaranth.hdl import Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -11,38 +11,41 @@ from contactfpga_hdl.scan.sample_at import SampleAt
 from contactfpga_hdl.util.bits import lowest
 
 SYNCHRONIZED = 3
-"""Clocks from a touch until its row reads touched in a synchronizer's output, inclusive."""
+"""Clocks from a touch until its row reads touched at a synchronizer's output, inclusive."""
 
 
 class ReversalCycle(wiring.Component):
-    """Listens; then charge, gap and select per row; with ``guard`` also answer, with ``self_test`` test.
+    """Sequence of listening, and of charge, gap and select for each row; with ``guard`` also checks, with ``self_test``
+    tests.
 
     touched (in): rows to drive: they read touched, or have a debounce time running.
-    wanted (in): a frame is wanted, though nothing is touched.
-    packed (in): high for a clock when the frame that began last is packed.
+    wanted (in): a frame is wanted without a touch.
+    packed (in): pulse when the last begun frame is packed.
     offers (in): a row is on offer.
-    begins (out): high for a clock in which a frame begins, of the rows that read touched in it.
-    rests (out): none began, and rows are watched since.
+    begins (out): pulse when a frame begins, with the rows that read touched then.
+    rests (out): rows are watched, and no frame has begun since.
     settled (out): rows have been released for long enough.
     todo (out): rows still to be driven in this frame.
-    y (out): number of the driven, or last driven, row; following (out): of the next one.
-    strobe (out): high for a clock when the columns of that row are available.
-    charges, listens (out): in the next clock columns are driven, rows are released.
+    y, following (out): number of the last driven row, and of the next one.
+    strobe (out): pulse when the columns of row ``y`` are available.
+    charges, listens (out): in the next clock columns are driven; rows are released.
     selected (out): rows driven to the selecting level.
 
     With ``guard``, see :class:`~contactfpga_hdl.scan.reversal_guard.Checks`:
 
-    check_asked (in): a resting sheet is to be checked.
+    check_asked (in): a check of a resting sheet is wanted.
     of_rows (in): the next check is of the rows.
-    check_starts, checked (out): high for a clock when a check starts, and when its sample is available.
+    check_starts, checked (out): pulses when a check starts, and when its sample is available.
     guard (out): the guard row is driven to the selecting level.
-    inverts (out): in the next clock the guard column has the released level, the other columns the selecting one.
+    inverts (out): in the next clock the guard column has the released level, other columns the selecting level.
 
     With ``self_test``, see :class:`~contactfpga_hdl.scan.self_test.SelfTest`:
 
-    test_asked (in): a slot is wanted; tested (in): high for a clock, its last one.
+    test_asked (in): a slot is wanted.
+    tested (in): pulse in a slot's last clock.
     discharges (in): in the next clock all rows are driven to the selecting level.
-    lets_go (out): high for a clock when a slot begins; tests (out): it is under way.
+    lets_go (out): pulse when a slot begins.
+    tests (out): a slot is under way.
     """
 
     def __init__(self, skin: Skin):
@@ -160,18 +163,15 @@ class ReversalCycle(wiring.Component):
                         self._check(m, columns_from="CHARGE")
 
     def _sample_clock(self, m: Module) -> Value | int:
-        """Sample clock of a row's columns."""
         if not moves_sample(self.derived):
             return self._settle
         return SampleAt(m, self.derived, self.moves, self.clocks, self.begins).clock
 
     @property
     def _check_clocks(self) -> int:
-        """Clocks of a check of the rows after a frame."""
         return max(self.derived.project_clocks, self._settle)
 
     def _check(self, m: Module, columns_from: str) -> None:
-        """Begin the next check, one of columns in the given state."""
         m.d.comb += self.check_starts.eq(1)
         m.d.sync += self._selects.eq(~self.of_rows)
         with m.If(self.of_rows):

@@ -1,7 +1,7 @@
-"""Line reversal with guard lines: checks of rows and columns in turn, one per frame and at rest one every 256 us.
+"""Line reversal with guard lines: checks of rows and columns in turn, one per frame, or at rest every 256 us.
 
-Rows: the guard column alone is driven to the released level, all others to the selecting one, and each whole row reads
-touched. Columns: the guard row alone is selected, and each whole column reads pressed.
+Rows: only the guard column is driven to the released level, and each whole row reads touched. Columns: only the guard
+row is selected, and each whole column reads pressed.
 """
 
 from amaranth.hdl import Cat, Const, Module
@@ -17,14 +17,15 @@ CHECK_BIT = 8
 
 
 class Checks(wiring.Component):
-    """The next check, and the checks' results. A stuck guard column prevents conclusions about rows.
+    """The next check, and the results of checks. A stuck guard column prevents conclusions about rows.
 
-    due (in): high for a clock when a resting sheet is to be checked.
+    due (in): pulse when a resting sheet is to be checked.
     asked (out): such a check is wanted, until a check starts.
-    starts, checked (in): high for a clock when a check starts, and when its sample is available.
+    starts, checked (in): pulses when a check starts, and when its sample is available.
     of_rows (out): the next check is of the rows.
-    of_guard (out): high for a clock when the sample of the rows, and of the guard column, is available.
-    rows, columns (in): rows that read touched, columns that read pressed; held (in): stuck columns.
+    of_guard (out): pulse when the sample of the rows, and of the guard column, is available.
+    rows, columns (in): rows that read touched, columns that read pressed.
+    held (in): stuck columns.
     retry (in): bit ``RETRY_BIT`` of the clock in us.
     faults (out): see :class:`~contactfpga_hdl.scan.guard.LineFaults`.
     """

@@ -1,4 +1,4 @@
-"""Line reversal: the rows passed on, the contact pin, and motion within a frame."""
+"""Line reversal: rows passed on, the contact pin, and motion within a frame."""
 
 from amaranth.hdl import Const, Module, Mux, Signal
 from amaranth.lib import stream, wiring
@@ -13,9 +13,10 @@ from contactfpga_hdl.scan.stuck import present
 def offer_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Ports of the stage that passes rows on.
 
-    untouched (in): high for a clock when a frame without a driven row begins.
-    strobe (in): high for a clock: ``pressed`` (in) are the columns that read pressed in row ``y`` (in), the frame's
-        ``last`` (in), or row ``following`` (in) is the next.
+    untouched (in): pulse when a frame without a driven row begins.
+    strobe (in): pulse with the columns of a row.
+    pressed, y, last (in): columns that read pressed in that row, its number, and whether it is the frame's last.
+    following (in): number of the next row.
     rows (out), alone (out): see :class:`~contactfpga_hdl.scan.reversal.ReversalScanner`.
     """
     number = row_bits(derived)
@@ -32,7 +33,7 @@ def offer_ports(derived: Derived) -> dict[str, wiring.Member]:
 
 
 class DrivenRows(wiring.Component):
-    """Passes on the driven rows, and an empty one after a row whose neighbor was not driven."""
+    """Passes on the driven rows, and an empty row after a row whose neighbor was not driven."""
 
     def __init__(self, skin: Skin):
         super().__init__(offer_ports(skin.derived))
@@ -88,10 +89,10 @@ class AllRows(wiring.Component):
 class Contact(wiring.Component):
     """The contact pin.
 
-    begins, untouched (in): high for a clock when a frame begins, and when no row is driven in it.
+    begins, untouched (in): pulses when a frame begins, and when it has no driven row.
     wakes (in): a row without a masked switch of a resting sheet reads touched.
-    strobe, pressed, last (in): high for a clock: a row's columns are available; a switch is pressed; the row is the
-        last.
+    strobe (in): pulse with the columns of a row.
+    pressed, last (in): a switch of that row is pressed; the row is the frame's last.
     contact (out): rises with ``wakes`` or ``pressed``, and falls with a frame without a pressed switch.
     """
 
@@ -120,9 +121,11 @@ class Contact(wiring.Component):
 class Motion(wiring.Component):
     """Whether a row without a masked switch read touched as the frame began, and empty when driven.
 
-    begins (in): high for a clock; ``read`` (in): rows that then read touched.
-    strobe, pressed, y (in): high for a clock: a row's columns are available; a switch is pressed; the row's number.
-    motion (out): since the frame began.
+    begins (in): pulse when a frame begins.
+    read (in): rows that then read touched.
+    strobe (in): pulse with the columns of a row.
+    pressed, y (in): a switch of that row is pressed; number of the row.
+    motion (out): such a row was found since the frame began.
     """
 
     def __init__(self, skin: Skin):

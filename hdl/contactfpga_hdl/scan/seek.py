@@ -8,12 +8,10 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 
 HITS = 2
-"""Probes of a frame that may be followed by a search; after one more hit, the rest is scanned row by row."""
+"""Most probes of a frame that hit and begin a search; after one more hit, the remaining rows are scanned one by one."""
 
 
 class _Plan:
-    """Remaining work of a frame."""
-
     def __init__(self, derived: Derived):
         rows, levels = derived.skin.rows, derived.row_levels
         self.on_list = Signal(rows)  # to be driven alone in the next frame
@@ -29,24 +27,23 @@ class _Plan:
 
 
 class Seek(wiring.Component):
-    """Chooses row patterns from whether the last one hit.
+    """Chooses the rows of each slot by whether the last ones hit.
 
     A slot drives one row alone, or it *probes* several. A frame begins with a probe of all rows that are not on the
     list; if that hits, a search halves them (docs/timing.md). Rows are driven alone in ascending order. A row stays on
-    the list while it hits, and while ``busy`` at its strobe requires it.
+    the list while it hits, or while ``busy``. Outputs except ``known`` and ``ends`` are valid from
+    ``Derived.choice_clocks`` after the strobe until the next one.
 
-    All outputs except ``known`` and ``ends`` are valid ``Derived.choice_clocks`` after the strobe, until the next one.
-
-    strobe (in): high for a clock at the end of a slot.
+    strobe (in): pulse at the end of a slot.
     hit (in): in that clock, whether any column read pressed.
-    busy (in): in that clock, whether the row that is driven alone must stay on the list.
-    clear (in): forgets ``known``; must come before the next frame's first strobe.
+    busy (in): in that clock, whether the row driven alone must stay on the list.
+    clear (in): clears ``known`` before the next frame's first strobe.
     pattern (out): rows of the next slot.
-    alone (out): it is one row, not a probe.
-    idle (out): it is a probe of all rows.
-    first (out): it is the frame's first slot.
+    alone (out): the slot is one row, not a probe.
+    idle (out): the slot is a probe of all rows.
+    first (out): the slot is the frame's first.
     known (out): rows whose cells in this frame are known, one clock after the strobe.
-    ends (out): high in the clock after a frame's last strobe.
+    ends (out): pulse in the clock after a frame's last strobe.
     """
 
     def __init__(self, skin: Skin):
@@ -90,7 +87,6 @@ class Seek(wiring.Component):
         return m
 
     def _keep_list(self, m: Module, plan: _Plan) -> None:
-        """The rows to drive alone in the next frame, and their number."""
         with m.If(self.strobe & self.alone):
             was = (plan.on_list & self.pattern).any()
             stays = self.hit | self.busy
@@ -140,10 +136,9 @@ class Seek(wiring.Component):
             m.next = "PICK"
 
     def _search(self, m: Module, plan: _Plan) -> None:
-        """Halve the suspects by a bit of their number. Rows that differ only in the lowest are driven alone.
+        """Halve the suspects by a bit of their number; rows that differ only in the lowest bit are driven alone.
 
-        When no probe is left, all open rows are. The suspects are the first of them, so ending the search loses
-        nothing.
+        When no probe is left, all open rows are driven alone. The suspects are the first of them, so nothing is lost.
         """
         rows, levels = self.skin.rows, self.derived.row_levels
         lower = Array(Const(sum(1 << row for row in range(rows) if not row >> bit & 1), rows) for bit in range(levels))

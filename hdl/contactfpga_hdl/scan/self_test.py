@@ -1,8 +1,8 @@
-"""The self-test of a scan by line reversal: each line alone is driven, and the lines that follow it are found.
+"""Self-test of a scan by line reversal: one line at a time is driven, and the lines that follow are found.
 
-A slot begins with all lines at the selecting level. Then all are released, and one of them, or none in the first slot,
-is driven to the released level: pins can oppose each other no longer than that. Current may flow from a column through
-its pressed switches to rows, the way of their diodes; nothing else may follow.
+A slot begins with all lines at the selecting level. Then all are released, and at most one is driven to the released
+level; pins oppose each other no longer. Current may flow from a column through pressed switches to rows, in the
+direction of the diodes; no other line may follow.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
@@ -16,26 +16,25 @@ from contactfpga_hdl.scan.guard import checked_rows
 from contactfpga_hdl.scan.stuck import anywhere
 
 SEEN = 2
-"""Clocks from a level to a synchronizer's output."""
 
 
 class SelfTest(wiring.Component):
-    """Slot 0 with no line driven, one per row, one per column; all of them once after power-up and after each command.
+    """One slot without a driven line, one per row, and one per column, after power-up and after each command.
 
-    A column that rises in slot 0 is ignored in the others; a row that does without a column is joined with the supply.
-    Fully masked lines are not driven.
+    A column that rises in slot 0 is ignored in other slots; a row that rises without a column is joined with the
+    supply. Fully masked lines are not driven.
 
-    command (in): high for a clock; slots are sent from then on, and a test under way starts again after its slot.
+    command (in): pulse from which slots are sent; a test under way starts again after its slot.
     asks (out): a slot is wanted.
-    begin (in): high for a clock in which one begins; the scan drives nothing from the next clock but one on.
-    ends (out): high for a clock, its last one.
+    begin (in): pulse when a slot begins; the scan drives nothing from the second clock after.
+    ends (out): pulse in the last clock of a slot.
     rows, columns (in): lines that read released, from synchronizers; fully masked rows never do.
-    discharges (out): in the next clock all lines are driven to the selecting level, from the third clock after
-        ``begin`` on for the projection time.
-    alone (out): rows, then columns, driven to the released level in the next clock: one line, after a gap of a clock,
+    discharges (out): in the next clock all lines are driven to the selecting level; from the third clock after
+        ``begin`` for the projection time.
+    alone (out): rows, then columns: the line driven to the released level in the next clock, after a gap of a clock,
         for the settle time.
-    slots (out): after a command, the readings of each slot.
-    joined (out): a slot found a line that follows another; until a whole test finds none.
+    slots (out): readings of each slot after a command.
+    joined (out): high from a slot in which a line follows another until a whole test finds none.
     """
 
     def __init__(self, skin: Skin):
@@ -104,7 +103,6 @@ class SelfTest(wiring.Component):
         return judges
 
     def _count(self, m: Module, judges: Value, number: Signal, last: int) -> None:
-        """Number of the next slot, constant until a slot is sent."""
         waits = self.slots.valid
         wanted = Signal()
         tells = Signal()  # slots go out
@@ -144,7 +142,7 @@ class SelfTest(wiring.Component):
                 m.d.sync += rises.eq(Cat(rows, columns))
 
     def drives(self) -> tuple[Value, Value]:
-        """Rows and columns driven in the next clock. A guard row is discharged, a guard column is by its switches."""
+        """Rows and columns driven in the next clock; a guard column is discharged by its switches."""
         rows, columns = self.skin.rows, self.skin.columns
         guard = 1 << rows if self.skin.guard else 0
         discharged = self.discharges.replicate(rows + 1) & (checked_rows(self.skin) | guard)
@@ -155,5 +153,5 @@ class SelfTest(wiring.Component):
 
 
 def test_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Ports of a scan with a self-test, see :class:`SelfTest`."""
+    """Ports of a scan with a self-test, as in :class:`SelfTest`."""
     return {"command": In(1), "slots": Out(stream.Signature(slots_layout(derived)))}

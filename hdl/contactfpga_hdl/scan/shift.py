@@ -1,7 +1,7 @@
 """Chains of shift registers between the board's pins and a sheet with more wires.
 
-All pins come from registers. A bit needs ``Derived.shift_clocks``; the shift clock is high in half of it.
-docs/boards.md has the wiring, and the chips' times against these halves.
+All pins come from registers. A bit takes ``Derived.shift_clocks``, half of them with the shift clock high;
+docs/boards.md has the wiring and the chips' times.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
@@ -16,11 +16,10 @@ from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
 
 class RowChain(wiring.Component):
     """Rows on chains of 74HC595. A pattern is loaded ``Derived.row_shift_clocks`` clocks after ``shift``; the enable
-    pin follows ``drive`` and ``release`` by one.
+    pin follows ``drive`` and ``release`` by one clock.
 
-    A whole pattern is shifted, highest line of each chain first, while the one before it is driven, so a random
-    power-up state or disturbance is gone with the next pattern. The latch rises once it is loaded; by then no row may
-    be driven, or the same ones, and the enable pin begins and ends a row.
+    A whole pattern, highest line of each chain first, is shifted while the one before is driven, so a random state
+    lasts one pattern. The latch rises while no row, or the same rows, are driven.
     """
 
     def __init__(self, skin: Skin):
@@ -61,8 +60,8 @@ class RowChain(wiring.Component):
 class ColumnChain(wiring.Component):
     """Columns on chains of 74HC165.
 
-    The load pulse captures them all at once, in its last clock. The first line of each chain is available without a
-    shift, each following one after a rising edge; a bit is read in the last clock before the next edge.
+    The load pulse captures all columns in its last clock. The first line of each chain needs no shift, each further one
+    a rising edge; a bit is read in the last clock before the next edge.
     """
 
     def __init__(self, skin: Skin):

@@ -10,7 +10,7 @@ from contactfpga_hdl.util.bits import popcount
 
 
 def present(skin: Skin, row: int) -> int:
-    """Columns, as bits, in which this row has an unmasked switch."""
+    """Columns, as bits, in which a row has an unmasked switch."""
     return sum(1 << column for column in range(skin.columns) if (row, column) not in skin.mask)
 
 
@@ -23,15 +23,13 @@ def anywhere(skin: Skin) -> int:
 
 
 def watched(skin: Skin) -> int:
-    """Columns, as bits, not masked in every row, and the guard column."""
+    """Columns, as bits, that are not masked in every row, and the guard column."""
     return anywhere(skin) | (1 << skin.columns if skin.guard else 0)
 
 
 class Stuck(wiring.Component):
-    """Counts columns that read pressed in any ``released`` clock up to ``take``; ``count`` is valid two clocks later.
-
-    Columns that are masked in every row do not count, nor does a guard column. ``seen`` accumulates the lines.
-    """
+    """Counts columns that read pressed in any ``released`` clock up to ``take``, except fully masked ones and a guard
+    column; ``count`` is valid two clocks later, ``seen`` accumulates the lines."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -56,7 +54,7 @@ class Stuck(wiring.Component):
 
 
 def count_columns(m: Module, columns: Value, take: Value, count: Signal) -> None:
-    """Set ``count`` to the number of columns at ``take``, two clocks later, as 64 are too many for one clock."""
+    """Set ``count`` to the number of columns two clocks after ``take``; 64 are too many for one clock."""
     groups = [columns[first : first + 8] for first in range(0, len(columns), 8)]
     counts = [Signal(range(len(group) + 1), name=f"stuck_{index}") for index, group in enumerate(groups)]
     with m.If(take):

@@ -1,1 +1,1 @@
-"""Pressure units: their converter, thresholds on readings, and packets."""
+"""Pressure units: converter, thresholds, and packets."""

@@ -1,4 +1,4 @@
-"""ADS131M08: 24 bits, eight channels at once, paced by a given clock (Texas Instruments SBAS950B)."""
+"""ADS131M08: 24 bits, eight channels at once, paced by the board (Texas Instruments SBAS950B)."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -8,24 +8,25 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.units.ports import converter_ports
 
 BITS, WORDS = 24, 10
-"""Bits of a word, and words of a frame: its status, eight channels, a check. These are the sizes at power-up, and a
-frame must be read whole."""
+"""Bits of a word, and words of a frame: status, eight channels, check; sizes at power-up. A frame must be read whole.
+"""
 CLOCKS = BITS * WORDS
 LEVELS = 2 * CLOCKS + 2
 """Levels (half periods) of a frame; in the last one the converter is not selected."""
 SKIPPED = 3
-"""Omitted frames after power-up."""
+"""Frames omitted after power-up."""
 
 
 class Ads131m08(wiring.Component):
-    """Reads a frame for each conversion, SPI mode 0,1; see :func:`~contactfpga_hdl.units.ports.converter_ports`.
+    """Reads a frame for each conversion, SPI mode 0,1; ports as in
+    :func:`~contactfpga_hdl.units.ports.converter_ports`.
 
-    The converter keeps its power-up settings: 1024 modulator samples per result, all channels enabled, gain 1. Zeros
-    are sent, which request nothing. It keeps two unread results (8.5.1.9.1), and its first two results after power-up
-    come from a filter with another delay (8.3.7.1.1). So two frames are read in sequence and omitted, and one more.
+    The converter keeps its power-up settings: 1024 modulator samples per result, all channels, gain 1. Zeros are sent,
+    which request nothing. The converter keeps two unread results (8.5.1.9.1), and its first two results after power-up
+    come from a filter with another delay (8.3.7.1.1), so the first :data:`SKIPPED` frames are omitted.
 
-    The converter gives a bit at a rising edge, read at the next falling one. A channel is available three clocks after
-    that of its last bit.
+    A bit changes at a rising edge and is read at the next falling one. A channel is available three clocks after that
+    of its last bit.
     """
 
     def __init__(self, skin: Skin):
@@ -66,13 +67,11 @@ class Ads131m08(wiring.Component):
         return m
 
     def _pace(self, m: Module) -> None:
-        """The converter's own clock."""
         count = Signal(range(self.pace_clocks))
         toggles = count == self.pace_clocks - 1
         m.d.sync += [count.eq(Mux(toggles, 0, count + 1)), self.pins.spi_pace.eq(self.pins.spi_pace ^ toggles)]
 
     def _take(self, m: Module, falls: Value, counts: Value) -> None:
-        """Read the pin, two synchronizer clocks after ``falls``."""
         bit = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, bit)
         place = Signal(range(BITS))

@@ -17,10 +17,9 @@ LEVELS = 40
 
 
 class Mcp3208(wiring.Component):
-    """Sweeps the units without a pause, SPI mode 0,0; see :func:`~contactfpga_hdl.units.ports.converter_ports`.
+    """Sweeps the units without a pause, SPI mode 0,0; ports as in :func:`~contactfpga_hdl.units.ports.converter_ports`.
 
-    The converter gives a bit at a falling edge, read at the next rising one. A reading is available three clocks after
-    that.
+    A bit changes at a falling edge and is read at the next rising one. A reading is available three clocks after that.
     """
 
     def __init__(self, skin: Skin):
@@ -52,7 +51,6 @@ class Mcp3208(wiring.Component):
         return m
 
     def _take(self, m: Module, rises: Value, last_bit: Value, unit: Value, last_unit: Value) -> None:
-        """Read the pin, two synchronizer clocks after ``rises``."""
         level = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, level)
         takes = Signal(2)

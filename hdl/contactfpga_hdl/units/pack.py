@@ -1,4 +1,4 @@
-"""Packets of readings, one for each sweep: the newest complete one waits for the wire (docs/protocol.md)."""
+"""Packets of readings, one per sweep; the newest complete one waits for the wire (docs/protocol.md)."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import memory, wiring
@@ -18,20 +18,19 @@ PLACE_BITS = 6
 def packet_signature() -> wiring.Signature:
     """Unit packets without their check, for the link.
 
-    due (out): one waits.
-    taken (in): high for a clock when it is sent.
-    place (in): of the byte offered from the next clock on.
+    due (out): a packet waits.
+    taken (in): pulse when the packet is sent.
+    place (in): place of the byte offered from the next clock.
     byte (out): that byte.
     """
     return wiring.Signature({"due": Out(1), "taken": In(1), "place": In(PLACE_BITS), "byte": Out(8)})
 
 
 class UnitPacker(wiring.Component):
-    """Writes a packet's digits, one a clock: those of a reading after it, the rest after the last one.
+    """Writes a packet's digits, one per clock: those of a reading after it, the rest after the last reading. Three
+    regions of a memory rotate: the sweep being written, the waiting one, the one on the wire.
 
-    Three regions of a memory rotate: the sweep being written, the waiting one, the one on the wire.
-
-    sampled, done, reading (in): of the converter.
+    sampled, done, reading (in): from the converter.
     over, armed (in): the packet's flags, read nine clocks after the last reading of two digits.
     packet (out): see :func:`packet_signature`.
     """

@@ -1,4 +1,4 @@
-"""Pressure units between their converter's pins, the commands, the contact pin and the link: wiring only."""
+"""Pressure units between converter, commands, contact pin and link: connections only."""
 
 from amaranth.hdl import Module
 from amaranth.lib import wiring
@@ -15,7 +15,7 @@ class Units(wiring.Component):
     """Sweeps of the converter, a packet for each; ``over`` follows a unit's reading by two clocks, the last sum's by up
     to seven, the packet's ``due`` as in docs/timing.md.
 
-    pins: those at the converter.
+    pins: pins at the converter.
     command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.
     over, armed (out): see :class:`~contactfpga_hdl.units.watch.Watch`.
     packet (out): see :func:`~contactfpga_hdl.units.pack.packet_signature`.

@@ -1,4 +1,4 @@
-"""Whether a unit's deviation from its zero, or a weighted sum of deviations, has reached its threshold."""
+"""Thresholds on the deviations of units from their zeros, and on weighted sums of deviations."""
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
@@ -11,13 +11,13 @@ from contactfpga_hdl.units.ports import reading_layout
 
 
 class Watch(wiring.Component):
-    """Compares each unit at each of its readings, each sum once a sweep.
+    """Compares each unit at each of its readings, and each sum once per sweep.
 
-    done, reading (in): of the converter.
-    command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.
-    over (out): a threshold is reached. A unit's counts two clocks after ``done``, sum k's four + k clocks after that of
-        the sweep's last unit, until the next comparison.
-    armed (out): there is a threshold.
+    done, reading (in): from the converter.
+    command, what, value (in): see :class:`Settings`.
+    over (out): a threshold is reached, until the next comparison; for a unit from two clocks after ``done``, for sum k
+        from 4 + k clocks after ``done`` of the sweep's last unit.
+    armed (out): a threshold is set.
     """
 
     def __init__(self, skin: Skin):
@@ -74,11 +74,10 @@ class Watch(wiring.Component):
 class Settings(wiring.Component):
     """Zeros and thresholds in registers, so that a restart of two copies clears them.
 
-    command (in): high for a clock; ``what`` and ``value`` are then a command's. Those of absent units and sums are
-        ignored.
-    unit (in): selects ``zero`` and ``threshold``; ``watched``: it has a threshold.
+    command (in): pulse with a command; ``what`` and ``value`` (in) are ignored for absent units and sums.
+    unit (in): selects ``zero``, ``threshold``, and ``watched``, whether there is a threshold (out).
     sum (in), with sums: likewise for a sum.
-    armed (out): there is a threshold.
+    armed (out): a threshold is set.
     """
 
     def __init__(self, skin: Skin):
@@ -119,7 +118,6 @@ class Settings(wiring.Component):
         return m
 
     def _registers(self, m: Module, name: str, what: int, count: int, bits: int) -> tuple[Array, Array]:
-        """Values set by commands, and whether each is not 0."""
         values = [Signal(bits, name=f"{name}_{index}") for index in range(count)]
         given = [Signal(name=f"{name}_{index}_given") for index in range(count)]
         index, number = self.value[:INDEX_BITS], self.value[INDEX_BITS:]
@@ -134,10 +132,10 @@ class Settings(wiring.Component):
 class Sums(wiring.Component):
     """One multiplier computes the sums in turn, a clock each, while their totals rotate.
 
-    taken (in): high for a clock; then ``deviation`` is that of ``unit``, stable for as many clocks as there are sums.
-    last (in): of the sweep's last unit.
-    sum (out): whose ``threshold`` and ``watched`` (in) are needed in this clock.
-    over (out): a bit for each sum, three clocks after its product in the last unit's.
+    taken (in): pulse with a ``deviation`` of ``unit``, which are stable for as many clocks as there are sums.
+    last (in): the deviation is of the sweep's last unit.
+    sum (out): number of the sum whose ``threshold`` and ``watched`` (in) are needed in this clock.
+    over (out): a bit per sum, three clocks after its product with the last unit.
     """
 
     def __init__(self, skin: Skin):

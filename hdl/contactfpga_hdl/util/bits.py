@@ -1,4 +1,4 @@
-"""Numbers of the bits of a word."""
+"""Counts and indexes of set bits."""
 
 from collections.abc import Iterable
 

@@ -10,8 +10,8 @@ SHALLOW = 4
 class Stack(Elaboratable):
     """Stack of ``depth`` entries whose top is a register; the others are in registers or, if many, in a memory.
 
-    In one cycle it performs ``pop``, then ``push``; with ``enable`` low nothing. Depth 0 keeps nothing. Popping an
-    empty stack and pushing onto a full one are the caller's errors.
+    In one clock with ``enable`` the stack performs ``pop``, then ``push``. Depth 0 keeps nothing. The caller never pops
+    an empty stack or pushes onto a full one.
     """
 
     def __init__(self, layout: data.StructLayout, depth: int):
@@ -45,7 +45,6 @@ class Stack(Elaboratable):
         return m
 
     def _shift(self, m: Module, deeper: Value, shallower: Value) -> Value:
-        """Keep the entries below the top in registers, the next one first; returns that."""
         entries = [self.top, *(Signal(self.entry.shape(), name=f"below_{i}") for i in range(1, self.depth))]
         for index in range(1, self.depth):
             with m.If(deeper):
@@ -58,7 +57,7 @@ class Stack(Elaboratable):
     def _spill(self, m: Module, deeper: Value, shallower: Value) -> Value:
         """Keep the entries below the top in a memory, entry i at address i; returns the one next to the top.
 
-        That one is read ahead, or, if just written, kept in a register: no address is read and written in the same
+        That entry is read ahead, or, if just written, kept in a register: no address is read and written in the same
         clock.
         """
         m.submodules.below = below = memory.Memory(shape=self.entry.shape(), depth=self.depth - 1, init=[])

@@ -1,4 +1,4 @@
-"""Registers that flip without a write, for instance by radiation."""
+"""Detection of registers that flip without a write, for instance by radiation."""
 
 from amaranth.hdl import Module, Signal, Value
 
@@ -13,7 +13,7 @@ def upset(m: Module, name: str, word: Value, writes: Value, toggles: Value | int
 
 
 def upset_places(first: Value, second: Value, third: Value) -> Value:
-    """High while these are not 0, 1 and 2 in any order, because of a flip in one of their six bits."""
+    """High while these are not 0, 1 and 2 in any order, because one of their six bits flipped."""
     return first ^ second ^ third != 0b11
 
 

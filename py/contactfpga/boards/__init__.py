@@ -1,4 +1,4 @@
-"""The supported boards, each described once. A new one is a file here and an entry in :data:`BOARDS`."""
+"""The supported boards; a new one is a file here and an entry in :data:`BOARDS`."""
 
 from contactfpga.boards.ice40 import ICEBREAKER, ICESTICK
 from contactfpga.boards.spec import BoardSpec
@@ -12,11 +12,10 @@ __all__ = ["BOARDS", "find"]
 BOARDS: dict[str, BoardSpec] = {
     board.name: board for board in (ICEBREAKER, ICESTICK, ULX3S_12F, ULX3S_85F, ULX3S_12F_FT232H)
 }
-"""Boards by name."""
 
 
 def find(name: str) -> BoardSpec:
-    """The board of that name, or your own ``module:attribute``. Raises SkinError that lists the names."""
+    """The board of that name, or at a user's ``module:attribute``. Raises SkinError that lists the names."""
     if name in BOARDS:
         return BOARDS[name]
     if ":" not in name:

@@ -1,4 +1,4 @@
-"""PLL dividers from a board's crystal to a clock. Loads no Amaranth.
+"""PLL dividers from a board's crystal to a clock; without Amaranth.
 
 iCE40 (SB_PLL40_PAD, SB_PLL40_CORE): the oscillator runs at ``crystal / (DIVR + 1) * (DIVF + 1)`` and is divided by
 ``2**DIVQ``. ECP5 (EHXPLLL): the output is fed back, so it is ``crystal / CLKI_DIV * CLKFB_DIV`` and the oscillator
@@ -31,11 +31,8 @@ ECP5_OUTPUT = 10 * MHZ, 400 * MHZ
 
 
 def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
-    """The dividers for exactly this clock.
-
-    Of several the one with the highest comparison frequency, then the oscillator nearest to the middle of its range.
-    Raises SkinError with the nearest clocks of whole MHz if there is none.
-    """
+    """The dividers for exactly this clock: those of the highest comparison frequency, then of the oscillator nearest to
+    the middle of its range. Raises SkinError with the nearest whole MHz if there are none."""
     clocks = _clocks(cell, crystal_hz)
     if clock_hz in clocks:
         return clocks[clock_hz]
@@ -50,7 +47,6 @@ def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
 
 @functools.cache
 def _clocks(cell: str, crystal_hz: int) -> dict[int, Dividers]:
-    """Dividers by clock of whole MHz, as Skins request."""
     clocks: dict[int, Dividers] = {}
     for made, found in _SETTINGS[cell](crystal_hz):
         if made % MHZ == 0:

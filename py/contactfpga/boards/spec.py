@@ -1,8 +1,8 @@
-"""Description of a board: clock, pins, bridge, programmer. Loads no Amaranth.
+"""Description of a board, without Amaranth.
 
-Sheet lines are on two rows of header pins. Rows use the first from its start, columns the second, and whichever
-overflows continues at the far end of the other: row k and column k are on the same pin in every sheet. With shift
-registers, their few wires replace the rows or the columns.
+Sheet lines are on two sides of header pins. Rows use the first side from its start, columns the second; lines that do
+not fit continue at the far end of the other side. So row k and column k are on the same pin for every sheet. A few
+wires of shift registers replace the lines.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several
 
 NAME = "contactfpga"
-"""Base name of a build's files."""
 
 UNIT_PORTS = ("spi_ready_n", "spi_pace", "spi_clock", "spi_select_n", "spi_mosi", "spi_miso")
-"""Ports of the pressure units' converter; one without its own pace lacks the first two."""
+"""Ports of the converter of pressure units; a converter without its own pace lacks the first two."""
 
 
 def unit_ports(skin: Skin) -> tuple[str, ...]:
@@ -32,21 +31,21 @@ def unit_ports(skin: Skin) -> tuple[str, ...]:
 
 
 MAX_BRIDGE_ERROR = 0.03
-"""FTDI's limit for the difference between the rates of both ends."""
+"""FTDI's limit for the relative difference between the rates of both ends."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Bridge:
-    """The USB chip of the UART; it divides ``max_baud`` by 1, 1.5, or 2 and more in eighths."""
+    """The USB chip of the UART, which divides ``max_baud`` by 1, 1.5, or 2 and more in eighths."""
 
     chip: str
     usb: tuple[int, int]
     """Vendor and product ID."""
     interface: int | None
-    """Interface of the UART in a chip with several; None: it has one."""
+    """Interface of the UART; None for a chip with one interface."""
     max_baud: int
     high_speed: bool = False
-    """Whether it is a high-speed device, 480 Mbit/s; else a full-speed one, 12 Mbit/s."""
+    """Whether the chip is a high-speed device, 480 Mbit/s; otherwise a full-speed one, 12 Mbit/s."""
 
     @property
     def frame_us(self) -> int:
@@ -55,12 +54,11 @@ class Bridge:
 
     @property
     def payload_bytes(self) -> int:
-        """UART bytes in a full packet: the largest of a bulk endpoint (USB 2.0, 5.8.3), less the two status bytes of an
-        FTDI chip's packet (AN232B-04)."""
+        """UART bytes in a full packet: the most of a bulk endpoint (USB 2.0, 5.8.3), less the two status bytes of
+        FTDI's packets (AN232B-04)."""
         return (512 if self.high_speed else 64) - 2
 
     def nearest(self, baud: int) -> float:
-        """The chip's actual rate for ``baud``."""
         eighths = max(16, round(8 * self.max_baud / baud))
         rates = [self.max_baud, self.max_baud / 1.5, 8 * self.max_baud / eighths]
         return min(rates, key=lambda rate: abs(rate - baud))
@@ -74,7 +72,7 @@ class Programmer:
     options: tuple[str, ...]
     install: str
     wheel: str = ""
-    """Command of a wheel with the same program, which needs the system's libusb; "" for none."""
+    """Command of a wheel with the same program, which needs the system's libusb; "": none."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,9 +85,9 @@ class BoardSpec:
     platform: str
     """``module:class`` in amaranth_boards."""
     clock_hz: int
-    """Frequency of its crystal. An on-chip oscillator is too imprecise for a UART."""
+    """Frequency of the crystal. An on-chip oscillator is too imprecise for a UART."""
     pll: str
-    """The PLL cell for other clocks, which depends on the crystal's pin."""
+    """PLL cell for other clocks, which depends on the crystal's pin."""
     connectors: Mapping[str, str]
     """Print beside each connector."""
     row_side: tuple[str, ...]
@@ -104,34 +102,33 @@ class BoardSpec:
     bitstream: str
     """File ending of the bitstream."""
     constraints: str
-    """File in constraints/; boards with the same pins share it."""
+    """File in constraints/, common to boards with the same pins."""
     skin: Skin
-    """The default sheet."""
     circuit: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """Values of that sheet's table ``[circuit]``."""
+    """Table ``[circuit]`` of the default sheet."""
     uart: tuple[str, str] | None = None
-    """Connector pins of an external bridge for receiving and sending; None: the bridge is on board."""
+    """Connector pins of an external bridge for receiving and sending; None for a bridge on the board."""
     held_high: tuple[str, ...] = ()
     """FPGA pins that other chips on the board need high."""
 
     @property
     def lines(self) -> int:
-        """Number of wires to the sheet that fit on pins."""
+        """Number of pins for wires to the sheet."""
         return len(self.row_side) + len(self.column_side)
 
     @property
     def alive(self) -> str:
-        """The pin of ``alive`` for a Skin that has it; otherwise one of the sheet's."""
+        """Pin of ``alive``; without ``alive`` a pin of the sheet."""
         return self.column_side[-1]
 
     @property
     def converter(self) -> tuple[str, ...]:
-        """The pins of :data:`UNIT_PORTS` that a Skin's converter has; otherwise they are the sheet's."""
+        """Pins of :data:`UNIT_PORTS` for a Skin with units; without units pins of the sheet."""
         return self.row_side[-len(UNIT_PORTS) :]
 
     def pins(self, skin: Skin | Several) -> dict[str, tuple[str, ...]]:
-        """Pins of each gateware port at the sheet and at the units' converter, lowest bit first, and of ``alive``; of
-        several sheets with the sheet's number after the port's name."""
+        """Pins of each gateware port at the sheet and at the converter, and of ``alive``, lowest bit first; port names
+        of several sheets end with the sheet's number."""
         if isinstance(skin, Several):
             rows_first, columns_first = self.row_side + self.column_side[::-1], self.column_side + self.row_side[::-1]
             sheets = self._dealt(_of_sheets(skin, row_wires), rows_first)
@@ -151,7 +148,7 @@ class BoardSpec:
         return {name: tuple(itertools.islice(pins, count)) for name, count in wires.items()}
 
     def load(self, path: str | Path) -> Skin:
-        """A Skin's file; ``clock_hz`` and ``baud`` default to those of the board's own Skin."""
+        """Read a Skin's file with defaults for ``clock_hz`` and ``baud`` from the board's own Skin."""
         return Skin.load(path, usual={"clock_hz": self.skin.clock_hz, "baud": self.skin.baud})
 
     def label(self, pin: str) -> str:
@@ -160,7 +157,7 @@ class BoardSpec:
         return f"{self.connectors[connector]} {number}"
 
     def check(self, skin: Skin | Several) -> None:
-        """Raise SkinError if ``skin``, or several sheets, cannot be built for this board."""
+        """Raise SkinError if this board cannot be built for one or several sheets."""
         self.check_clock(skin)
         self.check_pins(skin)
         self.check_baud(skin)
@@ -171,7 +168,6 @@ class BoardSpec:
             pll.dividers(self.pll, self.clock_hz, skin.clock_hz)
 
     def check_pins(self, skin: Skin | Several) -> None:
-        """Raise SkinError for more wires than pins."""
         if isinstance(skin, Several):
             self._check_sheets(skin)
         else:
@@ -236,7 +232,6 @@ def column_wires(skin: Skin) -> dict[str, int]:
 
 
 def _of_sheets(several: Several, wires: Callable[[Skin], Mapping[str, int]]) -> dict[str, int]:
-    """Bits of each port of several sheets."""
     return {f"{name}_{number}": bits for number, skin in enumerate(several.skins) for name, bits in wires(skin).items()}
 
 
@@ -245,5 +240,4 @@ def pins_of(connector: str, numbers: str) -> tuple[str, ...]:
 
 
 def bitstream_path(board: BoardSpec, folder: Path) -> Path:
-    """Path of a build's bitstream."""
     return folder / f"{NAME}.{board.bitstream}"

@@ -1,4 +1,4 @@
-"""Connections of a board's pins, or of shift registers' outputs, to the lines of a Skin's sheet. Loads no Amaranth."""
+"""Connections of a board's pins, or of shift registers' outputs, to a sheet's lines; without Amaranth."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ OWN = "(on the board)"
 """Destination of a wire that nobody has to solder."""
 
 ROW_OUTPUTS = ("QA", 15), ("QB", 1), ("QC", 2), ("QD", 3), ("QE", 4), ("QF", 5), ("QG", 6), ("QH", 7)
-"""Outputs of a 74HC595 with their pins, line 0's first."""
+"""Outputs of a 74HC595 with their pins, that of line 0 first."""
 COLUMN_INPUTS = ("H", 6), ("G", 5), ("F", 4), ("E", 3), ("D", 14), ("C", 13), ("B", 12), ("A", 11)
-"""Inputs of a 74HC165 with their pins, line 0's first."""
+"""Inputs of a 74HC165 with their pins, that of line 0 first."""
 
 _CHIP_PINS = {
     "row_clock": "SRCLK 11 of every 74HC595",
@@ -45,29 +45,25 @@ _CONVERTER_PINS = {
         "spi_pace": "XTAL1/CLKIN 23 of the ADS131M08",
     },
 }
-"""Pins by converter name; for your own the port itself is shown."""
+"""Pin of each port by converter name; a user's own converter shows the port."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Connection:
-    """The destination of a line, and its parts."""
-
     leads_to: str
     """Destination such as ``row 3``, ``guard column``, ``nothing``."""
     kind: str = ""
-    """``row`` or ``column`` of the sheet; empty for other wires."""
+    """``row`` or ``column`` for a line of the sheet; otherwise ""."""
     pull: str = ""
-    """``up``, ``down``, or empty: direction of the pull on a line of the sheet."""
+    """Direction of the pull on a line of the sheet, ``up`` or ``down``; otherwise ""."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Wire:
-    """An FPGA pin of the gateware."""
-
     port: str
-    """Name in the constraints, with its bit if there are several: ``rows[3]``, ``uart rx``."""
+    """Name in the constraints, with the bit of a wide port: ``rows[3]``, ``uart rx``."""
     pin: str
-    """``connector:pin`` as the platform names it; empty if the board itself connects it."""
+    """``connector:pin`` as in the platform; "" if the board itself connects the pin."""
     line: Connection
 
 
@@ -85,12 +81,11 @@ class Output:
 
     @property
     def place(self) -> tuple[str, str, str, str]:
-        """The output's place in words."""
         return self.chip, str(self.chain), str(self.number), f"{self.name} {self.pin}"
 
 
 def wires(board: BoardSpec, skin: Skin | Several) -> list[Wire]:
-    """Every FPGA pin that the gateware of ``skin``, or of several sheets, uses, in port order."""
+    """All FPGA pins that the gateware uses, in port order."""
     found = []
     for port, pins in board.pins(skin).items():
         lines = _lines_of_sheet(skin, port, len(pins)) if isinstance(skin, Several) else _lines(skin, port, len(pins))
@@ -109,7 +104,7 @@ def wires(board: BoardSpec, skin: Skin | Several) -> list[Wire]:
 
 
 def outputs(skin: Skin) -> list[Output]:
-    """Every used output of the shift registers, rows first."""
+    """All used outputs of the shift registers, rows first."""
     found: list[Output] = []
     if skin.row_drive != "direct":
         found += _chained("74HC595", ROW_OUTPUTS, skin.row_chains, row_lines(skin))
@@ -119,7 +114,6 @@ def outputs(skin: Skin) -> list[Output]:
 
 
 def parts(skin: Skin) -> dict[str, int]:
-    """Number of each part on the sheet, without connectors."""
     lines = [*row_lines(skin), *column_lines(skin)]
     cells = skin.rows * skin.columns - len(skin.mask)
     chips = collections.Counter(chip for chip, *_ in {(one.chip, one.chain, one.number) for one in outputs(skin)})
@@ -136,13 +130,13 @@ def parts(skin: Skin) -> dict[str, int]:
 
 
 def row_lines(skin: Skin) -> list[Connection]:
-    """Connection of each row's line, the guard row's last."""
+    """Connection of each row's line; the guard row's comes last."""
     pull = ("down" if skin.selects_low else "up") if skin.reads_rows else ""
     return _sheet_lines("row", skin.line_of_row, skin.rows, pull)
 
 
 def column_lines(skin: Skin) -> list[Connection]:
-    """Connection of each column's line, the guard column's last."""
+    """Connection of each column's line; the guard column's comes last."""
     return _sheet_lines("column", skin.line_of_column, skin.columns, "up" if skin.selects_low else "down")
 
 

@@ -1,5 +1,5 @@
-"""Choices of a Skin: labellers, scans, debounces and reports, each registered in one place.
+"""Choices of a Skin: labellers, scans, debounces, converters and reports, each registered in one place.
 
-A choice holds what all parts of the project need: its name, its title in charts, its bounds, its requirements, and the
-places of its gateware and its golden rule. These two stay apart and are loaded on demand.
+A choice has a name, a title, bounds and requirements, and the places of gateware and golden rule, which are loaded on
+demand.
 """

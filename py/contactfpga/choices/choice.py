@@ -1,4 +1,4 @@
-"""Common parts of choices, which are found by a built-in name, or as your own ``module:attribute``."""
+"""Common parts of choices: a choice has a built-in name, or is a user's own ``module:attribute``."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from contactfpga.errors import SkinError
 from contactfpga.inputs.values import shown
 
 Bound = Callable[[Any], int]
-"""An upper bound in clocks or slots, from the :class:`~contactfpga.skin.derived.Derived` of a Skin."""
+"""An upper bound in clocks or slots from a :class:`~contactfpga.skin.derived.Derived`."""
 
 FIELDS = ("labeller", "scan", "debounce", "converter")
-"""Fields of a Skin that may name your own choice, ``module:attribute``."""
+"""Fields of a Skin that may name a user's own choice."""
 
 _trusting: contextvars.ContextVar[bool] = contextvars.ContextVar("trusting", default=False)
 
 
 @contextlib.contextmanager
 def trusted(trust: bool) -> Iterator[None]:
-    """With ``trust``, files read in this block may name modules, which are imported and so run."""
+    """With ``trust``, files read in this block may name modules, whose import runs their code."""
     token = _trusting.set(trust or trusting())
     try:
         yield
@@ -34,12 +34,11 @@ def trusted(trust: bool) -> Iterator[None]:
 
 
 def trusting() -> bool:
-    """Whether this is inside :func:`trusted`."""
     return _trusting.get()
 
 
 def refuse_modules(values: Mapping[str, Any], source: str) -> None:
-    """Raise SkinError if a Skin from ``source`` names a module, outside :func:`trusted`."""
+    """Raise SkinError if the Skin from ``source`` names a module, except inside :func:`trusted`."""
     if trusting():
         return
     for field in FIELDS:
@@ -53,23 +52,21 @@ def refuse_modules(values: Mapping[str, Any], source: str) -> None:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Choice:
-    """One way to do a stage. Two choices with one name are the same choice."""
+    """One way to do a stage; choices of one name are the same choice."""
 
     name: str
-    """Name in a Skin: a built-in one, or the ``module:attribute`` of this object."""
+    """Name in a Skin: a built-in name, or the ``module:attribute`` of this object."""
     title: str
-    """Its label in charts and tables."""
     gateware: str
-    """Place of the gateware's class, ``module:attribute``, which is called with the Skin. Empty: none."""
+    """``module:attribute`` of the gateware's class, which is called with the Skin; "": none."""
     golden: str
-    """Place of the golden model's rule, ``module:attribute``; it shares no code with the gateware."""
+    """``module:attribute`` of the golden model's rule; it shares no code with the gateware."""
 
     def load_gateware(self) -> Any:
         """The gateware's class. Imports Amaranth."""
         return load(self.gateware)
 
     def load_golden(self) -> Any:
-        """The golden model's rule."""
         return load(self.golden)
 
 
@@ -77,7 +74,7 @@ AnyChoice = TypeVar("AnyChoice", bound=Choice)
 
 
 def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object) -> AnyChoice:
-    """The choice of this kind that ``value`` names or is. Raises SkinError that lists the choices."""
+    """The choice of a kind that ``value`` names or is. Raises SkinError that lists the choices."""
     field = kind.__name__.lower()
     if isinstance(value, kind):
         if find(kind, built_in, value.name) != value:
@@ -99,13 +96,13 @@ def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object
 
 
 def load(place: str) -> Any:
-    """The object at ``module:attribute``."""
     module, _, attribute = place.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
 def load_own(place: str, what: str) -> Any:
-    """The object at a place that a user names. Raises SkinError, beginning with ``what``, however the module fails."""
+    """The object at a user's ``module:attribute``. Raises SkinError, beginning with ``what``, for any failure of the
+    module."""
     try:
         return load(place)
     except (ImportError, AttributeError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""Converters, which read the pressure units over SPI."""
+"""Converters that read pressure units over SPI."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from contactfpga.choices.choice import find as find_choice
 
 @dataclasses.dataclass(frozen=True)
 class ConverterPace:
-    """A converter that converts all channels by itself, paced by a clock from the board."""
+    """Timing of a converter that converts all channels by itself, paced by a clock from the board."""
 
     most_hz: int
-    """Highest frequency of that clock."""
+    """Highest frequency of the pacing clock."""
     least_level_ns: int
-    """Shortest high and low level of that clock."""
+    """Shortest level, high or low, of the pacing clock."""
     period: int
-    """Clock periods from one conversion to the next."""
+    """Periods of the pacing clock from one conversion to the next."""
     delay_halves: int
-    """Half periods from the middle of a conversion's average until it is ready."""
+    """Half periods of the pacing clock from the middle of a conversion's average until it is ready."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Converter(Choice):
-    """Pressure units in, readings out, in sweeps over all units.
+    """A converter that reads all units in sweeps.
 
-    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.units.ports.converter_ports`. ``golden`` is a
+    ``gateware``: a component with the ports of :func:`contactfpga_hdl.units.ports.converter_ports`; ``golden``: a
     :class:`contactfpga_sim.model.golden.units.ConverterRule`.
     """
 
@@ -36,20 +36,20 @@ class Converter(Choice):
     channels: int
     """Largest number of units."""
     limits: tuple[tuple[float, int], ...]
-    """(supply in V, highest SPI clock in Hz) of the data sheet, rising; the first is the lowest supply."""
+    """(supply in V, highest SPI clock in Hz) from the data sheet, rising; the first is the lowest supply."""
     most_v: float
-    """The highest supply."""
+    """Highest supply in V."""
     least_level_ns: int
-    """Shortest high and low level of the SPI clock."""
+    """Shortest level, high or low, of the SPI clock."""
     sweep_levels: int
-    """Levels (half periods) of the SPI clock in a sweep, for each unit."""
+    """Levels of the SPI clock (half periods) per unit in a sweep."""
     spacing_levels: int
     """Levels of the SPI clock between the samples of two units; 0 for simultaneous samples."""
     pace: ConverterPace | None = None
-    """None: it converts on request."""
+    """Pacing clock; None for a converter that converts on request."""
 
     def most_hz(self, supply_v: float) -> int:
-        """The highest SPI clock; between two supplies of the data sheet that of the lower one."""
+        """Highest SPI clock in Hz; between two supplies of the data sheet that of the lower one."""
         return max((hz for volts, hz in self.limits if volts <= supply_v), default=0)
 
 
@@ -91,9 +91,8 @@ CONVERTERS: dict[str, Converter] = {
         ),
     )
 }
-"""The built-in converters by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
+"""Built-in converters by name; a new one needs an entry, gateware and a golden rule (docs/extend.md)."""
 
 
 def find(value: object) -> Converter:
-    """The converter that a Skin's ``converter`` names or is. Raises SkinError."""
     return find_choice(Converter, CONVERTERS, value)

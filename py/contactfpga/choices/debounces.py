@@ -1,4 +1,4 @@
-"""Debounces: when a switch that reads differently changes its state. Methods and names as in QMK."""
+"""Debounces: conditions for a switch to change its state; methods and names as in QMK."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from contactfpga.choices.choice import find as find_choice
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Debounce(Choice):
-    """Rows in, rows out.
+    """A debounce of rows.
 
-    ``gateware`` counts scan periods, for evenly sampling scans; ``timed_gateware`` counts row times, for others.
-    ``golden`` is a :class:`contactfpga_sim.model.golden.debounce.DebounceRule`.
+    ``gateware`` counts scan periods, for even scans; ``timed_gateware`` counts row times, for others. ``golden``: a
+    :class:`contactfpga_sim.model.golden.debounce.DebounceRule`.
     """
 
     timed_gateware: str
@@ -22,7 +22,7 @@ class Debounce(Choice):
     """Whether a press counts only after ``debounce_press_us``."""
 
     def load_timed_gateware(self) -> Any:
-        """The gateware's class for unevenly sampling scans. Imports Amaranth."""
+        """The gateware's class for uneven scans. Imports Amaranth."""
         return load(self.timed_gateware)
 
 
@@ -59,9 +59,7 @@ DEBOUNCES: dict[str, Debounce] = {
         ),
     )
 }
-"""The built-in debounces by name."""
 
 
 def find(value: object) -> Debounce:
-    """The debounce that a Skin's ``debounce`` names or is. Raises SkinError."""
     return find_choice(Debounce, DEBOUNCES, value)

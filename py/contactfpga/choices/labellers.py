@@ -11,22 +11,22 @@ from contactfpga.choices.choice import find as find_choice
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Labeller(Choice):
-    """Rows in, zone records out.
+    """A labeller of rows that gives zone records.
 
-    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.payloads.labeller_ports`. ``golden`` is a
+    ``gateware``: a component with the ports of :func:`contactfpga_hdl.payloads.labeller_ports`; ``golden``: a
     :class:`contactfpga_sim.model.golden.zones.LabellerRule`.
     """
 
     exact: bool
-    """Whether zones are the connected components of the cells. Inexact labellers ignore the connectivity."""
+    """Whether zones are the connected components of cells. Inexact labellers ignore the connectivity."""
     end_clocks: Bound
     """The most clocks from a frame's last row to its end mark, which follows the last record."""
     row_clocks: Bound
-    """The most clocks from a row to the next one that can be taken."""
+    """The most clocks from a row until the labeller takes the next."""
     empty_row_clocks: Bound = lambda derived: 1
-    """The most clocks from an empty row below an empty row to the next one that can be taken."""
+    """The most clocks from an empty row below an empty row until the labeller takes the next."""
     closed: bool = False
-    """Whether it joins zones over the seam of a sheet whose ends meet."""
+    """Whether zones are joined over the seam of a sheet whose ends meet."""
 
 
 LabellerName = Literal["run", "serial", "projection", "single"]
@@ -75,9 +75,8 @@ LABELLERS: dict[str, Labeller] = {
         ),
     )
 }
-"""The built-in labellers by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
+"""Built-in labellers by name; a new one needs an entry, gateware and a golden rule (docs/extend.md)."""
 
 
 def find(value: object) -> Labeller:
-    """The labeller that a Skin's ``labeller`` names or is. Raises SkinError."""
     return find_choice(Labeller, LABELLERS, value)

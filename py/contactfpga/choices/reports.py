@@ -1,4 +1,4 @@
-"""Reports: the content of frames. Each is a kind of packet in docs/protocol.md, so the set is closed."""
+"""Reports: contents of frames; each has a packet kind in docs/protocol.md, so users cannot add one."""
 
 from __future__ import annotations
 
@@ -8,20 +8,15 @@ from typing import Literal
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Report:
-    """The content of a frame, and where it is computed."""
-
     name: str
-    """Name in a Skin."""
     title: str
-    """Its label in charts and tables."""
     kind: int
-    """Kind of its packets."""
     code: int
     """Code in a hello."""
     zones: bool
-    """Whether the board finds zones; otherwise a frame has the plain rows."""
+    """Whether the board finds zones; otherwise it sends a bitmap."""
     divided: bool
-    """Whether the board divides: zones have barycenters."""
+    """Whether the board divides, so that zones have barycenters."""
 
 
 ReportName = Literal["moments", "barycenter", "cells"]
@@ -34,4 +29,3 @@ REPORTS: dict[str, Report] = {
         Report(name="cells", title="cells", kind=6, code=1, zones=False, divided=False),
     )
 }
-"""All reports by name."""

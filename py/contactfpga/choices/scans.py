@@ -1,4 +1,4 @@
-"""Scans: the order of driven rows."""
+"""Scans: orders of driven rows."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from contactfpga.errors import SkinError
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Scan(Choice):
-    """Drives rows, samples columns.
+    """A scan that drives rows and samples columns.
 
-    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.scan.pins.scan_ports`, and one that is not
-    ``even`` also with those of :class:`contactfpga_hdl.scan.adaptive.AdaptiveScanner`. ``golden`` is a
+    ``gateware``: a component with the ports of :func:`contactfpga_hdl.scan.pins.scan_ports`; a scan that is not
+    ``even`` also has those of :class:`contactfpga_hdl.scan.adaptive.AdaptiveScanner`. ``golden``: a
     :class:`contactfpga_sim.model.golden.scan.ScanRule`.
     """
 
     even: bool
-    """Whether every row is sampled once per frame and frames take the same time. Otherwise times are counted in row
+    """Whether every row is sampled once per frame and all frames take the same time. Otherwise times are counted in row
     times, whose number each frame reports, or in us if the scan ``waits``."""
     reads_rows: bool
-    """Whether it releases the rows and reads them while columns are driven, by bidirectional pins."""
+    """Whether rows are released and read while columns are driven, by bidirectional pins."""
     waits: bool
-    """Whether it waits until the next stage takes a row, and until a frame is packed before it begins another, so that
-    no stage is too slow. With zones it passes on the driven rows, with their numbers."""
+    """Whether the scan waits until the next stage takes a row, and begins a frame only when the last is packed, so that
+    no stage is too slow. With zones it passes on only driven rows, with their numbers."""
     guards: bool = False
-    """Whether it checks the guard lines of a Skin with ``guard``, and has the port ``faults``."""
+    """Whether the scan checks the lines of a Skin with ``guard``, and has the port ``faults``."""
     moves_sample: bool = False
-    """Whether it obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
+    """Whether the scan obeys the command "sample at", by the ports of
+    :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
     check: Callable[[Any], None]
-    """Raises SkinError if the scan cannot serve a Skin; called before anything is derived from it."""
+    """Raises SkinError if the scan cannot serve a Skin; called before anything is derived from the Skin."""
     choice_clocks: Bound
     """Clocks from a strobe until the next rows are known; 0 if known beforehand."""
     max_frame_slots: Bound
-    """The most row times of a frame."""
     max_frame_clocks: Bound
-    """The most clocks of a frame, from its first sample to its last."""
+    """The most clocks of a frame, from first to last sample."""
     min_row_clocks: Bound
-    """The least clocks of a row time in which the later stages keep up, including the end mark; the scanner's tag is
-    kept only until the frame before it is packed."""
+    """The least clocks of a row time with which later stages keep up; the scanner keeps its tag until the frame before
+    is packed."""
 
 
 def _check_adaptive(skin: Any) -> None:
@@ -71,7 +71,7 @@ def _check_reversal(skin: Any) -> None:
 
 
 def _reversal_frame_clocks(derived: Any) -> int:
-    """Clocks when all rows are touched and wait for debounce, labeller and count, with the guard check."""
+    """Clocks of a frame with all rows touched, waiting for debounce, labeller and count, with the guard check."""
     handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones) + 16
     checked = max(derived.project_clocks, derived.row_clocks) + 1 if derived.skin.guard else 0
     clocks: int = derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed) + checked
@@ -85,8 +85,7 @@ def _raster_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_min_row_clocks(derived: Any) -> int:
-    """Clocks to pass on a slot's results before the next strobe, up to the end mark, and to pack a frame before the
-    next one ends."""
+    """Clocks to pass on a slot's rows before the next strobe, and to pack a frame before the next one ends."""
     rows = derived.skin.rows
     handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
     least: int = max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
@@ -94,7 +93,6 @@ def _adaptive_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_packing_clocks(derived: Any, pressed: int) -> int:
-    """Packing time while the next frame drives the same rows again."""
     skin = derived.skin
     if not derived.report.zones:
         items = skin.rows
@@ -160,9 +158,7 @@ SCANS: dict[str, Scan] = {
         ),
     )
 }
-"""The built-in scans by name."""
 
 
 def find(value: object) -> Scan:
-    """The scan that a Skin's ``scan`` names or is. Raises SkinError."""
     return find_choice(Scan, SCANS, value)

@@ -10,13 +10,13 @@ from contactfpga.design.circuit import Circuit, CircuitError, check, check_times
 from contactfpga.skin import Skin, SkinError
 
 _LONGER = (1, 2, 4, 8)
-"""Factors by which a row time is lengthened until the shift registers and the labeller keep up."""
+"""Factors by which a row time grows until the shift registers and the labeller keep up."""
 _SLOW_US = 100.0
 
 
 def findings(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str, str]:
-    """Problems with pins, clock, baud rate, levels and times, by subject; "" where there is none. Without a circuit the
-    last two are left out. Size and speed are only known after place and route."""
+    """Problems with pins, clock, baud rate, levels and times by subject, "" for none. Levels and times need a
+    circuit."""
     asked: dict[str, Callable[[], None]] = {
         "pins": lambda: board.check_pins(skin),
         "clock": lambda: board.check_clock(skin),
@@ -37,8 +37,8 @@ def _said(ask: Callable[[], None]) -> str:
 
 
 def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str, Any]:
-    """Changes of the Skin that make it fit its circuit and the board; none if they fit. Raises SkinError if shift
-    registers, the board's own clock and baud rate, and longer times do not suffice."""
+    """Changes that make a Skin fit its circuit and the board: shift registers, the board's clock and baud rate, longer
+    times. Raises SkinError if they do not suffice."""
     wrong = findings(board, skin, circuit)
     if wrong.get("levels"):
         raise SkinError(wrong["levels"])
@@ -68,7 +68,6 @@ def _wirings(skin: Skin) -> Iterator[dict[str, Any]]:
 
 
 def _times(skin: Skin, changes: dict[str, Any], circuit: Circuit | None, factor: int) -> dict[str, Any]:
-    """Longer times that the circuit needs, and a longer row."""
     found: dict[str, Any] = {"settle_us": skin.settle_us * factor} if factor > 1 else {}
     if circuit is not None:
         slow = skin.replace(**changes, settle_us=_SLOW_US)  # so that no row is too short to ask

@@ -16,18 +16,18 @@ from contactfpga.skin import Skin
 
 
 class KitError(ContactFPGAError, ValueError):
-    """A missing kit or wrong files; the message names the file and its allowed content."""
+    """A missing kit or wrong files."""
 
 
 @dataclasses.dataclass(frozen=True)
 class KitPart:
-    """An article to buy that is not on the sheet's own board."""
+    """An article to buy that is not on the sheet's board."""
 
     count: int
     what: str
     maker: str
     number: str
-    """The maker's number; "" if any part that fits the description will do."""
+    """The maker's number; "" if any part of this description will do."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Kit:
 
 
 def names() -> list[str]:
-    """The names of all kits, sorted."""
+    """Names of all kits, sorted."""
     return sorted(path.parent.name for path in (examples() / "kits").glob("*/kit.toml"))
 
 

@@ -1,7 +1,6 @@
 """Predictions of a kit that a builder can prove wrong: numbers with intervals, each with its command.
 
-They are in ``predictions.toml`` of the kit's folder. A changed prediction is a new entry below the old one, which
-stays.
+In ``predictions.toml`` a changed prediction is a new entry below the old one.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ class Prediction:
     low: float
     high: float
     model: str
-    """The model that it tests: gateware, bridge, circuit or cover."""
+    """Model under test: gateware, bridge, circuit or cover."""
     command: str
-    """The command that computes it."""
+    """Command that computes the value."""
     date: datetime.date
     commit: str
-    """Abbreviated hash of the commit whose code computed the value."""
+    """Abbreviated hash of the commit that computed the value."""
 
 
 def load(kit: Kit) -> dict[str, Prediction]:

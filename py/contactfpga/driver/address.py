@@ -1,5 +1,4 @@
-"""What a port's name asks for: a serial port, a virtual board, a recording, a board on the network, one of several
-sheets, a foreign sheet."""
+"""Port names, decoded."""
 
 from __future__ import annotations
 
@@ -17,13 +16,13 @@ from contactfpga.inputs.values import number_in
 from contactfpga.skin.several import MOST_SHEETS
 
 NAME, USB = "name:", "usb:"
-"""What the names begin with of boards that have to be searched (:mod:`contactfpga.driver.finding`)."""
+"""Prefixes of ports that have to be searched (:mod:`contactfpga.driver.finding`)."""
 SIM, REPLAY, NET, FLEXITAC = "sim:", "replay://", "zenoh://", "flexitac://"
-"""What the other addresses begin with."""
+"""Prefixes of the other addresses."""
 
 
 def searched(port: object) -> bool:
-    """Whether a port is one of those that have to be searched."""
+    """Whether a port has to be searched."""
     return port is None or (isinstance(port, str) and port.startswith((NAME, USB)))
 
 
@@ -41,16 +40,17 @@ class Sim:
     scene: str | None = None
     skin: str | None = None
     threshold: float | None = None
-    """Above which a recording's numbers count as pressed."""
+    """Number above which a cell of a recorded scene is pressed."""
     units: str | None = None
-    """File of the pressure units that the scene presses on."""
+    """File of pressure units, pressed by the scene."""
     sheets: str | None = None
-    """File of several sheets at one FPGA, in place of a Skin; the scene touches each of them."""
+    """File of several sheets on one FPGA, instead of a Skin; the scene touches each."""
 
     @classmethod
     def parse(cls, name: str) -> Sim:
-        """Read an address. ``%`` and two hex digits stand for a byte of UTF-8; all else but ``&`` stands for itself,
-        ``+`` and ``#`` too. Raises :class:`AddressError` that says what is wrong."""
+        """Decode an address. ``%`` and two hex digits stand for a byte of UTF-8; all other characters except ``&``
+        stand for themselves. Raises :class:`AddressError`.
+        """
         head, _, query = name.partition("?")
         if head not in ("sim://", "sim:"):
             raise AddressError(f"{name}: {_SIM_FORM}")
@@ -100,15 +100,15 @@ class Replay:
 
     path: Path
     pace: float | None = None
-    """How many times as fast as it was recorded; None: as fast as it is read."""
+    """Speed relative to real time; None: as fast as it is read."""
     start_s: float = 0.0
-    """Where an MCAP file starts to play: at the last hello before this many seconds from its beginning."""
+    """Time in s; an MCAP file plays from the last hello before it."""
     link: str | None = None
-    """Name of the link to play, of an MCAP file with several."""
+    """Link to play from an MCAP file with several."""
 
     @classmethod
     def parse(cls, name: str) -> Replay:
-        """Read an address; raises :class:`AddressError` that says what is wrong."""
+        """Decode an address; raises :class:`AddressError`."""
         path, *rest = _REPLAY_OPTIONS.split(name.removeprefix(REPLAY), maxsplit=1)
         found: dict[str, str] = {}
         for part in rest[0].split("&") if rest else ():
@@ -130,7 +130,7 @@ class Replay:
 
 
 _REPLAY_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
-"""Where they begin; a path may have other question marks."""
+"""Beginning of the options; the path may contain other question marks."""
 REPLAY_FORM = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
 
 
@@ -151,11 +151,11 @@ class Net:
     connect: str | None = None
     config: str | None = None
     wait_s: float = 0.5
-    """How long a publisher that is gone may take to come back before the port counts as lost."""
+    """Time in s after which a missing publisher counts as lost."""
 
     @classmethod
     def parse(cls, name: str) -> Net:
-        """Read an address; raises :class:`AddressError` that says what is wrong."""
+        """Decode an address; raises :class:`AddressError`."""
         head, _, query = name.removeprefix(NET).partition("?")
         found: dict[str, str] = {}
         for part in query.split("&") if query else ():
@@ -174,7 +174,7 @@ _NET_FORM = "it reads zenoh://KEY, with ?connect=ENDPOINT, &config=FILE and &wai
 
 
 def checked_key(key: str) -> str:
-    """A key that names one board; raises ValueError."""
+    """A key that names one board; raises ValueError for any other."""
     if not re.fullmatch(r"[\w.@:+-]+(/[\w.@:+-]+)*", key) or len(key) > 200:
         raise ValueError(f"key is {key!r}; it must be names of letters, digits and . _ - + : @ with / between them")
     return key
@@ -193,9 +193,9 @@ class Flexitac:
 
     device: str
     margin: int = 15
-    """By how much a pressed cell reads above its rest, of 255."""
+    """Excess over its rest from which a cell is pressed, of 255."""
     frames: int = 20
-    """How many frames the rest is taken from, at the beginning, while nothing touches the sheet."""
+    """Number of first frames, without touch, that determine the rest."""
     pitch_mm: float = 3.0
     rows: int = 16
     columns: int = 32
@@ -203,7 +203,7 @@ class Flexitac:
 
     @classmethod
     def parse(cls, name: str) -> Flexitac:
-        """Read an address; raises :class:`AddressError` that says what is wrong."""
+        """Decode an address; raises :class:`AddressError`."""
         device, _, query = name.removeprefix(FLEXITAC).partition("?")
         if not device:
             raise AddressError(f"{name}: it names no device; {_FLEXITAC_FORM}")
@@ -232,7 +232,7 @@ FLEXITAC_LIMITS: dict[str, tuple[float, float]] = {
     "columns": (1, 64),
     "baud": (9600, 12_000_000),
 }
-"""Least and most of each option."""
+"""Least and largest value of each option."""
 _FLEXITAC_FORM = "it reads flexitac://DEVICE, with " + ", ".join(f"{key}=" for key in FLEXITAC_LIMITS) + " where wanted"
 
 
@@ -245,7 +245,7 @@ class SheetOf:
 
     @classmethod
     def parse(cls, name: str) -> SheetOf | None:
-        """None where the name is of no sheet. Raises :class:`AddressError`."""
+        """Decode a name; None if it does not name one sheet. Raises :class:`AddressError`."""
         found = re.fullmatch(r"(.*)#(\d{1,4})", name)
         if found is None:
             return None
@@ -260,7 +260,7 @@ Address = Serial | Sim | Replay | Net | Flexitac | SheetOf
 
 
 def parse(name: str) -> Address:
-    """Read a port's name. Raises :class:`AddressError` that says what is wrong, for a file that is no port as well."""
+    """Decode a port's name. Raises :class:`AddressError`, also for an unsuitable file."""
     if (sheet := SheetOf.parse(name)) is not None:
         return sheet
     if name.startswith(SIM):
@@ -277,7 +277,7 @@ def parse(name: str) -> Address:
 
 
 def _no_port(name: str) -> str | None:
-    """What to say of a name that can be no serial port; None: it may be one."""
+    """Reason why a name cannot be a serial port, or None."""
     if not name:
         return "the port has no name; leave it out to take the board that is plugged in"
     scheme, colon, _ = name.partition("://")

@@ -23,7 +23,7 @@ from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 
 QUEUE = 16_384
-"""Frames that wait for :meth:`Board.next` at most."""
+"""Most frames that wait for :meth:`Board.next`."""
 
 
 class Board(BoardFacts):
@@ -34,10 +34,10 @@ class Board(BoardFacts):
     ...         if len(zones) == 2:
     ...             break
 
-    Made by :func:`open`. Safe for several threads. :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
-    thread that wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another
-    process; in a child of ``fork`` it is closed. After :meth:`close` every method raises :class:`BoardClosed`, even one
-    that was already waiting. In ``async with`` it is an :class:`AsyncBoard`.
+    Made by :func:`open`. Thread-safe. :meth:`read`, :meth:`next` and :meth:`latest` share one queue; a thread that
+    wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another process; a
+    child of ``fork`` sees it closed. After :meth:`close` every method raises :class:`BoardClosed`, even a waiting one.
+    In ``async with`` it is an :class:`AsyncBoard`.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Board(BoardFacts):
     # ---- frames
 
     def read(self, timeout: float = 1.0) -> Zones:
-        """Ask the board and return the first complete frame scanned after this call; :meth:`next` goes on after it.
+        """Request a frame and return the first complete one scanned after this call; :meth:`next` continues after it.
 
         ``timeout`` in seconds. A recording gives its next frame. Raises :class:`ReadTimeout`, :class:`PortLost`,
         :class:`SkinMismatch`, :class:`VersionMismatch`.
@@ -72,19 +72,19 @@ class Board(BoardFacts):
         return zones
 
     def next(self, timeout: float = 1.0) -> Zones:
-        """The next frame, in order. Raises as :meth:`read` does, and :class:`ReplayEnded`. With ``timeout=0`` a frame
-        that waits, or :class:`ReadTimeout` at once.
+        """The next frame, in order. With ``timeout=0`` only a waiting one. Raises the errors of :meth:`read`, and
+        :class:`ReplayEnded`.
 
-        At most 16,384 frames wait to be taken; beyond that, the oldest are dropped and counted in ``stats.dropped``.
+        At most 16,384 frames wait; beyond that, the oldest are dropped and counted in ``stats.dropped``.
         """
         return self._frames.next(timeout)
 
     def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
-        """The newest frame: the last of all that wait, or the next one if none waits. Older ones are dropped.
+        """The newest waiting frame, or the next one if none waits; older ones are dropped.
 
-        With ``max_age_s``, in seconds, it returns no frame that arrived longer ago, or that was scanned longer ago and
-        was held up on its way, as far as the clocks show. As soon as no such frame can come it raises :class:`NoData`.
-        A recording gives its next frame. ``timeout`` and errors as for :meth:`next`.
+        With ``max_age_s``, in seconds, it returns no frame that arrived earlier, or that was scanned earlier and
+        delayed, as far as the clocks show, and raises :class:`NoData` as soon as none can come. A recording gives its
+        next frame. ``timeout`` and other errors as for :meth:`next`.
         """
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
@@ -98,39 +98,39 @@ class Board(BoardFacts):
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds, as numpy arrays (:class:`Batch`).
 
-        It waits at most ``timeout`` seconds for the first one. Errors as for :meth:`next`.
+        It waits at most ``timeout`` seconds for the first frame. Errors as for :meth:`next`.
         """
         return self._frames.batch(max_s, timeout)
 
     # ---- commands
 
     def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
-        """Have the board do something: 1, test its lines; 2, see :meth:`sample_at`. Returns the first complete frame
-        scanned after the board took the command. If answers were lost, the board may have taken it twice.
+        """Send a command: 1, test the lines; 2, see :meth:`sample_at`. Returns the first complete frame scanned after
+        the board took it. The board may take it twice if answers are lost.
 
-        ``value`` belongs to the command, ``timeout`` is in seconds. Raises :class:`NoSuchCommand` if the board does not
-        take it, ValueError for numbers that no command has, and the errors of :meth:`read`.
+        ``value`` is its argument, ``timeout`` is in seconds. Raises :class:`NoSuchCommand` if the board does not take
+        it, ValueError for numbers out of range, and the errors of :meth:`read`.
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
 
     def sample_at(self, clocks: int = 0, timeout: float = 1.0) -> Zones:
-        """From the next frame on, sample the columns this many clocks of the board after a row is selected; 0 stands
-        for the settle time. This measures how long the sheet takes (``contactfpga wire --settle``). Returns the first
-        frame that was sampled so. Until you set it to 0 again, or the board restarts, slower cells do not read pressed.
+        """From the next frame on, sample the columns this many clocks of the board after a row is selected. This
+        measures the settle time that the sheet needs (``contactfpga wire --settle``). Returns the first frame sampled
+        in this way. Until the value is 0 again, or the board restarts, slower cells do not read pressed.
 
-        More than the settle time counts as the settle time. So does a value that is too early for the board: less than
-        2 clocks, or than columns on shift registers take. Raises the errors of :meth:`command`; boards with
-        ``report = "cells"`` and ``scan = "raster"`` or ``"reversal"`` take it.
+        0, larger values than the settle time, and values too early for the board (less than 2 clocks, or than shift
+        registers take) mean the settle time. Raises the errors of :meth:`command`; boards with ``report = "cells"`` and
+        ``scan = "raster"`` or ``"reversal"`` take it.
         """
         return self.command(SAMPLE_AT, clocks, timeout)
 
     def self_test(self, timeout: float = 2.0) -> SelfTest:
-        """Have the board drive each of its lines alone, and return what this shows (:class:`SelfTest`).
+        """Have the board drive each of its lines alone, between scans, and return the result (:class:`SelfTest`).
 
         Bridged diodes show only while their switch is pressed: repeat the test, and combine the results with
-        :func:`contactfpga.instruments.self_test.merged`. The scan goes on between the slots of the test. ``timeout`` in
-        seconds. Raises :class:`NoSuchCommand` if the board has no self-test, and the errors of :meth:`read`. Without
-        the board's Skin its mask is not known, so lines that do not rise cannot be distinguished from absent ones.
+        :func:`contactfpga.instruments.self_test.merged`. ``timeout`` in seconds. Raises :class:`NoSuchCommand` if the
+        board has no self-test, and the errors of :meth:`read`. If the Skin is unknown, so is its mask, and lines that
+        do not rise cannot be distinguished from absent ones.
         """
         slots = _run_self_test(self._link, checked(timeout))
         try:
@@ -141,16 +141,15 @@ class Board(BoardFacts):
         return SelfTest(slots, sheet.rows, sheet.columns, self.hello.guard, mask)
 
     def set_zero(self, unit: int, reading: int, timeout: float = 1.0) -> Zones:
-        """Tell the board what a pressure unit reads without load, in steps of its converter; as :meth:`command`."""
+        """Set the reading of an unloaded pressure unit, in steps of its converter; as :meth:`command`."""
         return self.command(*zero_value(self._unit_facts(), unit, reading), timeout=timeout)
 
     def set_threshold(self, unit: int, deviation: int, timeout: float = 1.0) -> Zones:
-        """Have a unit raise ``contact`` once it deviates this much from its zero, either way; 0: never. As
-        :meth:`command`."""
+        """Make a unit raise ``contact`` at this deviation from its zero, either way; 0: never. As :meth:`command`."""
         return self.command(*threshold_value(self._unit_facts(), unit, deviation), timeout=timeout)
 
     def set_sum_threshold(self, index: int, deviation: int, timeout: float = 1.0) -> Zones:
-        """The same for a weighted sum of deviations, by its place in the Skin's ``unit_sums``."""
+        """:meth:`set_threshold` for a weighted sum of deviations, by its place in the Skin's ``unit_sums``."""
         return self.command(*sum_threshold_value(self._unit_facts(), index, deviation), timeout=timeout)
 
     def _unit_facts(self) -> UnitFacts:
@@ -159,11 +158,11 @@ class Board(BoardFacts):
         return facts
 
     def __iter__(self) -> Iterator[Zones]:
-        """Every frame, forever; a recording ends."""
+        """Every frame, until a recording ends."""
         yield from self._frames
 
     async def __aiter__(self) -> AsyncIterator[Zones]:
-        """The same in ``async for``."""
+        """Every frame in ``async for``."""
         async for zones in self._frames:
             yield zones
 
@@ -184,7 +183,7 @@ class Board(BoardFacts):
         self.close()
 
     def greet(self, timeout: float) -> None:
-        """Wait for the hello without which no frame can be read; keep the frame that answers for :meth:`next`."""
+        """Wait for the hello; the frame that answers the request stays for :meth:`next`."""
         if self.live:
             self._frames.put_back(self.read(timeout))
             return
@@ -196,7 +195,7 @@ class Board(BoardFacts):
 
 
 class AsyncBoard(BoardFacts):
-    """A board in ``async with``: what waits is awaited, and other tasks go on meanwhile.
+    """A board in ``async with``, whose waiting methods are coroutines.
 
     >>> import asyncio
     >>> async def main():
@@ -205,34 +204,32 @@ class AsyncBoard(BoardFacts):
     >>> asyncio.run(main())
     2
 
-    Every frame comes in ``async for``. :func:`open` itself waits for the board's hello, at most its ``timeout``; where
-    no task may wait that long, open it by ``await asyncio.to_thread(contactfpga.open, port)``. :attr:`board` has the
-    commands, which wait.
+    :func:`open` itself blocks until the board's hello, at most for its ``timeout``; where no task may block that long,
+    use ``await asyncio.to_thread(contactfpga.open, port)``. Commands are methods of :attr:`board`.
     """
 
     def __init__(self, board: Board, link: Link, frames: Subscription, expected: Skin | None):
         super().__init__(link, frames, expected)
         self.board = board
-        """The board that this one wraps. Its methods block."""
+        """The wrapped board, whose methods block."""
 
     async def read(self, timeout: float = 1.0) -> Zones:
-        """Await the first frame that is scanned after the call; errors as of :meth:`Board.read`."""
+        """Await the first frame scanned after the call; errors as for :meth:`Board.read`."""
         return await _in_thread(self.board.read, timeout)
 
     async def next(self, timeout: float = 1.0) -> Zones:
-        """Await the next frame in order; errors as of :meth:`Board.next`. A task that is canceled takes no frame."""
+        """Await the next frame; errors as for :meth:`Board.next`. A canceled task takes no frame."""
         return await self._frames.awaited(timeout)
 
     async def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
-        """Await the newest frame; errors as of :meth:`Board.latest`."""
+        """Await the newest frame; errors as for :meth:`Board.latest`."""
         return await _in_thread(lambda timeout: self.board.latest(timeout, max_age_s=max_age_s), timeout)
 
     async def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
-        """Await all frames that have come, as arrays; errors as of :meth:`Board.batch`."""
+        """Await all frames that have come, as arrays; errors as for :meth:`Board.batch`."""
         return await _in_thread(lambda timeout: self.board.batch(max_s, timeout), timeout)
 
     async def __aiter__(self) -> AsyncIterator[Zones]:
-        """Every frame, forever; a recording ends."""
         async for zones in self._frames:
             yield zones
 
@@ -248,21 +245,19 @@ async def _in_thread(call: Callable[[float], Found], timeout: float) -> Found:
 
 @runtime_checkable
 class Opening(Protocol):
-    """A tap that wants to know whose bytes these are."""
+    """A tap that is told whose bytes it gets."""
 
     def opened(self, board: Board) -> None:
-        """Called before the first byte comes."""
+        """Called before the first byte."""
 
 
 ATTEMPT_S = 0.5
-"""After which a self-test of which slots were lost is asked for again; more where a slow line needs it."""
+"""Least time in s after which a self-test with lost slots is repeated."""
 SLOT_BITS = 5000
-"""On the wire from one slot to the next, at most: the slot, a frame and now and then a hello."""
+"""Most bits on the wire per slot: the slot, a frame, and sometimes a hello."""
 
 
 class _SlotListener:
-    """Waits for all slots of one test."""
-
     def __init__(self, link: Link, count: int, attempt_s: float):
         self.whole: tuple[SelfTestSlot, ...] | None = None
         self.attempt_s = attempt_s
@@ -271,7 +266,6 @@ class _SlotListener:
         self._queue = link.queue(QUEUE, all_events=True)
 
     def look(self) -> bool | None:
-        """Whether all have come."""
         while (item := self._queue.pop()) is not None:
             self._take(item)
         return True if self.whole is not None else None
@@ -288,7 +282,7 @@ class _SlotListener:
 
 
 def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
-    """All slots of a test that begins after this call. Raises :class:`ReadTimeout`, and as a command does."""
+    """All slots of a new test. Raises :class:`ReadTimeout`, and the errors of a command."""
     deadline = link.clock() + timeout
     while True:
         slots = _listen_for_slots(link)

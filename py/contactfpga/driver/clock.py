@@ -1,8 +1,4 @@
-"""When frames were scanned, on the board's clock and on the host's.
-
-:class:`Timeline` counts frames and finds their times since power-up, from the few bits that frames carry and from
-hellos. :class:`ClockFit` fits the board's clock to the host's, and :class:`HostClock` feeds it with what arrives.
-"""
+"""Scan times of frames, on the board's clock and on the host's."""
 
 from __future__ import annotations
 
@@ -24,24 +20,23 @@ _EPOCH_US = 1 << EPOCH_BITS
 _SEQUENCES = 1 << SEQUENCE_BITS
 
 MOST_US = _EPOCH_US
-"""Hellos come twice per second, so that a frame is no later than this after the hello or the frame before it."""
+"""Longest time before a frame without another frame or hello, which come twice per second."""
 MOST_S = 8.0
-"""Half the time in which a frame's time wraps: after a longer pause nobody knows how often it did."""
+"""Longest pause after which a frame's time is unambiguous: half the period of its time field."""
 SETTLED_S = 1.0
-"""This long after a pause in which nobody read, all that waited meanwhile has been read."""
+"""Time after a reading pause by which all waiting bytes have been read."""
 BEGUN_US = 1 << 21
-"""A board may have been restarted this long ago without a hello that arrived."""
+"""Longest time since a restart of which no hello has arrived."""
 
 
 class Timeline:
-    """Counts and times since the board's power-up.
+    """Frame counts and times since the board's power-up, from the few bits in frames, and from hellos.
 
-    A frame whose time cannot be explained is not passed on before the next hello, so that no time is wrong.
+    A frame of unknown time is dropped, and so are all others until the next hello.
     """
 
     def __init__(self, stats: Stats, live: bool):
         self.before: Frame | None = None
-        """The last frame since power-up that was explained."""
         self._stats = stats
         self._live = live
         self._greeted = self._known = self._forgot = False
@@ -56,17 +51,18 @@ class Timeline:
 
     @property
     def known(self) -> bool:
-        """Whether the next frame's time can be explained, as far as that is known by now."""
+        """Whether the next frame's time can be explained, as far as known."""
         return self._known
 
     def doubt(self, now: float) -> None:
-        """Nobody has read for long: what is read now may have waited, with a break before what comes next."""
+        """Note a reading pause: bytes read now may have waited, and later ones may be missing."""
         self._known = False
         self._doubted = now
 
     def take_hello(self, hello: Hello, now: float, fresh: bool) -> None:
-        """The board says how many frames it has sent, and roughly when this was. ``fresh``: it answers a request sent
-        since :meth:`doubt`."""
+        """Take the board's frame count and approximate time. ``fresh``: the hello answers a request since
+        :meth:`doubt`.
+        """
         if self._greeted:
             self._compare(hello)
         self._greeted = True
@@ -87,7 +83,7 @@ class Timeline:
         self._stats.lost += max(0, hello.sent - first - self._waiting)
 
     def take_frame(self, frame: Frame, widths: Widths, now: float) -> int | None:
-        """The frame's time since power-up in us; None where it cannot be explained."""
+        """The frame's time since power-up in us; None if it cannot be explained."""
         time_us = self._explain(frame, now)
         if time_us is None:
             self._known = False
@@ -105,13 +101,13 @@ class Timeline:
         return time_us
 
     def place(self, time_us: int) -> int | None:
-        """The time since power-up in us of these bits of it, which are of about now; None where that is not known."""
+        """The time since power-up in us from the low bits of a time close to now; None if unknown."""
         if not self._known or self._last_us < 0:
             return None
         return self._last_us + (time_us - self._last_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
 
     def expects(self, heard: int, time_us: int, now: float) -> bool:
-        """Whether a frame that carries these continues the one explained last."""
+        """Whether a frame with this request number and time continues the last explained frame."""
         if self.before is None or self._time_us is None or not self._known:
             return False
         soon = not self._live or now - self._now <= self._patience_s
@@ -119,17 +115,18 @@ class Timeline:
 
     @property
     def last(self) -> tuple[int, Frame, float] | None:
-        """Time of the last frame in us since power-up, the frame, and its arrival in s on the host's clock; None if no
-        frame can continue it."""
+        """The last frame with its time since power-up in us and its arrival in s on the host's clock; None if no frame
+        can continue it.
+        """
         if self.before is None or self._time_us is None or not self._known:
             return None
         return self._time_us, self.before, self._now
 
     def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
-        """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before;
-        the first one is expected, or the one before it was explained.
+        """Times since power-up in us of frames that continue one another (:func:`continues`) and the last explained
+        frame.
 
-        ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: the last one of them.
+        ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: their last frame.
         """
         assert self.before is not None
         assert self._time_us is not None
@@ -167,9 +164,9 @@ class Timeline:
 
 
 def continues(packets: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether each frame's time follows from the one before it, if that one's is known.
+    """(n,) bool: whether each frame's time follows from a known time of the one before.
 
-    ``packets``: of :data:`contactfpga.wire.many.FIELDS`, as they came one after the other.
+    ``packets``: consecutive ones, of :data:`contactfpga.wire.many.FIELDS`.
     """
     valid, heard, time_us = packets["valid"], packets["heard"], packets["time_us"]
     found = np.zeros(len(packets), np.bool_)
@@ -179,7 +176,7 @@ def continues(packets: np.ndarray) -> np.ndarray:
 
 
 def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
-    """From each value to the next, the first one from ``before``; ``modulus`` is a power of two."""
+    """Differences of successive values, from ``before`` on; ``modulus`` is a power of two."""
     steps = values.copy()
     steps[1:] -= values[:-1]
     steps[0] -= before
@@ -187,21 +184,21 @@ def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
 
 
 MOST_PPM, USUAL_PPM = 200.0, 50.0
-"""By how much the two clocks may differ at most, and usually do, in millionths."""
+"""Largest and usual difference of the clock rates."""
 WINDOW_S = 60.0
-"""Arrivals that are older do not count."""
+"""Age beyond which arrivals do not count."""
 PIECE_S = 0.25
-"""The window is cut into pieces of this length, of which the least delayed arrival counts."""
+"""Length of a piece of the window, in which only the least delayed arrival counts."""
 UNKNOWN_S = 0.02
-"""The least delay may be this long as long as no request was answered."""
+"""Assumed bound of the least delay until a request is answered."""
 STEP_S = 0.005
-"""What contradicts the bounds by more than this is a step of one of the clocks."""
+"""Contradiction of the bounds that indicates a step of a clock."""
 QUIET_S = 5.0
-"""After so long without an answered request one is supposed."""
+"""Time without an answered request after which the fit assumes one."""
 CAUTION = 1.25
-"""So much more is stated than these lines alone say, as clocks do not keep to a straight line."""
+"""Factor on the uncertainty, because clocks do not keep to straight lines."""
 MOST_ASKED, MOST_POINTS = 64, 512
-"""Answered requests, and least delayed arrivals, that count."""
+"""Most answered requests and most least-delayed arrivals that count."""
 
 _SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
 
@@ -209,16 +206,16 @@ _SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
 class _Point(NamedTuple):
     device_s: float
     excess_s: float
-    """By how much more the host's clock went on than the board's since the first frame, delays included."""
+    """Advance of the host's clock over the board's, delays included."""
 
 
 class ClockFit:
-    """A running fit of the board's clock to the host's, which knows that delays only add: device and host times in,
-    lines from one to the other out; times of one board since its power-up.
+    """A running fit of the board's clock to the host's since one power-up: device and host times in, lines between the
+    clocks out.
 
-    A frame arrives after it was sampled, never before: the least delayed arrivals, less what their bytes take on the
-    wire, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
-    which bounds it from below. The truth lies between the two, on a line whose slope is that of crystals.
+    Delays only add. A frame arrives after its sampling, so the least delayed arrivals, less the wire time of their
+    bytes, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
+    which bounds it from below. The true line lies between, with the slope of a crystal.
 
     Sums are formed in order and exponentials one by one, so that the same fit in C (c/clockfit.h) rounds alike.
     """
@@ -228,8 +225,7 @@ class ClockFit:
         self.forget()
 
     def forget(self) -> None:
-        """The board was restarted, or a clock stepped: what was measured says nothing of what comes, but for the least
-        delay, which is the way's."""
+        """Drop all measurements after a restart or a clock step, except the transport's least delay."""
         self._pieces: collections.deque[_Point] = collections.deque(maxlen=MOST_POINTS)
         self._piece = -math.inf  # number of the last one
         self._asked: collections.deque[_Point] = collections.deque(maxlen=MOST_ASKED)
@@ -239,7 +235,7 @@ class ClockFit:
         self._height_s = self._slope = self._variance = 0.0
 
     def arrived(self, time_us: int, arrived_s: float, wire_s: float) -> None:
-        """A frame of this device time came, whose bytes alone take ``wire_s``; of several at once, the last one."""
+        """Add the last frame of those that arrived together; ``wire_s`` is the wire time of its bytes."""
         if not self._pieces:
             self._base_us, self._base_s = time_us, arrived_s - wire_s
         point = self._point(time_us, arrived_s - wire_s)
@@ -263,7 +259,7 @@ class ClockFit:
             self._least_s = max(0.0, self._least_s - below_s)
 
     def answered(self, time_us: int, asked_s: float) -> None:
-        """The frame that :meth:`arrived` was called for last was sampled after that moment of the host's clock."""
+        """State that the last frame given to :meth:`arrived` was sampled after ``asked_s`` on the host's clock."""
         asked = self._point(time_us, asked_s)
         if asked.excess_s > self._bound(asked.device_s) + STEP_S:  # arrivals from before a step
             self._pieces.clear()
@@ -274,7 +270,7 @@ class ClockFit:
         self._way_s = self._least_s
 
     def _suppose(self) -> None:
-        """Where nobody has asked for long, that the least delay since then is at most twice what it was."""
+        """Without requests for long, assume that the least delay has at most doubled."""
         now_s = self._newest.device_s
         if now_s - (self._asked[-1].device_s if self._asked else 0.0) > QUIET_S:
             since = [point for point in self._pieces if point.device_s > now_s - QUIET_S]
@@ -286,12 +282,12 @@ class ClockFit:
         return _Point(device_s, host_s - self._base_s - device_s)
 
     def _bound(self, device_s: float) -> float:
-        """What the excess is at most then."""
         return self._height_s + self._slope * (device_s - self._fitted_s)
 
     def _fit(self) -> None:
-        """Every line between the bounds is as likely as any other, but for its slope: that of crystals, near that of
-        the least delayed arrivals. The mean of all lines is taken."""
+        """Take the mean of all lines between the bounds, weighted by how likely their slopes are for crystals and for
+        the least delayed arrivals.
+        """
         for points in (self._pieces, self._asked):
             while points and points[0].device_s < self._newest.device_s - WINDOW_S:
                 points.popleft()
@@ -313,9 +309,9 @@ class ClockFit:
         self._variance = _total(weights * ((middles - middle) ** 2 + gaps**2 / 12)) * CAUTION**2
 
     def _likely(self, widest: int, gap_s: float) -> np.ndarray:
-        """Of each slope, from arrivals alone, of which delays hide as much as they vary and as the bounds leave open:
-        where the times of frames and of the bus beat slowly, they go up and down for long. ``widest``: the slope that
-        leaves the widest gap between the bounds."""
+        """Likelihood of each slope from arrivals alone. They tell no more than their scatter and the bounds' gap allow,
+        because frame and bus times can beat slowly. ``widest``: index of the slope with the widest gap.
+        """
         device_s, excess_s = np.array(self._pieces).T
         heights = excess_s - _SLOPES[widest] * device_s
         hidden_s = max(gap_s, 0.0) / 4 + float(np.median(heights) - heights.min()) + 1e-6
@@ -326,8 +322,9 @@ class ClockFit:
     def arrived_in_turn(
         self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """:meth:`arrived` for each of many frames after the first one; before it, of :meth:`line` all but the first
-        field. Most arrivals say nothing new, and only those that do are taken one by one."""
+        """Call :meth:`arrived` for many frames after the first one; returns, before each of them, all fields of
+        :meth:`line` but the first. Frames that do not change the fit are handled together.
+        """
         count, at = len(times_us), 0
         base_us, (base_s, rate, sigma_s) = np.empty(count, np.int64), np.empty((3, count))
         while at < count:
@@ -353,11 +350,10 @@ class ClockFit:
 
     @property
     def begun(self) -> bool:
-        """Whether a frame has come."""
         return bool(self._pieces)
 
     def line(self, arrived_s: float) -> HostLine | None:
-        """For frames that arrived then; None before the first :meth:`arrived`."""
+        """The map for frames that arrive now; None before the first :meth:`arrived`."""
         if not self._pieces:
             return None
         now_s = self._newest.device_s
@@ -382,14 +378,14 @@ def _hides(point: _Point, earlier: _Point) -> bool:
 
 
 def _least(points: collections.deque[_Point] | list[_Point], now_s: float, sign: int = 1) -> np.ndarray:
-    """By slope (times ``sign``), the height now of the highest line below the points."""
+    """For each slope (times ``sign``), height now of the highest line below the points."""
     device_s, excess_s = np.array(points).T
     least: np.ndarray = (excess_s - sign * _SLOPES[:, None] * (device_s - now_s)).min(axis=1)
     return least
 
 
 def _middle_slope(points: list[_Point]) -> float:
-    """Of the lower convex hull's edge over the middle of the time that the points span; they are in order of time."""
+    """Slope of the lower convex hull over the middle of the time span; points are in order of time."""
     hull: list[_Point] = []
     for point in points:
         while len(hull) > 1 and _turns_down(hull[-2], hull[-1], point):
@@ -408,22 +404,22 @@ def _turns_down(first: _Point, second: _Point, third: _Point) -> bool:
 
 
 class HostClock:
-    """A fit of clocks for one conversation; a recording has none."""
+    """The clock fit of one conversation; a recording has none."""
 
     def __init__(self, fit: ClockFit | None):
         self.byte_s = 0.0
-        """What a byte takes on the wire."""
         self.fit = fit
         self._line: HostLine | None = None  # for the frames that come now
         self._latest: tuple[int, int] | None = None  # time and bytes of the last of them
 
     def begin(self, now: float) -> None:
-        """Packets came."""
+        """Begin to take the packets that arrived together now."""
         self._line = None if self.fit is None else self.fit.line(now)
 
     def take(self, time_us: int, size: int, now: float, asked_s: float | None) -> HostLine | None:
-        """A frame of so many bytes is among them, or the last of a run; ``asked_s``: the request was sent then that it
-        answers first."""
+        """Take a frame of ``size`` bytes, or the last one of a run. ``asked_s``: time of the request that it answers
+        first.
+        """
         if self.fit is None:
             return None
         self._latest = time_us, size
@@ -437,9 +433,10 @@ class HostClock:
     def take_reads(
         self, times_us: np.ndarray, sizes: np.ndarray, arrived_s: np.ndarray, counts: np.ndarray
     ) -> HostLines | None:
-        """The host's lines of reads in turn, none of which answers a request; None in a recording. ``arrived_s`` and
-        ``counts``: time and number of frames of each read; ``times_us`` and ``sizes``: time and bytes of its last
-        frame. An arrival came before (:attr:`begun`)."""
+        """The host's lines of successive reads that answer no request, after :attr:`begun`; None in a recording.
+        ``arrived_s`` and ``counts``: arrival and number of frames of each read; ``times_us`` and ``sizes``: time and
+        bytes of its last frame.
+        """
         if self.fit is None:
             return None
         lines = self.fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
@@ -447,18 +444,16 @@ class HostClock:
 
     @property
     def begun(self) -> bool:
-        """Whether :meth:`take_reads` may be called."""
         return self.fit is None or self.fit.begun
 
     def end(self, now: float) -> None:
-        """These were all."""
+        """End the packets that arrived together."""
         if self.fit is not None and self._latest is not None:
             time_us, size = self._latest
             self.fit.arrived(time_us, now, size * self.byte_s)
         self._latest = None
 
     def forget(self) -> None:
-        """The board was restarted, or is another one."""
         self._line = self._latest = None
         if self.fit is not None:
             self.fit.forget()

@@ -1,7 +1,7 @@
-"""What is said between host and board, without input or output: bytes and the clock in, events out.
+"""The protocol between host and board without input or output: bytes and the time in, events out.
 
-Freshness, losses, restarts, hellos and times are decided here and in the two parts
-:mod:`contactfpga.driver.requests` and :mod:`contactfpga.driver.clock`, and nowhere else.
+Only this module, :mod:`contactfpga.driver.requests` and :mod:`contactfpga.driver.clock` decide on freshness, losses,
+restarts, hellos and times.
 """
 
 from __future__ import annotations
@@ -39,49 +39,44 @@ _FRAME_KINDS = set(protocol.KINDS.values())
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Arrival:
-    """A frame that came."""
+    """A received frame."""
 
     zones: Zones
     answers: int
-    """Every :meth:`Conversation.ask` whose ticket is not above this one came before the frame was scanned."""
+    """Highest ticket of :meth:`Conversation.ask` that was issued before the frame was scanned."""
 
 
 class Steady(NamedTuple):
-    """What frames mean as long as each continues the last one: then they change nothing but counters and clocks."""
+    """The meaning of frames while they change only counters and clocks, because each continues the last one."""
 
     time_us: int
-    """Time of the last frame in us since power-up."""
+    """Time of :attr:`before` since power-up."""
     before: Frame
     """The last frame."""
     came_s: float
-    """Arrival of the last frame, in s on the host's clock."""
+    """Arrival of :attr:`before`, on the host's clock."""
     fit: ClockFit
-    """Fit of the clocks after the last frame."""
     byte_s: float
-    """Time of a byte on the wire, in s."""
     sheet: Sheet
     faults: tuple[str, ...]
-    """Names of the faults that a flagged frame has."""
     history: UnitHistory | None
 
     def zones(self, frame: Frame, time_us: int, before: Frame, line: HostLine) -> Zones:
-        """Zones of a frame that continues the last one, perhaps with others between; no counter changes. ``before`` is
-        the frame before it."""
+        """Zones of a frame, without counting it; ``before`` is the frame just before it."""
         return Zones(frame, self.sheet, time_us, before, line, self.faults, self.history)
 
 
 Event = Arrival | Hello | Faults | SelfTestSlot | UnitSamples | SkinMismatch | VersionMismatch
 
 FEW, FEW_IN_RUN = 16, 8
-"""Fewer packets are decoded, and fewer frames taken, faster one by one."""
+"""Least number of packets, and of frames, whose joint processing is faster."""
 
 
 class Conversation:
-    """One port's side of it.
+    """The host's side of the protocol on one port.
 
-    ``port``: its name, for messages. ``expected``: the Skin the board must be built from; None: any. ``live``: a board
-    is at the other end; else the bytes are a recording, and their times are no arrival times. ``fit`` makes the fit of
-    its clocks.
+    ``port``: its name, for messages. ``expected``: the Skin from which the board must be built; None: any. ``live``: a
+    board is at the other end, not a recording, which has no arrival times. ``fit`` makes the fit of its clocks.
     """
 
     def __init__(
@@ -95,15 +90,12 @@ class Conversation:
         self.port = port
         self.stats = Stats()
         self.hello: Hello | None = None
-        """The last hello."""
         self.sheet: Sheet | None = None
-        """What frames are read with; None until a hello has come, or where it is of another Skin than expected."""
+        """Sheet by which frames are read; None before a hello of the expected Skin."""
         self.numbers: set[int] = set()
-        """Of sheets that packets said while no hello had come."""
+        """Sheet numbers in packets before the first hello."""
         self.lines = Lines(expected.mask if expected is not None else ())
-        """What the board says of its lines."""
         self.units = UnitLine(self.stats)
-        """What the board says of its pressure units."""
         self._expected = expected
         self._live = live
         self._requests = Requests(rng)
@@ -111,7 +103,7 @@ class Conversation:
         self._clock = HostClock(fit() if live else None)
         self._reader = protocol.HelloReader()
         self.frame_format: tuple[Widths, bytes] | None = None
-        """What frames are decoded with, and what their check begins with; None where they come only one by one."""
+        """Widths of frames, and first bytes of their check; None if frames have to be decoded singly."""
         self._widths: Widths | None = None
         self._rest = b""
         self._noticed = math.inf
@@ -120,42 +112,43 @@ class Conversation:
         self._damage = False
 
     def ask(self, now: float, until: float) -> int:
-        """A ticket for a frame that is scanned after ``now``; :attr:`Arrival.answers` tells when it has come.
+        """Request a frame scanned after ``now``; returns the ticket that :attr:`Arrival.answers` reaches.
 
-        Until the time ``until`` the request is sent again where it seems lost. :meth:`data_to_send` has what to send.
+        Until ``until`` a request that seems lost is sent again.
         """
         self._notice(now)
         return self._requests.ask(now, until, hello=not self._timeline.known)
 
     def command(self, command: Command, now: float, until: float) -> int:
-        """A ticket likewise for a frame that is scanned after the board took this command; one at a time."""
+        """Send a command, one at a time; returns a ticket for a frame scanned after the board took it."""
         self._notice(now)
         return self._requests.command(command, now, until)
 
     def end_command(self) -> None:
-        """Do not send the command again."""
         self._requests.end_command()
 
     def doubt(self, now: float) -> None:
-        """What is received from now on may be of much later than what came before, or may have waited for long."""
+        """Note a reading pause: bytes received from now on may have waited, or may be much later."""
         self._timeline.doubt(now)
         self._doubted = now
 
     def data_to_send(self) -> bytes:
-        """What has to be sent to the board now; look after each :meth:`ask` and each :meth:`receive`."""
+        """Bytes to send to the board now; call it after other methods."""
         return self._requests.data_to_send()
 
     def receive(self, data: bytes, now: float) -> list[Event]:
-        """What ``data`` completes, in order. ``now`` is the time of its arrival in seconds; call it every now and then
-        also when nothing came, as then a request may have to be sent again."""
+        """The events that ``data`` completes, in order. ``now`` is the arrival in seconds. Call it regularly even
+        without data, because a request may have to be sent again.
+        """
         packets = self._split(data, now)
         events = [event for packet in packets if (event := self._packet(packet, now)) is not None]
         self._end(now)
         return events
 
     def receive_runs(self, data: bytes, now: float, decoded: many.PacketTable | None = None) -> list[Event | Run]:
-        """Events of received bytes as :meth:`receive`, with most of many frames in runs: frames that answer no further
-        request. ``decoded``: all packets that ``data`` completes, by the sheet and check of the last hello."""
+        """Events as of :meth:`receive`, but successive frames that answer no further request come as runs. ``decoded``:
+        all packets that ``data`` completes, by the last hello.
+        """
         packets = self._split(data, now)
         if decoded is not None and len(decoded.packets) != len(packets):
             decoded = None
@@ -169,8 +162,9 @@ class Conversation:
         return events
 
     def receive_reads(self, reads: Reads) -> Iterator[tuple[float, list[Event | Run]]]:
-        """Events of many reads in turn, each with the time at which its bytes came, in s. Reads that bring only frames
-        which continue one another give one run."""
+        """Events of successive reads, each with its arrival in s. Reads of frames that continue one another give one
+        run.
+        """
         table = reads.decoded
         ends = None if table is None or len(table.packets) < FEW_IN_RUN else _ends(continues(table.packets))
         at = 0
@@ -189,12 +183,12 @@ class Conversation:
             at += 1
 
     def skip(self, missing: int, rest: bytes) -> None:
-        """Count ``missing`` bytes that were overwritten; ``rest`` is the packet that the next read completes."""
+        """Count ``missing`` overwritten bytes; ``rest`` begins the next packet."""
         self._rest = rest
         self.stats.bytes += missing
 
     def steady(self) -> Steady | None:
-        """None where a frame that continues the last one might change anything else than counters and clocks."""
+        """The current steady state; None if a continuing frame might change more."""
         last, fit = self._timeline.last, self._clock.fit
         if last is None or fit is None or not fit.begun or self.lines.fading or self.frame_format is None:
             return None
@@ -203,7 +197,7 @@ class Conversation:
         return Steady(*last, fit, self._clock.byte_s, self._widths.sheet, names, self.units.history)
 
     def pass_time(self, now: float, paused: bool) -> None:
-        """Nothing came until now. Who reads sees to it that nobody ``paused`` for long, as :meth:`doubt` wants."""
+        """Note that nothing came until now. ``paused``: the reader was away too long, see :meth:`doubt`."""
         if paused:
             self.doubt(now)
         self._noticed = now
@@ -218,8 +212,9 @@ class Conversation:
         return [packet for packet in packets if packet]
 
     def _steady(self, reads: Reads, at: int, ends: list[int]) -> int:
-        """Up to which read there are only frames of which each continues the one before, in the last one at least one,
-        and many enough; ``at`` where there are not."""
+        """The read up to which frames continue one another; ``at`` unless they are many enough, with one in the last
+        read.
+        """
         first = reads.packets_before(at)
         end = reads.last_within(at, ends[first + 1] if first + 1 < len(ends) else first)
         if end == at or reads.packets_before(end) - first < FEW_IN_RUN or self.frame_format != reads.frame_format:
@@ -269,10 +264,9 @@ class Conversation:
     def _take_some(
         self, packets: list[bytes], now: float, events: list[Event | Run], decoded: many.PacketTable | None
     ) -> int:
-        """Take packets until the sheet changes, at least one; how many.
+        """Take at least one packet, up to a change of the sheet; returns their number.
 
-        A frame is decoded by itself where it is not known to continue the one before, and so decides what the next
-        ones mean.
+        A frame that may not continue the one before is decoded alone, because it decides how to read the next ones.
         """
         before, widths = self._before(), self._widths
         table, ends, follows = None, [0], False
@@ -296,8 +290,9 @@ class Conversation:
         return at
 
     def _stretches(self, packets: np.ndarray, now: float) -> tuple[list[int], bool]:
-        """For each place, and the one after the last, where the stretch ends in which each frame continues the one
-        before, and whether the first one is expected."""
+        """For each place, and the one after the last, the end of the frames that continue one another; and whether the
+        first is expected.
+        """
         found = continues(packets)
         _, time_us, _, heard, *_ = packets[0].item()
         expected = bool(packets["valid"][0]) and self._timeline.expects(heard, time_us, now)
@@ -317,7 +312,7 @@ class Conversation:
         return Run(widths.sheet, packets, starts, table.records, times_us, line, before, faults, self.units.history)
 
     def _heard(self, heard: int, time_us: int, packet_bytes: int, now: float) -> HostLine | None:
-        """A frame whose time is known carries these bits of a request's number: news of requests and clocks."""
+        """Take the request number of a frame with a known time."""
         answered = self._requests.answered
         self._requests.take_frame(heard, now)
         asked_s = self._requests.answered_sent_s if self._requests.answered > answered else None
@@ -340,7 +335,6 @@ class Conversation:
         return event
 
     def _decoded(self, decoded: many.PacketTable, index: int, packet_bytes: int, now: float) -> Event | None:
-        """:meth:`_packet` of one that is a whole frame."""
         assert self._widths is not None
         start, end = decoded.starts[index], decoded.starts[index + 1]
         frame = frame_of(decoded.packets[index].item(), decoded.records[start:end], self._widths.sheet)
@@ -349,7 +343,6 @@ class Conversation:
         return event
 
     def _passed(self) -> None:
-        """A valid packet came."""
         self._begun = True
         if self._damage:
             self._damage = False
@@ -463,7 +456,7 @@ class Conversation:
 
 
 def _ends(found: np.ndarray) -> list[int]:
-    """For each place, and the one after the last, the first one from there on that was not found."""
+    """For each place, and the one after the last, the next place that was not found."""
     places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
     ends: list[int] = np.minimum.accumulate(places[::-1])[::-1].tolist()
     return ends

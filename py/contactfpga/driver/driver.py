@@ -24,7 +24,6 @@ from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
 READERS = ("native", "thread")
-"""What may read a port."""
 
 
 def open(
@@ -44,23 +43,23 @@ def open(
     >>> len(zones)
     2
 
-    ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB
-    serial number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, else as
-    fast as it is read), ``flexitac://DEVICE`` for a foreign sheet, a virtual board
+    ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB serial
+    number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast
+    as it is read), ``flexitac://DEVICE`` for a foreign sheet, a virtual board
     (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed with the board), or None for the one
-    supported board that is plugged in; with ``skin``, for the one with that Skin, and if there are several, for the one
-    with its name.
-    ``skin``: the Skin (or its file) that the board must be built from; None accepts any board. ``baud``: bits per
-    second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
-    ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
-    ``timeout`` in seconds, for the hello. ``trust``: files of Skins may name modules, which are imported and so run
-    (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`. ``reader``: ``"native"`` reads
-    a serial port in a thread in C, which never waits for Python; ``"thread"`` reads any port in a thread in Python; by
-    default the first of them that can, and for a Tap, which gets bytes as they come, ``"thread"`` (docs/use.md).
+    supported board that is plugged in; with ``skin``, for the one with that Skin, or among several for the one with its
+    name.
+
+    ``skin``: the Skin (or its file) from which the board must be built; None accepts any board. ``baud``: bits per
+    second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file for every received byte, to be read
+    by ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`. ``timeout`` in seconds, for the hello. ``trust``:
+    allow Skin files to name modules, which are imported and so run (:meth:`Skin.load`). ``reader``: ``"native"`` reads
+    a serial port in a thread in C, which never waits for Python; ``"thread"`` reads any port in a thread in Python; the
+    default is the first that can, and ``"thread"`` for a Tap, which gets bytes as they come (docs/use.md).
 
     Raises :class:`AddressError`, :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`,
     :class:`OnlyNoise`, :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`; :class:`SkinError` for a
-    Skin that cannot work, and OSError, such as FileNotFoundError, for its file.
+    Skin that cannot work, and OSError for an unreadable file.
     """
     timeout = checked(timeout)
     if reader is not None and reader not in READERS:
@@ -124,19 +123,19 @@ def _opened(
 
 
 _boards: dict[str | None, Board] = {}
-"""What :func:`read_zones` keeps open."""
+"""Boards that :func:`read_zones` keeps open, by port."""
 _lock = threading.RLock()
 
 
 def read_zones(port: str | None = None, timeout: float = 1.0) -> Zones:
-    """Ask a board for its contact zones: the first complete frame scanned after this call.
+    """Read the contact zones of a board: the first complete frame scanned after this call.
 
     >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
     >>> zones[0].area_mm2
     400.0
 
-    ``port`` as for :func:`open`; it stays open until :func:`open` asks for it. ``timeout`` in seconds. Past it raises
-    :class:`ReadTimeout`, which is a :class:`TimeoutError`; see :func:`open` for the others.
+    ``port`` and errors as for :func:`open`. The port stays open until :func:`open` asks for it. ``timeout`` in seconds,
+    after which it raises :class:`ReadTimeout`, a :class:`TimeoutError`.
     """
     timeout = checked(timeout)
     with _lock:
@@ -167,7 +166,7 @@ def _forget(port: str | None, board: Board | None = None) -> None:
 
 
 def _given_back() -> bool:
-    """Close what :func:`read_zones` keeps open, which nobody else can; False where that is nothing."""
+    """Close the boards that :func:`read_zones` keeps open; False if there are none."""
     kept = list(_boards.items())
     for port, board in kept:
         _forget(port, board)

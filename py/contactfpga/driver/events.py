@@ -1,4 +1,4 @@
-"""What comes from a board besides frames: faults of its lines, sweeps of its pressure units, and silence."""
+"""Events besides frames: faults of the lines, sweeps of the pressure units, and silence."""
 
 from __future__ import annotations
 
@@ -20,34 +20,32 @@ SideEvent = Faults | SelfTestSlot | UnitSamples
 
 
 class Lines:
-    """The last report of a board, and the names of its faults while frames are flagged.
+    """The last fault report of a board, and the names of its faults while frames are flagged.
 
-    A report that the faults are gone overtakes the last frames in which they were. So their names hold until a frame
-    is not flagged, or another report comes.
+    A report that faults are gone overtakes the last flagged frames, so the names hold until an unflagged frame or
+    another report.
     """
 
     def __init__(self, mask: Iterable[tuple[int, int]] = ()):
         self.told: Faults | None = None
-        """The last report; None: none came since the board was powered up or another Skin loaded, or it sends none."""
+        """The last report; None: none since power-up or a change of the Skin."""
         self.fading = False
-        """The next frame that is not flagged changes the names."""
+        """Whether the next unflagged frame clears the names."""
         self._mask = tuple(mask)
         self._unnamed: tuple[str, ...] = (STUCK,)
         self._names: tuple[str, ...] = self._unnamed
 
     def forget(self) -> None:
-        """The board was restarted, or is another one."""
         self.told, self.fading, self._names = None, False, self._unnamed
 
     def take_hello(self, hello: Hello) -> None:
-        """What the board can tell."""
         unnamed = UNNAMED if hello.guard or (hello.self_test and self.told is None) else STUCK
         if self._names == self._unnamed:
             self._names = (unnamed,)
         self._unnamed = (unnamed,)
 
     def take_report(self, plain: bytes, hello: Hello) -> Faults | None:
-        """An unsealed report; returns it if it says something else than the one before. Raises :class:`PacketError`."""
+        """Decode an unsealed report; returns it if it is new. Raises :class:`PacketError`."""
         sheet = hello.sheet
         found = decode_faults(plain, sheet.rows, sheet.columns, hello.guard, hello.self_test)
         found = found.named(sheet.rows, sheet.columns, self._mask)
@@ -68,7 +66,7 @@ class Lines:
 
 
 class UnitLine:
-    """The sweeps of a board since it was powered up or another Skin loaded."""
+    """The sweeps of a board since power-up or a change of the Skin."""
 
     def __init__(self, stats: Stats):
         self.history: UnitHistory | None = None
@@ -77,18 +75,16 @@ class UnitLine:
         self._sequence: int | None = None  # of the last sweep
 
     def forget(self) -> None:
-        """The board was restarted, or is another one."""
         self.history = self._sequence = None
 
     def take_hello(self, hello: Hello) -> None:
-        """What the board has."""
         if hello.units is None:
             self.forget()
         elif self.history is None or self.history.facts != hello.units:
             self.history = UnitHistory(hello.units, hello.clock_hz)
 
     def take(self, plain: bytes, timeline: Timeline) -> UnitSamples | None:
-        """An unsealed packet; None where its time is not known. Raises :class:`PacketError`."""
+        """Decode an unsealed sweep; None if its time is unknown. Raises :class:`PacketError`."""
         if self.history is None:
             return None
         sweep = decode_sweep(plain, self.history.facts)
@@ -104,12 +100,12 @@ class UnitLine:
 
 
 BETWEEN_BYTES = 160
-"""What may go out between two frames: a hello and a report of faults."""
+"""Most bytes between two frames: a hello and a fault report."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Silence:
-    """No frame came for longer than allowed. This says nothing about the sheet, which may be touched.
+    """No frame arrived for longer than allowed. The sheet may be touched all the same.
 
     >>> with contactfpga.open("sim://") as board:
     ...     board.silence.seconds < 1
@@ -118,11 +114,11 @@ class Silence:
 
     port: str
     seconds: float
-    """How long no frame came."""
+    """Duration without a frame."""
     bytes: int
-    """Bytes that came in this time without making a frame."""
+    """Bytes received in this time, none of which completed a frame."""
     last: Zones | None
-    """The frame that came last; None if none has come yet."""
+    """The last frame; None: none yet."""
 
     def __str__(self) -> str:
         if self.last is None:
@@ -134,8 +130,9 @@ class Silence:
 
 
 def longest_pause_s(hello: Hello | Skin, skin: Skin | None) -> float:
-    """The longest time from a frame's last byte to the next one's, of a board that works: a keep-alive or a scan, and
-    a frame on the wire. Of a board whose Skin is not known its scan counts nothing, and its keep-alive the most."""
+    """The longest time in s between the last bytes of successive frames of a working board: a keep-alive or a scan, and
+    a frame. For an unknown Skin, no scan and the longest keep-alive are assumed.
+    """
     wire_s = (Widths(hello.sheet).max_frame_bytes + BETWEEN_BYTES) * 10 / hello.baud
     if hello.send == "on_change":
         return (limits.MAX_KEEP_ALIVE_MS if skin is None else skin.keep_alive_ms) / 1000 + wire_s
@@ -143,7 +140,7 @@ def longest_pause_s(hello: Hello | Skin, skin: Skin | None) -> float:
 
 
 def checked_deadline(name: str, deadline_s: float, hello: Hello, skin: Skin | None) -> float:
-    """A deadline in seconds; raises ValueError unless a board that works can meet it."""
+    """A deadline in seconds; raises ValueError unless a working board can meet it."""
     if not is_finite(deadline_s) or deadline_s <= 0:
         raise ValueError(f"{name} is {shown(deadline_s)}; it must be a positive number of seconds")
     least = longest_pause_s(hello, skin)

@@ -1,4 +1,4 @@
-"""What is known of a board, however its frames are waited for."""
+"""Facts about a board, common to blocking and asynchronous boards."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from contactfpga.zones.units import UnitHistory
 
 
 class BoardFacts:
-    """An open port, what its board said about itself, and queues of its frames."""
+    """An open port, the board's description of itself, and queues of its frames."""
 
     def __init__(self, link: Link, frames: Subscription, expected: Skin | None):
         self._link, self._frames, self._expected = link, frames, expected
@@ -31,7 +31,7 @@ class BoardFacts:
         return f"<Board {self.port}: {sheet.rows}x{sheet.columns} cells>"
 
     def __reduce__(self) -> NoReturn:
-        """Not even a copy: the end of one would close the port of the other."""
+        """Refuse copies: closing one would close the port of the original."""
         raise TypeError(f"{self.port}: an open board cannot be copied or sent to another process; open its port there")
 
     @property
@@ -41,12 +41,12 @@ class BoardFacts:
 
     @property
     def live(self) -> bool:
-        """Whether a board that answers requests is at the other end; False for a recording."""
+        """Whether a board that answers requests is at the other end, not a recording."""
         return self._link.transport.live
 
     @property
     def hello(self) -> Hello:
-        """What the board last said about itself, which it does twice per second."""
+        """The board's last description of itself, sent twice per second."""
         self._link.check_open()
         if self._link.conversation.hello is None:
             raise ContactFPGAError(f"{self.port}: no hello has come yet")
@@ -64,7 +64,7 @@ class BoardFacts:
 
     @property
     def fingerprint(self) -> bytes:
-        """Fingerprint of the Skin the board was built from."""
+        """Fingerprint of the Skin from which the board was built."""
         return self.hello.fingerprint
 
     @property
@@ -79,8 +79,7 @@ class BoardFacts:
 
     @property
     def skin(self) -> Skin:
-        """The board's whole Skin: the one given to :func:`open`, or the reference Skin if the board has its
-        fingerprint.
+        """The board's whole Skin: the one given to :func:`open`, or the reference Skin by its fingerprint.
 
         Raises :class:`ContactFPGAError` for any other board, whose hello describes only the :attr:`sheet`.
         """
@@ -95,21 +94,21 @@ class BoardFacts:
 
     @property
     def faults(self) -> Faults | None:
-        """Faults of its lines, as the board last reported them. It does so within 1 ms of a change and after each
-        hello, even when it sends no frame. None if it reported none yet, or its Skin has neither ``guard`` nor
-        ``self_test``."""
+        """Faults of the lines, reported by the board within 1 ms of a change and after each hello, even without a
+        frame. None before the first report, or if the Skin has neither ``guard`` nor ``self_test``.
+        """
         self._link.check_open()
         return self._link.conversation.lines.told
 
     @property
     def unit_history(self) -> UnitHistory | None:
-        """The last readings of its pressure units, which are in :attr:`Zones.units`, too; None if it has no units."""
+        """The last readings of the pressure units; None if the board has none."""
         self._link.check_open()
         return self._link.conversation.units.history
 
     @property
     def silence(self) -> Silence:
-        """How long no frame has come, since the last frame or since the port was opened, and which frame came last."""
+        """Time without a frame, since the last frame or since the port was opened, and the last frame."""
         self._link.check_open()
         with self._link.changed:
             return self._link.silence(-math.inf)
@@ -123,7 +122,7 @@ class BoardFacts:
         return stats
 
     def clock(self) -> float:
-        """Seconds on the clock that timeouts use: ``time.monotonic``, or simulated time for ``sim://``."""
+        """Seconds on the clock of timeouts: ``time.monotonic``, or simulated time for ``sim://``."""
         return self._link.clock()
 
     # ---- queues
@@ -131,17 +130,18 @@ class BoardFacts:
     def subscribe(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Subscription:
         """A separate queue for every frame from now on; see :class:`Subscription`.
 
-        With ``deadline_s`` it raises :class:`NoData` when no frame comes for longer than that. The deadline must be at
-        least as long as a working board may need: a scan and a frame on the wire, or with ``send = "on_change"`` its
-        keep-alive and a frame. It has no effect in a recording, which has no times of arrival.
+        With ``deadline_s`` it raises :class:`NoData` when no frame comes for longer. The deadline must allow for the
+        longest pause of a working board: a scan and a frame on the wire, or with ``send = "on_change"`` its keep-alive
+        and a frame. It has no effect in a recording.
         """
         self._link.check_open()
         deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
         return Subscription(self._link, maxsize, self, deadline_s)
 
     def events(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Events:
-        """The same for everything that comes: frames, changes of faults, silence; see :class:`Events`. ``deadline_s``
-        as for :meth:`subscribe`, but silence is an event like the others."""
+        """A separate queue for everything that comes: frames, changes of faults, silence; see :class:`Events`.
+        ``deadline_s`` as for :meth:`subscribe`, but silence is an event instead of an error.
+        """
         self._link.check_open()
         deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
         return Events(self._link, maxsize, self, deadline_s)
@@ -156,5 +156,5 @@ class BoardFacts:
     # ---- its end
 
     def close(self) -> None:
-        """Give the port back; may be called twice. Calls that wait in other threads raise :class:`BoardClosed`."""
+        """Close the port; may be called twice. Calls that wait in other threads raise :class:`BoardClosed`."""
         self._link.close()

@@ -1,8 +1,7 @@
-"""Which port a board is on: the only one, the one of a Skin, ``name:LEFT``, ``usb:SERIAL``.
+"""Search for a board's port: the only one, the one of a Skin, ``name:LEFT``, ``usb:SERIAL``.
 
-Serial ports that may be a supported board are known by their USB ids. A search only listens: boards say hello twice per
-second without being asked, and whatever else hangs at a port of the same USB chip gets no byte. A port that another
-program reads is passed over before its settings are touched.
+A search only listens at ports with USB ids of supported boards: boards say hello twice per second unasked, and foreign
+devices with the same USB chip must get no byte. A port that another program reads is skipped untouched.
 """
 
 from __future__ import annotations
@@ -28,17 +27,15 @@ from contactfpga.wire.hello import Hello, describe
 
 @dataclasses.dataclass(frozen=True)
 class Usb:
-    """USB ids of a board's serial port."""
-
     vid: int
     pid: int
     interface: int | None
-    """Interface that carries the serial port where the chip has several; None: any."""
+    """Interface of the serial port on a chip with several; None: any."""
     boards: str
 
 
 def supported(boards: Iterable[BoardSpec]) -> tuple[Usb, ...]:
-    """The boards by the chip that carries their UART, each chip once."""
+    """USB ids of the chips that carry the boards' UARTs, each chip once."""
     titles: dict[tuple[int, int, int | None], list[str]] = {}
     for board in boards:
         titles.setdefault((*board.bridge.usb, board.bridge.interface), []).append(board.title)
@@ -63,11 +60,11 @@ class Candidate:
 
 
 MORE = "CONTACTFPGA_PORTS"
-"""Environment variable with more ports to search, separated as in PATH: those that have no USB ids."""
+"""Environment variable with ports to search that have no USB ids, separated as in PATH."""
 
 
 def candidates() -> list[Candidate]:
-    """Ports with the USB ids of supported boards, in the order of their names, and those of :data:`MORE`."""
+    """Ports with USB ids of supported boards, by name, and those of :data:`MORE`."""
     from serialx import list_serial_ports
 
     found = choose(list_serial_ports())
@@ -77,9 +74,8 @@ def candidates() -> list[Candidate]:
 
 
 def choose(ports: Iterable[object]) -> list[Candidate]:
-    """The ports among ``ports`` (objects like serialx.SerialPortInfo) that may be a supported board.
-
-    Where the system does not tell the interface number, every port of a chip is a candidate.
+    """Those of ``ports`` (objects like serialx.SerialPortInfo) that may be a supported board: every port of a chip if
+    the system does not tell interface numbers.
     """
     found = []
     for port, usb in itertools.product(ports, SUPPORTED):
@@ -92,22 +88,21 @@ def choose(ports: Iterable[object]) -> list[Candidate]:
 
 
 LISTEN_S = 1.2
-"""How long a port may take to say hello; boards do so every 0.5 s."""
+"""Longest wait for a hello; boards send one every 0.5 s."""
 PATIENT_S = 8.0
-"""The same where what comes may be frames: a virtual board is slower than its clock on a busy machine."""
+"""Longest wait if frames may be arriving: a virtual board may be slower than its clock."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Reply:
-    """A port that was listened to."""
+    """The result of listening to a port."""
 
     candidate: Candidate
     hello: Hello | None
-    """None: no board said one."""
+    """None: no board said hello."""
     problem: str
-    """Why there is none; "" where there is one."""
+    """Reason for the missing hello; "" if there is one."""
     busy: bool = False
-    """Nobody could listen, because the port is open somewhere."""
 
     def __str__(self) -> str:
         said = self.problem if self.hello is None else f"says hello: {describe(self.hello)}"
@@ -115,8 +110,9 @@ class Reply:
 
 
 def find(port: str | None, skin: Skin | None, baud: int) -> str:
-    """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is,
-    and :class:`PortBusy` where it may be at a port that is open."""
+    """The device of the one matching board. Raises :class:`PortNotFound`, which lists all boards, and :class:`PortBusy`
+    if it may be at an open port.
+    """
     if port is not None and (sheet := SheetOf.parse(port)) is not None:
         return f"{find(sheet.port, None, baud)}#{sheet.number}"
     found = candidates()
@@ -150,7 +146,6 @@ def survey(candidates: Sequence[Candidate], baud: int) -> list[Reply]:
 
 
 def _heard(candidate: Candidate, baud: int) -> list[Reply]:
-    """What is at a port: a board, or each sheet of one that serves several."""
     try:
         names = sheets.open_at(candidate.device) or [candidate.device]
         heard = [one for name in names for one in listen(name, baud).items()]
@@ -160,7 +155,7 @@ def _heard(candidate: Candidate, baud: int) -> list[Reply]:
 
 
 def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, Hello]:
-    """The hellos that a board says by itself at this port within ``seconds``, by the port to open; nothing is sent."""
+    """Hellos sent unasked at this port within ``seconds``, by the port to open."""
     seconds = LISTEN_S if seconds is None else seconds
     transport = connect(device, baud)
     of_sheets = sheets.Greetings(device)
@@ -200,7 +195,7 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
 
 
 def _meant(heard: Sequence[Reply], port: str | None, skin: Skin | None) -> list[Reply]:
-    """Those that were asked for by name; by Skin; and where its name tells several of these apart, by that."""
+    """Boards selected by port name or Skin; among several, those with the Skin's name."""
     found = [one for one in heard if one.hello is not None]
     if port is not None and port.startswith(NAME):
         found = _named(found, port.removeprefix(NAME))
@@ -218,7 +213,6 @@ def _named(found: Sequence[Reply], name: str) -> list[Reply]:
 
 
 def _of(port: str | None, skin: Skin | None) -> str:
-    """Which boards were looked for."""
     name = f" named {visible(port.removeprefix(NAME))!r}" if port is not None and port.startswith(NAME) else ""
     return name + (f" with fingerprint {skin.fingerprint.hex()}" if skin is not None else "")
 
@@ -230,7 +224,6 @@ def _nobody(port: str | None, skin: Skin | None, heard: Sequence[Reply]) -> str:
 
 
 def _hint(meant: Sequence[Reply]) -> str:
-    """How these can be told apart."""
     names = [one.hello.name for one in meant if one.hello is not None]
     numbers = [one.candidate.serial_number for one in meant]
     for scheme, keys in ((NAME, names), (USB, numbers)):

@@ -1,8 +1,8 @@
-"""A FlexiTac sheet at a serial port: what its microcontroller sends, as the packets of a board.
+"""A FlexiTac sheet at a serial port, whose data are converted to the packets of a board.
 
-FlexiTac is an open sheet of 16x32 resistive cells (https://flexitac.github.io). Its firmware sends, without end and at
-2,000,000 baud, the bytes AA 55 and a reading from 0 to 255 of each cell, row by row, about 100 times per second. There
-are no numbers, times or checks among them. So a frame counts only if the next one's AA 55 follows it.
+FlexiTac is an open sheet of 16x32 resistive cells (https://flexitac.github.io). Its firmware sends, at 2,000,000 baud
+and about 100 times per second, the bytes AA 55 and a reading from 0 to 255 of each cell, row by row. Frames have no
+numbers, times or checks, so a frame counts only if the next one's AA 55 follows it.
 """
 
 from __future__ import annotations
@@ -20,15 +20,14 @@ from contactfpga.wire.framing import DELIMITER, KINDS, PacketError
 from contactfpga.wire.protocol import HEARD_DIGITS, KIND_REQUEST, REQUEST_HELLO, check_prefix, encode_hello
 
 MARK = b"\xaa\x55"
-"""Begins a frame."""
 BITS_PER_BYTE = 10
-"""On the line: with start and stop."""
+"""Bits of a byte on the line, with start and stop."""
 DAMAGED = b"\x01\x00"
-"""In place of bytes that are no frame: a packet that is counted as damaged."""
+"""Packet in place of bytes that are no frame; it counts as damaged."""
 
 
 class Framer:
-    """Cuts bytes into frames of ``size`` readings. It keeps no more than two frames of bytes."""
+    """Cuts bytes into frames of ``size`` readings; buffers at most two frames."""
 
     def __init__(self, size: int):
         self._size = size + len(MARK)
@@ -52,8 +51,9 @@ class Framer:
 
 
 class Cells:
-    """Thresholds readings: a cell is pressed while it reads ``margin`` or more above its own rest, which is the median
-    of the first frames."""
+    """Compares readings with the rest: a cell is pressed while it reads at least ``margin`` above its median in the
+    first frames.
+    """
 
     def __init__(self, shape: tuple[int, int], frames: int, margin: int):
         self._shape, self._frames, self._margin = shape, frames, margin
@@ -61,7 +61,7 @@ class Cells:
         self._from: np.ndarray | None = None
 
     def take(self, readings: bytes) -> np.ndarray | None:
-        """(rows, columns) bool; None as long as the rest is not known."""
+        """(rows, columns) bool; None while the rest is unknown."""
         values = np.frombuffer(readings, np.uint8).reshape(self._shape)
         if self._from is None:
             self._first.append(values)
@@ -75,20 +75,20 @@ class Cells:
 
 @dataclasses.dataclass
 class Heard:
-    """The last request, and how many more frames may have begun before it came."""
+    """The last request, and how many more frames may have begun before it."""
 
     number: int = 0
     older: int = 0
     shown: int = 0
-    """The number that frames carry."""
+    """Request number in current frames."""
 
 
 HELLO_US = 500_000
-"""Interval of hellos, as boards say them: after a break a reader in the network needs one to know the time again."""
+"""Interval of hellos, by which a network reader knows the time after a break."""
 
 
 class FlexitacPort:
-    """The port ``flexitac://PORT``. Raises what a serial port raises, and :class:`AddressError`."""
+    """The port ``flexitac://PORT``. Raises the errors of a serial port, and :class:`AddressError`."""
 
     live = threaded = True
 
@@ -116,7 +116,6 @@ class FlexitacPort:
         self._time_us = self._greeted_us = 0
 
     def read(self, timeout_s: float) -> bytes:
-        """Packets of the frames that came by then."""
         data = self._port.read(0.0 if self._out else timeout_s)
         frames = self._framer.take(data) if data else []
         now_us = int((self._port.clock() - self._begun_s) * 1e6)
@@ -144,7 +143,7 @@ class FlexitacPort:
             self._sent += 1
 
     def write(self, data: bytes) -> None:
-        """Take requests of the host; the sheet itself gets nothing."""
+        """The sheet itself gets nothing."""
         for packet in data.split(bytes([DELIMITER])):
             try:
                 plain = framing.unseal(packet, b"")
@@ -161,7 +160,6 @@ class FlexitacPort:
         self._out += encode_hello(self._skin, self._sent, time_us >> EPOCH_BITS, heard)
 
     def _packet(self, cells: np.ndarray) -> bytes:
-        """A frame of these cells, as on the wire."""
         widths = self._widths
         room = np.zeros((len(cells), 8 * widths.bitmap_row_bytes), bool)
         room[:, : cells.shape[1]] = cells
@@ -180,9 +178,7 @@ class FlexitacPort:
         return framing.seal(body, check_prefix(self._skin))
 
     def clock(self) -> float:
-        """Of the computer."""
         return self._port.clock()
 
     def close(self) -> None:
-        """Give the port back."""
         self._port.close()

@@ -1,4 +1,4 @@
-"""What a child of ``fork`` inherits and must leave alone: ports, files and locks, which its parent goes on to use."""
+"""Protects the parent's ports, files and locks, which a child of ``fork`` inherits."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Callable
 from typing import BinaryIO, Protocol
 
 ELSEWHERE = "was opened in another process; open it anew in this one"
-"""What whoever uses it in the child is told."""
+"""End of the error message in the child."""
 
 
 class Owner(Protocol):
-    """Has something that its parent goes on to use."""
+    """An object with resources that the parent continues to use."""
 
     def forked(self) -> None:
-        """This is the child, in which no other thread exists, though locks may be held by one. Waits for nothing."""
+        """Called in the child, the only thread there, while locks may be held; must not block."""
 
 
 _owners: weakref.WeakSet[Owner] = weakref.WeakSet()
@@ -23,18 +23,18 @@ _functions: list[Callable[[], None]] = []
 
 
 def watch(owner: Owner) -> None:
-    """From now on tell this object in every child, as long as it lives."""
+    """Call the object's ``forked`` in every child from now on."""
     _owners.add(owner)
 
 
 def in_child(function: Callable[[], None]) -> Callable[[], None]:
-    """Decorator: call this function of a module in every child, too, after all objects were told."""
+    """Decorator: call this module's function in every child, too, after all objects."""
     _functions.append(function)
     return function
 
 
 def discard(file: BinaryIO) -> None:
-    """Have a file in the child lead nowhere, so that nothing is written twice that waited to be written."""
+    """Redirect the child's file to nowhere, so that buffered bytes are not written twice."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     os.dup2(nowhere, file.fileno(), inheritable=False)
     os.close(nowhere)

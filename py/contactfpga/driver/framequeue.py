@@ -11,19 +11,18 @@ from contactfpga.zones.zone import Zones
 
 
 class FrameQueue:
-    """A queue of at most ``maxsize`` frames, errors and events between frames, which drops the oldest when it is full.
-    The caller holds the board's lock."""
+    """A queue of at most ``maxsize`` frames, errors and events between frames, which drops the oldest when full. The
+    caller holds the board's lock.
+    """
 
     def __init__(self, maxsize: int, all_events: bool = False, came: int = 0):
         self.maxsize = maxsize
         self.all_events = all_events
-        """Whether the queue also takes events between frames."""
         self.dropped = 0
-        """Frames that were not taken in time."""
         self.shown = 0
-        """Number of the last frame that :meth:`show` gave: what waits up to it is dropped."""
+        """Number of the last frame given by :meth:`show`; frames up to it are dropped."""
         self.others = 0
-        """What waits and is no frame."""
+        """Number of waiting items that are no frames."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
         self._taken = 0  # frames of the run in front
         self._came = self._gone = came  # frames, which have numbers from 1; those that wait no more
@@ -33,19 +32,19 @@ class FrameQueue:
 
     @property
     def seen(self) -> int:
-        """Number of the last frame that the listener had, or that was dropped."""
+        """Number of the last frame that the listener got, or that was dropped."""
         return max(self._gone, self.shown)
 
     def show(self, number: int) -> bool:
-        """The listener gets this frame now, before it is put here or while it waits; False: it had it. The caller need
-        not hold the board's lock, but one that all callers hold."""
+        """Mark a frame as given to the listener outside of the queue; False if it already had it. All callers hold a
+        common lock, not necessarily the board's.
+        """
         if number <= self.seen:
             return False
         self.shown = number
         return True
 
     def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
-        """Add what came."""
         self._items.append(item)
         if isinstance(item, (Zones, Run)):
             self._came += _count(item)
@@ -56,13 +55,13 @@ class FrameQueue:
             self.dropped += self._drop(self._held - self.maxsize)
 
     def put_back(self, zones: Zones) -> None:
-        """Have this frame come next."""
+        """Make this frame the next one."""
         self._unwrap()
         self._items.appendleft(zones)
         self._gone -= 1
 
     def pop(self) -> Zones | SideEvent | ContactFPGAError | None:
-        """What comes next; None where nothing waits."""
+        """The next item; None if nothing waits."""
         self._drop_shown()
         if not self._items:
             return None
@@ -83,7 +82,7 @@ class FrameQueue:
         return zones
 
     def pop_frames(self) -> list[Zones | Run]:
-        """All frames that wait, up to the first error."""
+        """All waiting frames up to the first error."""
         self._drop_shown()
         self._unwrap()
         found: list[Zones | Run] = []
@@ -94,11 +93,11 @@ class FrameQueue:
         return found
 
     def first_error(self) -> ContactFPGAError | None:
-        """The error that comes next, if one does; it stays."""
+        """The next item if it is an error, which stays in the queue."""
         return self._items[0] if self._items and isinstance(self._items[0], ContactFPGAError) else None
 
     def skip_to(self, zones: Zones) -> None:
-        """Drop this frame, which is in no run, and all that came before it."""
+        """Drop this frame, which is in no run, and all earlier ones."""
         if not any(item is zones for item in self._items):
             return
         while self._items[0] is not zones:
@@ -106,7 +105,7 @@ class FrameQueue:
         self._drop(1)
 
     def keep_last(self) -> None:
-        """Drop all but what came last, or up to the first error, which is raised."""
+        """Drop all but the last item, or raise the first error."""
         self._drop_shown()
         while self._held > 1:
             error = self.first_error()
@@ -116,25 +115,24 @@ class FrameQueue:
         self._unwrap()  # so that the others do not become Python's numbers with it
 
     def drop_older(self, moment: float) -> None:
-        """Drop a frame that waits alone and came before that moment."""
+        """Drop a single waiting frame that arrived before ``moment``."""
         self._drop_shown()
         item = self._items[0] if self._held == 1 else None
         if isinstance(item, Zones) and item.arrived_s is not None and item.arrived_s < moment:
             self.clear()
 
     def clear(self) -> None:
-        """Drop everything."""
         self._items.clear()
         self._gone = self._came
         self._taken = self.others = 0
 
     @property
     def _held(self) -> int:
-        """What waits, and what was shown and is not dropped yet, which another thread changes at any moment."""
+        """Number of waiting frames, with shown ones, which another thread may change."""
         return self._came - self._gone + self.others
 
     def _drop(self, most: int) -> int:
-        """Drop what comes first, and of a run at most ``most`` frames; returns how many frames were dropped."""
+        """Drop the first item, or at most ``most`` frames of a run; returns the number of frames."""
         item = self._items[0]
         if not isinstance(item, (Zones, Run)):
             self._items.popleft()
@@ -153,7 +151,6 @@ class FrameQueue:
             self._drop(self.shown - self._gone)
 
     def _unwrap(self) -> None:
-        """Take the frames out of the run in front that were taken from it."""
         if self._taken:
             run = self._items[0]
             assert isinstance(run, Run)

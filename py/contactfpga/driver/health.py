@@ -1,4 +1,4 @@
-"""What can be wrong between this computer and a board, and what to do about it."""
+"""Checks of the path between this computer and a board, with remedies."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
 
 LATENCY_MS = 1
 EVENT_CHAR = 0x100
-"""Byte 0, the delimiter, and bit 8, which enables it: the chip hands over what it has when that byte comes."""
+"""FTDI event character at which the chip passes its buffer on: byte 0, the delimiter, and bit 8 to enable it."""
 
 CLOCK_ERROR = 0.01
 JITTER_S = 0.03
-"""By how much the time of a frame's arrival may vary, with an FTDI chip's default latency."""
+"""Jitter of arrivals with an FTDI chip's default latency."""
 
 
 class Finding(NamedTuple):
-    """What one look showed."""
+    """Result of one check."""
 
     verdict: Literal["ok", "note", "fault"]
     sentence: str
-    """With the next step where there is one."""
+    """The result, with the next step if there is one."""
 
 
 def rights(port: str) -> Iterator[Finding]:
-    """Whether this user may read and write the port."""
+    """Check whether this user may read and write the port."""
     if sys.platform == "win32":
         return
     if not os.path.exists(port):
@@ -56,7 +56,7 @@ def _group_command(port: str) -> str:
 
 
 def ftdi(port: str, folder: Path = USB_SERIAL) -> Iterator[Finding]:
-    """The FTDI chip's latency timer, and the udev rule that sets it and the event character."""
+    """Check the FTDI chip's latency timer, and the udev rule for it and the event character."""
     device = folder / Path(port).resolve().name
     timer = device / "latency_timer"
     if not timer.exists():
@@ -75,7 +75,7 @@ def ftdi(port: str, folder: Path = USB_SERIAL) -> Iterator[Finding]:
 
 
 def udev_rule() -> str:
-    """The rule that sets latency timer and event character of all supported boards."""
+    """The rule that sets latency timer and event character for all supported boards."""
     return "\n".join(
         f'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTRS{{idVendor}}=="{usb.vid:04x}", '
         f'ATTRS{{idProduct}}=="{usb.pid:04x}", ATTR{{latency_timer}}="{LATENCY_MS}", '
@@ -89,7 +89,7 @@ def _advice() -> str:
 
 
 def hello(board: Board) -> Iterator[Finding]:
-    """What the board says of itself."""
+    """Describe the board by its hello."""
     sheet = board.sheet
     surface = "plane" if sheet.radius_mm is None else f"cylinder of radius {sheet.radius_mm:g} mm"
     surface = f"closed {surface}" if sheet.closed else surface
@@ -103,7 +103,7 @@ def hello(board: Board) -> Iterator[Finding]:
 
 
 def reader(board: Board) -> Iterator[Finding]:
-    """Who reads the port."""
+    """Name the thread that reads the port."""
     if why := native.refusal(board.port):
         yield Finding("note", f"{board.port} is read in Python, not in C: {why}")
     else:
@@ -111,7 +111,7 @@ def reader(board: Board) -> Iterator[Finding]:
 
 
 def clock(board_s: float, host_s: float) -> Iterator[Finding]:
-    """Whether the board's clock agrees with this computer's, as far as this much time can show."""
+    """Compare the board's clock with this computer's, as far as the measured duration allows."""
     if host_s > 0 and abs(off := board_s / host_s - 1) > CLOCK_ERROR + JITTER_S / host_s:
         yield Finding(
             "note",
@@ -126,11 +126,11 @@ NEXT_STEPS = {
     "joined lines": "the self-test found a short circuit between lines",
     "unnamed fault": "its name has not come yet; run this once more",
 }
-"""What to do about a fault, by the end of its name."""
+"""Remedy of a fault, by the end of its name."""
 
 
 def lines(board: Board, zones: Zones) -> Iterator[Finding]:
-    """What the board says of its lines, and how old that is."""
+    """Describe the board's line faults, and the age of this report."""
     if zones.arrived_s is not None:
         yield Finding("ok", f"the last frame came {1000 * board.silence.seconds:.0f} ms ago")
     if zones.faults == (STUCK,):
@@ -144,7 +144,7 @@ def lines(board: Board, zones: Zones) -> Iterator[Finding]:
 
 
 def units(board: Board) -> Iterator[Finding]:
-    """What the pressure units read while frames were counted."""
+    """Check the pressure units' readings during the frame count."""
     history, stats = board.unit_history, board.stats
     if history is None:
         return
@@ -166,7 +166,7 @@ def units(board: Board) -> Iterator[Finding]:
 
 
 def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
-    """Frames and losses over some seconds of device time."""
+    """Count frames and losses over some seconds of device time."""
     try:
         first = zones = board.next(timeout)
     except ReplayEnded:

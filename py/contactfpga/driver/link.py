@@ -1,4 +1,4 @@
-"""One port and everyone who waits for it: who reads, who is notified, how it ends."""
+"""One port and all its listeners: reading, notification, and closing."""
 
 from __future__ import annotations
 
@@ -34,57 +34,48 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 LOG = logging.getLogger("contactfpga")
-"""Says which board it is and that its faults are gone (INFO), that it was restarted, how many frames were lost, and
-which faults it has (WARNING). Silent unless the program sets up logging. Twice per second at most but for faults, which
-it tells as they change."""
+"""Logger of the board's identity and the end of its faults (INFO), and of restarts, lost frames and faults (WARNING),
+at most twice per second except for faults. Silent unless the program configures logging.
+"""
 LOG.addHandler(logging.NullHandler())
 
 READ_S = 0.05
-"""How often the reader checks whether the board was closed."""
 
 ASK_S = 1.0
-"""How often :meth:`Link.ask` asks."""
 
 SIMULATED_READ_S = 0.002
-"""The most simulated time that passes in one read, for which :meth:`Link.close` may have to wait."""
+"""Longest simulated time of one read, which may delay :meth:`Link.close`."""
 
 Result = Zones | SideEvent | ContactFPGAError | Hello | bool
-"""What is waited for."""
 
 
 class _Waiter:
-    """A call of :meth:`Board.read` that waits for its frame."""
-
     def __init__(self, ticket: int):
         self.ticket = ticket
         self.found: Zones | ContactFPGAError | None = None
 
     def look(self) -> Zones | ContactFPGAError | None:
-        """What has been found by now."""
         return self.found
 
 
 class Link:
-    """A transport, what is said over it, and the threads that wait for that.
+    """A transport, its conversation, and the threads that wait for results.
 
-    A port's bytes are read by a thread of its own. Where time passes only while it is read (``sim://``), or all is
-    there already (``replay://``), one of the threads that wait reads for all.
+    A separate thread reads a live port. If time passes only during reads (``sim://``), or all bytes exist already
+    (``replay://``), one of the waiting threads reads for all.
     """
 
     fit: type[ClockFit] = ClockFit
-    """Fit of the board's clock to the host's."""
 
     def __init__(self, transport: Transport, skin: Skin | None):
         self.transport = transport
         rng = getattr(transport, "rng", None)
         self.conversation = Conversation(transport.name, skin, transport.live, rng, self.fit)
         self.changed = threading.Condition()
-        """To be held while any state is looked at."""
+        """Lock of the whole state, notified on changes."""
         self._queues: weakref.WeakSet[FrameQueue] = weakref.WeakSet()
         self.last: Zones | Run | None = None
-        """What came last."""
         self.last_s = transport.clock()
-        """When it came."""
         self._frames = 0  # that came
         self._last_bytes = 0  # that had come by then
         self._asked_s = -math.inf  # by :meth:`ask`
@@ -100,13 +91,12 @@ class Link:
         forks.watch(self)
 
     def start(self) -> None:
-        """Begin to read, once those listen who want to hear all from the first byte on."""
+        """Begin to read, after registration of listeners that need the first byte."""
         if self.transport.threaded:
             threading.Thread(target=self._read_all, name=f"reader of {self.transport.name}", daemon=True).start()
 
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
-        """A queue for what comes from now on, as long as it is kept; with all events first the faults that the board
-        told last."""
+        """A queue for items from now on, while it is referenced; with all events, first the last reported faults."""
         with self.changed:
             queue = FrameQueue(maxsize, all_events, self._frames)
             self._queues.add(queue)
@@ -115,16 +105,15 @@ class Link:
         return queue
 
     def leave(self, queue: object) -> None:
-        """Put nothing more into this queue; the lock is held."""
+        """Put nothing more into this queue; the caller holds the lock."""
         self._queues.discard(queue)  # type: ignore[arg-type]
 
     def clock(self) -> float:
-        """Seconds on the clock that timeouts run on."""
         self.check_open()
         return self.transport.clock()
 
     def read(self, timeout: float) -> Result:
-        """Ask the board; the first frame scanned after now, or the error that came in its place."""
+        """Request a frame; returns the first one scanned after now, or an error."""
         deadline = self.clock() + timeout
         with self.changed:
             self.check_open()
@@ -138,7 +127,7 @@ class Link:
                 self._waiters.remove(waiter)
 
     def ask(self) -> None:
-        """Ask the board, at most once per second; nobody waits for the answer, which says how late frames are."""
+        """Send a request, at most once per second, whose answer bounds the frames' latency."""
         with self.changed:
             now = self.transport.clock()
             if now < self._asked_s + ASK_S:
@@ -148,8 +137,9 @@ class Link:
         self._send()
 
     def command(self, command: Command, timeout: float) -> Result:
-        """Have the board do something; the first frame scanned after it took the command, or the error that came in
-        its place. Raises :class:`NoSuchCommand`."""
+        """Send a command; returns the first frame scanned after the board took it, or an error. Raises
+        :class:`NoSuchCommand`.
+        """
         deadline, denied = self.clock() + timeout, self._denied()
         if not self._commanding.acquire(timeout=timeout):
             raise ReadTimeout(f"{self.transport.name}: another command was not answered within {timeout:g} s")
@@ -177,17 +167,17 @@ class Link:
             self._commanding.release()
 
     def silence(self, since: float) -> Silence:
-        """How long no frame has come, where someone waits since that moment; the lock is held."""
+        """Time without a frame, for a listener since that moment; the caller holds the lock."""
         last = self.last[len(self.last) - 1] if isinstance(self.last, Run) else self.last
         seconds = self.transport.clock() - max(since, self.last_s)
         return Silence(self.transport.name, seconds, self.conversation.stats.bytes - self._last_bytes, last)
 
     def abandon(self) -> None:
-        """Have the reader give the port back: nobody can wait for anything any more. Takes no lock."""
+        """Make the reader close a port without possible listeners. Takes no lock."""
         self._closing = True
 
     def close(self) -> None:
-        """Give the port back; may be called twice."""
+        """Close the port; may be called twice."""
         with self.changed:
             self._closing = True
             self.changed.notify_all()
@@ -204,19 +194,20 @@ class Link:
             self.transport.close()
 
     def _in_use(self) -> bool:
-        """Whether a thread is in the transport; the lock is held."""
+        """Whether a thread is in the transport; the caller holds the lock."""
         return self._reading is not None or self._writing is not None
 
     def _leave(self) -> None:
-        """What a thread does that was in the transport, with the lock held: the last one of a board that was closed
-        gives the port back, unless :meth:`close` waits to do so and to tell its caller what fails."""
+        """Leave the transport, with the lock held. The last thread of a closed board closes the port, unless
+        :meth:`close` waits to do so.
+        """
         if self._closing:
             self.changed.notify_all()
             if not self._in_use() and not self._closers:
                 self.transport.close()
 
     def forked(self) -> None:
-        """In a child process the port is closed, and stays open in its parent."""
+        """Close the port in a child process; it stays open in the parent."""
         self.changed, self._commanding = threading.Condition(), threading.Lock()
         self._reading = self._writing = None
         self._closing = self._inherited = True
@@ -228,7 +219,7 @@ class Link:
             raise BoardClosed(f"{self.transport.name} was closed; open it again")
 
     def wait_for(self, found: Callable[[], Result | None], deadline: float, timeout: float) -> Result:
-        """What ``found`` returns as soon as it is not None; raises :class:`ReadTimeout` at the deadline."""
+        """The first result of ``found`` that is not None; raises :class:`ReadTimeout` at the deadline."""
         start = self.conversation.stats.bytes
         with self.changed:
             while True:
@@ -249,13 +240,14 @@ class Link:
                     self._read_once(min(left, SIMULATED_READ_S))
 
     def linger(self, until: float, seconds: float) -> None:
-        """Receive until the moment ``until``, for at most ``seconds``. Raises as :meth:`wait_for`, except
-        :class:`ReadTimeout` and :class:`PortLost`, which the next call raises."""
+        """Receive until the moment ``until``, for at most ``seconds``. :class:`ReadTimeout` and :class:`PortLost` are
+        left to the next call.
+        """
         with contextlib.suppress(ReadTimeout, PortLost):
             self.wait_for(lambda: None, until, seconds)
 
     def _read_once(self, seconds: float) -> int:
-        """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
+        """Read once, releasing the held lock meanwhile; returns the number of bytes."""
         self._reading = threading.get_ident()
         breaks = self._breaks()
         self.changed.release()
@@ -277,7 +269,7 @@ class Link:
 
     @property
     def net(self) -> NetCounters | None:
-        """The network's counters, or None for a port without a network."""
+        """The network's counters; None for a port without a network."""
         return counters_of(self.transport)
 
     def _denied(self) -> int:
@@ -291,15 +283,16 @@ class Link:
             self._send()
 
     def catch_up(self) -> None:
-        """Take what someone else has read; where the threads that wait read for themselves, there is nothing."""
+        """Take bytes that another thread has read, if any does."""
 
     def newest(self, queue: FrameQueue, timeout: float) -> Zones | None:
-        """The newest frame, none that the queue has had, and have the queue go on after it; None where the queue has to
-        be looked at. Raises as :meth:`wait_for`."""
+        """The newest frame that the queue has not had, after which the queue continues; None if the queue decides.
+        Raises the errors of :meth:`wait_for`.
+        """
         return None
 
     def take_what_came(self) -> None:
-        """Read the bytes that wait at a port which no thread reads."""
+        """Read the waiting bytes of a port that no thread reads."""
         if self.transport.threaded:
             return
         with self.changed:
@@ -355,8 +348,7 @@ class Link:
             LOG.info("%s: no fault any more", self.transport.name)
 
     def _send(self) -> None:
-        """Write what has to be sent, in the order in which the conversation made it: one thread writes at a time, and
-        what others ask meanwhile it writes next. A caller that holds the lock keeps it; else others go on."""
+        """Write the conversation's bytes in order. One thread writes for all; a caller that holds the lock keeps it."""
         with self.changed:
             while self._writing is None and not self._closing and (data := self.conversation.data_to_send()):
                 self._writing = threading.get_ident()
@@ -370,7 +362,6 @@ class Link:
             self.check_open()
 
     def _read_all(self) -> None:
-        """What the reader thread does, until the board is closed or the port is lost."""
         while True:
             with self.changed:
                 try:
@@ -388,7 +379,7 @@ class Link:
 
 
 def check_command(name: str, hello: Hello | None, command: Command) -> None:
-    """Raises :class:`NoSuchCommand` where a board with this hello does not take the command."""
+    """Raises :class:`NoSuchCommand` if a board with this hello does not take the command."""
     if hello is None or command.what in hello.commands:
         return
     known = COMMANDS.get(command.what)
@@ -403,20 +394,21 @@ def denied_error(name: str) -> NoSuchCommand:
 
 
 class Said(Protocol):
-    """What of a conversation tells why no frame came."""
+    """Part of a conversation that explains missing frames."""
 
     @property
     def stats(self) -> Stats:
-        """Counters of the packets that came."""
+        """Counters of received packets."""
 
     @property
     def numbers(self) -> Collection[int]:
-        """Numbers of the sheets whose packets came before any hello."""
+        """Sheet numbers in packets before the first hello."""
 
 
 def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounters | None) -> ReadTimeout:
-    """The error of a port on which no frame came within ``timeout`` seconds; ``start``: bytes that had come before.
-    ``net``: what is counted about the network; None: there is none."""
+    """The error of a port without a frame within ``timeout`` seconds; ``start``: earlier bytes; ``net``: the network's
+    counters.
+    """
     stats = said.stats
     head = f"{name}: no frame within {timeout:g} s"
     if net is not None:

@@ -1,6 +1,6 @@
-"""Reads the bytes of boards out of what `contactfpga record` wrote: an MCAP file, or several one after the other.
+"""Reader of boards' bytes in the MCAP file or files of one `contactfpga record`.
 
-Each record is read within bounds: what a file says of its sizes may be a lie.
+Every read is bounded, because the sizes stated in a file may be false.
 """
 
 from __future__ import annotations
@@ -26,17 +26,16 @@ if TYPE_CHECKING:
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9
-"""Bytes before a record: what it is, and how long."""
 LARGEST = 1 << 25
-"""Bytes of a record as it is in the file."""
+"""Most bytes of a record in the file."""
 UNPACKED = 1 << 23
-"""Bytes of a chunk, unpacked: ours have 64 KiB or one message, other programs' 4 MiB."""
+"""Most unpacked bytes of a chunk; ours have 64 KiB or one message, other programs' 4 MiB."""
 RATIO = 1000
-"""How many times as large as it is packed a chunk of more than :data:`FREE` bytes may be: the time for a file goes with
-its size. Ours shrink to a third."""
+"""Largest compression ratio of a chunk above :data:`FREE` bytes, which limits a file's time by its size; ours is about
+3.
+"""
 FREE = 1 << 17
 _MESSAGE = 22
-"""Bytes of a message's record before its data."""
 
 
 class RecordingError(ContactFPGAError):
@@ -44,18 +43,18 @@ class RecordingError(ContactFPGAError):
 
 
 class Unreadable(Exception):
-    """A record that is damaged, or larger than it may be."""
+    """A record that is damaged or too large."""
 
 
 class Cut(Unreadable):
-    """The file ends, or cannot be followed, within a record; ``size``: bytes of it that are there."""
+    """The file ends within a record; ``size``: its present bytes."""
 
     def __init__(self, size: int):
         self.size = size
 
 
 def record(file: BinaryIO) -> tuple[int, bytes] | None:
-    """Kind and content of the record that begins here; None at the end of the file. Raises :class:`Cut`."""
+    """Kind and content of the next record; None at the end of the file. Raises :class:`Cut`."""
     head = file.read(HEAD)
     if not head:
         return None
@@ -67,7 +66,7 @@ def record(file: BinaryIO) -> tuple[int, bytes] | None:
 
 
 def parsed(kind: Any, data: bytes) -> Any:
-    """The record of this class of the library's. Raises :class:`Unreadable`."""
+    """The record as an object of the MCAP library. Raises :class:`Unreadable`."""
     from mcap.data_stream import ReadDataStream
 
     try:
@@ -77,8 +76,7 @@ def parsed(kind: Any, data: bytes) -> Any:
 
 
 def inside(chunk: Chunk) -> Iterator[Any]:
-    """Messages, channels and schemas of a chunk, in order. Raises :class:`Unreadable` before the first one where the
-    chunk is damaged or unpacks to more than it may."""
+    """Messages, channels and schemas of a chunk, in order. Raises :class:`Unreadable` before the first one."""
     from mcap.opcode import Opcode
     from mcap.records import Channel, Schema
 
@@ -97,7 +95,7 @@ def inside(chunk: Chunk) -> Iterator[Any]:
 
 
 def message(data: bytes) -> Any:
-    """A message's record. Raises :class:`Unreadable`."""
+    """The record of a message. Raises :class:`Unreadable`."""
     from mcap.records import Message
 
     if len(data) < _MESSAGE:
@@ -108,7 +106,7 @@ def message(data: bytes) -> Any:
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """Its bytes: as many as it says, and never more than it may have, whatever is packed in it."""
+    """The chunk's bytes, exactly as many as it states and may have."""
     size, packed = chunk.uncompressed_size, chunk.data
     if size > min(UNPACKED, max(FREE, RATIO * len(packed))):
         raise Unreadable
@@ -140,28 +138,27 @@ _UNPACKERS = {"zstd": _zstd, "lz4": _lz4, "": lambda packed, _: packed}
 SUFFIX = ".mcap"
 KIND = "contactfpga_msgs/msg/Bytes"
 METADATA = "contactfpga"
-"""Name of what stands in a file for each link: its hello and its Skin."""
+"""Name of the metadata with each link's hello and Skin."""
 
 _BEGIN = struct.Struct("<4xiII")
-"""Seconds and nanoseconds, and the bytes of the link's name."""
 _COUNT = struct.Struct("<I")
 
 MAX_LINKS = 64
 MAX_NAME = 256
-"""Characters of a link's name: a table of frames has it in each row."""
+"""Most characters of a link's name, which tables repeat in each row."""
 MAX_TEXTS = 1000
 _FOOTER_BYTES = HEAD + 20 + len(MAGIC)
-"""At the end of a closed file."""
 
 
 def numbered(path: Path, number: int) -> Path:
-    """A file of a recording to ``path`` that is split."""
+    """Path of a numbered file of a recording to ``path`` that is split."""
     return path.with_name(f"{path.stem}_{number:04d}{path.suffix}")
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files of a recording to ``path``, in order: itself, or if there is no such file those that it was split into.
-    Raises :class:`RecordingError` where one of them is missing."""
+    """The files of a recording to ``path``, in order: one, or the parts of a split one. Raises :class:`RecordingError`
+    if a part is missing.
+    """
     if path.suffix != SUFFIX or path.exists():
         return [path]
     form = re.compile(re.escape(path.stem) + r"_(\d{4,})")
@@ -189,13 +186,11 @@ class McapPart:
                 f"{MAX_LINKS} and {MAX_NAME}"
             )
         self.topics: dict[str, str] = {name: channel.topic for name, channel in zip(names, found, strict=True)}
-        """Where each link's bytes are."""
         self.start_ns: int = summary.statistics.message_start_time
-        """Since 1970."""
         self.end_ns: int = summary.statistics.message_end_time
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """The texts of this name that are kept beside the messages."""
+        """The texts of this name in the metadata."""
         from mcap.opcode import Opcode
         from mcap.records import Metadata
 
@@ -210,8 +205,9 @@ class McapPart:
         return found
 
     def read(self, link: str, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
-        """(when the last byte came, bytes) of a link in order, from a time on and before another one. One chunk is in
-        memory at a time."""
+        """(arrival of the last byte in ns, bytes) of a link in order, from ``begin_ns`` up to ``end_ns``, with one
+        chunk in memory.
+        """
         from mcap.opcode import Opcode
         from mcap.records import Chunk, Message
 
@@ -259,7 +255,7 @@ class McapPart:
 
 
 class Summary:
-    """What stands at the end of a closed file: where its pieces are. Raises :class:`Unreadable`."""
+    """The summary at the end of a closed file. Raises :class:`Unreadable`."""
 
     def __init__(self, file: BinaryIO):
         from mcap.opcode import Opcode
@@ -276,7 +272,6 @@ class Summary:
         self.channels: dict[int, Channel] = {}
         self.chunks: list[ChunkIndex] = []
         self.texts: list[tuple[int, int]] = []
-        """Where each begins, and its bytes."""
         counted: Statistics | None = None
         end = _file_bytes(file) - _FOOTER_BYTES
         file.seek(max(0, end))
@@ -304,13 +299,14 @@ class Summary:
         self.statistics = counted
 
     def kind(self, channel: Channel) -> str:
-        """The type of its messages."""
+        """The type of a channel's messages."""
         return self.schemas[channel.schema_id].name if channel.schema_id in self.schemas else ""
 
 
 def _each(file: BinaryIO, kind: int, places: list[tuple[int, int]]) -> Iterator[bytes]:
-    """Contents of records of this kind that lie at these places, each a beginning and a number of bytes, in order.
-    Raises :class:`Unreadable`, also where a piece of the file is named twice: the time for it goes with its size."""
+    """Contents of the records of this kind at these (position, size) places. Raises :class:`Unreadable`, also for a
+    repeated place.
+    """
     free = 0
     for at, size in sorted(places):
         if not free <= at <= at + size <= _file_bytes(file):
@@ -328,7 +324,7 @@ def _file_bytes(file: BinaryIO) -> int:
 
 
 def data_of(message: bytes) -> bytes:
-    """What a message of :data:`KIND` holds."""
+    """Content of a message of :data:`KIND`."""
     _, _, name = _BEGIN.unpack_from(message)
     at = -(-(_BEGIN.size + name) // 4) * 4
     (count,) = _COUNT.unpack_from(message, at)
@@ -336,11 +332,10 @@ def data_of(message: bytes) -> bytes:
 
 
 HELLO_NS = 600_000_000
-"""Hellos come twice per second."""
 
 
 class McapBytes:
-    """A recording whose files were closed or recovered. Each :meth:`pieces` reads on its own."""
+    """A recording whose files were closed or recovered. Calls of :meth:`pieces` are independent."""
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
@@ -352,12 +347,11 @@ class McapBytes:
             raise RecordingError(f"{path} holds no bytes of a board; `contactfpga record` makes files that do")
         parts = [part for part in self._parts if part.topics]
         self.start_ns = min(part.start_ns for part in parts)
-        """Since 1970."""
         self.end_ns = max(part.end_ns for part in parts)
 
     @property
     def links(self) -> list[str]:
-        """Names of the links whose bytes it holds, in the order in which they were added."""
+        """Names of the links, in order of addition."""
         return list(self._links)
 
     def checked(self, link: str | None) -> str:
@@ -372,15 +366,16 @@ class McapBytes:
         raise RecordingError(f"{self.path} has no link {link!r}; it has {names}")
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """The texts of this name that are kept beside the messages; those that each file repeats once."""
+        """The texts of this name in the metadata, without repetitions in further files."""
         found: list[dict[str, str]] = []
         for part in self._parts:
             found += [one for one in part.texts(name) if one not in found]
         return found
 
     def pieces(self, link: str | None = None, start_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
-        """(when the last byte came, bytes) of a link, in order; with ``start_ns`` from the last hello on that had come
-        by then, or from the beginning."""
+        """(arrival of the last byte in ns, bytes) of a link, in order: from the last hello that arrived by
+        ``start_ns``, or from the beginning.
+        """
         link = self.checked(link)
         if start_ns is None:
             yield from self._read(link)
@@ -398,7 +393,7 @@ class McapBytes:
 
 
 class McapStream:
-    """The bytes of one link, to be read like a file."""
+    """The bytes of one link as a readable stream."""
 
     def __init__(self, path: str | Path, link: str | None, start_s: float):
         file = McapBytes(path)
@@ -420,12 +415,11 @@ class McapStream:
         return data
 
     def close(self) -> None:
-        """Let the file go."""
         self._pieces.close()  # type: ignore[attr-defined]
 
 
 def _last_hello(pieces: Iterable[tuple[int, bytes]]) -> int:
-    """Where in all bytes together the last whole hello begins; -1: there is none."""
+    """Position of the last whole hello in the joined bytes; -1: there is none."""
     found, before, held = -1, 0, b""
     for _, data in pieces:
         data = held + data
@@ -437,7 +431,6 @@ def _last_hello(pieces: Iterable[tuple[int, bytes]]) -> int:
 
 
 def _after(pieces: Iterable[tuple[int, bytes]], at: int) -> Iterator[tuple[int, bytes]]:
-    """The pieces without their first ``at`` bytes."""
     for moment, data in pieces:
         if at < len(data):
             yield moment, data[at:]

@@ -1,8 +1,8 @@
-"""The thread in C that reads ports (c/reader.c), by ctypes.
+"""Python binding, by ctypes, of the C thread that reads ports (c/reader.c).
 
-A library of plain C needs no header of Python's and no build for each of its versions; installing compiles it where
-there is a C compiler (hatch_build.py). Calls that wait release the interpreter's lock, the others keep it: so the
-newest frame is copied after a thread that waited has the lock again, and is as new as it can be.
+A plain C library needs no build for each Python version; the installation compiles it if there is a C compiler
+(hatch_build.py). Only waiting calls release the interpreter's lock, so a thread that has waited copies the newest frame
+of that time.
 """
 
 from __future__ import annotations
@@ -29,10 +29,8 @@ from contactfpga.zones.run import frame_of
 from contactfpga.zones.zone import HostLine
 
 LIBRARY = Path(__file__).with_name("_reader.so")
-"""File of the library, put there by the installation."""
 
 CHUNK = 16_384
-"""Bytes of a read, at most."""
 
 _WORD = 8
 _TAKEN = struct.Struct("8Q")
@@ -43,7 +41,7 @@ _NEWEST_AND_FRAME = struct.Struct("Qqqdqddd?7x8q")
 
 
 class Sheet(ctypes.Structure):
-    """What frames are decoded with."""
+    """Format of frames for the decoder."""
 
     _fields_ = [
         (name, ctypes.c_uint32)
@@ -55,7 +53,7 @@ class Sheet(ctypes.Structure):
 
 
 class Base(ctypes.Structure):
-    """What is known after the packets that were taken; see :meth:`Port.settle`."""
+    """State after the taken packets; see :meth:`Port.settle`."""
 
     _fields_ = [
         ("steady", ctypes.c_int64),
@@ -68,23 +66,17 @@ class Base(ctypes.Structure):
 
 
 class Newest(NamedTuple):
-    """The newest frame."""
-
     packets: int
     """Number of the frame's packet since the port was opened, from 1."""
     time_us: int
     """Time of the frame in us since power-up."""
     after_another: bool
-    """Whether the frame before it came after :meth:`Port.settle`: :meth:`Port.before` gives it."""
+    """Whether the frame before it, :meth:`Port.before`, came after :meth:`Port.settle`."""
     line: HostLine
-    """Map from the board's clock to the host's, with the frame's arrival."""
     frame: Frame
-    """The frame as it came over the wire."""
 
 
 class Library:
-    """The functions of the library."""
-
     def __init__(self, path: Path):
         keeps, releases = ctypes.PyDLL(str(path)), ctypes.CDLL(str(path), use_errno=True)
         address, double, number = ctypes.c_void_p, ctypes.c_double, ctypes.c_uint64
@@ -118,14 +110,14 @@ class Library:
 
 @functools.lru_cache(maxsize=1)
 def library() -> Library:
-    """Raises OSError where there is none."""
+    """The loaded library. Raises OSError if it does not exist."""
     found = Library(LIBRARY)
     forks.in_child(found.forked)
     return found
 
 
 def missing() -> str:
-    """Why the library cannot be used; empty if it can."""
+    """Reason why the library is unusable; "" if it is usable."""
     if os.name != "posix":
         return "it needs Linux or macOS"
     if not LIBRARY.exists():
@@ -138,15 +130,14 @@ def missing() -> str:
 
 
 def refusal(port: object) -> str:
-    """Why the thread in C cannot read a port; empty where it can."""
+    """Reason why the C thread cannot read a port; "" if it can."""
     if not isinstance(port, str) or not isinstance(parse(port), Serial):
         return "only the bytes of a serial port come by themselves, from a descriptor that C can read"
     return missing()
 
 
 class NativeFit(ClockFit):
-    """A :class:`~contactfpga.driver.clock.ClockFit` in C; the thread that reads goes on with it, see
-    :meth:`Port.settle`."""
+    """A :class:`~contactfpga.driver.clock.ClockFit` in C, which the reading thread continues."""
 
     def __init__(self) -> None:
         self._library = library()
@@ -183,7 +174,7 @@ class NativeFit(ClockFit):
 
 
 class Port:
-    """A port that the thread reads; with a descriptor of -1 it gets what :meth:`feed` gives."""
+    """A port that the C thread reads, or with descriptor -1 gets from :meth:`feed`."""
 
     def __init__(self, descriptor: int, now: float):
         self._library, self._inherited = library(), False
@@ -193,13 +184,12 @@ class Port:
         self._decodes: tuple[Widths, bytes] | None = None
         self._columns, self._room = 3, 0
         self.taken = 0
-        """Packets that were taken, and those that were overwritten before."""
+        """Packets taken so far, including overwritten ones."""
         self._bytes = 0  # the same
         self._make_room()
         forks.watch(self)
 
     def forked(self) -> None:
-        """In a child it is not this process's."""
         self._inherited = True
 
     def __del__(self) -> None:
@@ -212,12 +202,12 @@ class Port:
         return bool(getattr(self, "_address", None)) and not self._inherited
 
     def close(self) -> None:
-        """Read no more; who waits goes on. May be called twice."""
+        """Stop reading and wake waiting threads. May be called twice."""
         if self._mine():
             self._library.close(self._address)
 
     def wake(self) -> None:
-        """Who waits goes on, now and later."""
+        """Wake waiting threads, now and later."""
         if self._mine():
             self._library.wake(self._address)
 
@@ -230,20 +220,20 @@ class Port:
         self._library.wait(self._address, packets, 0, seconds)
 
     def wait_for_much(self, seconds: float) -> None:
-        """Wait until a ring is a quarter full, for the port's end, or for ``seconds``."""
+        """:meth:`wait` until a ring is a quarter full."""
         self._library.wait(self._address, 0, 1, seconds)
 
     def paused(self, now: float) -> bool:
-        """Whether nobody has read for longer than times are known."""
+        """Whether frame times are ambiguous since the last read."""
         return bool(self._library.notice(self._address, now))
 
     @property
     def failure(self) -> int:
-        """errno of a port that is lost, -1 at its end, 0 as long as it goes on."""
+        """errno of a lost port, -1 at its end, 0 while it works."""
         return int(self._library.failure(self._address))
 
     def decode(self, frame_format: tuple[Widths, bytes] | None) -> None:
-        """What frames are from now on; see :attr:`contactfpga.driver.conversation.Conversation.frame_format`."""
+        """Set the frame format; see :attr:`contactfpga.driver.conversation.Conversation.frame_format`."""
         if frame_format == self._decodes:
             return
         told = Sheet()
@@ -269,7 +259,6 @@ class Port:
         self._decodes = frame_format
 
     def _make_room(self) -> None:
-        """For the newest frame and the one before it."""
         self._newest = np.zeros(_NEWEST.size + 2 * FIELDS.itemsize + 2 * self._room * self._columns * _WORD, np.uint8)
         self._newest_view = self._newest.data
         self._newest_at = self._newest.ctypes.data
@@ -277,8 +266,9 @@ class Port:
     # ---- what came
 
     def take(self) -> tuple[Reads, bytes, int] | None:
-        """All reads that wait, the begin of their first packet where bytes before them are gone, and how many of these
-        were not taken; None where nothing waits."""
+        """All waiting reads, the beginning of their first packet if it was overwritten, and the number of overwritten
+        bytes; None if nothing waits.
+        """
         if not (size := self._library.waiting(self._address)):
             return None
         memory = np.empty(size, np.uint8)
@@ -315,7 +305,7 @@ class Port:
     # ---- the newest frame
 
     def settle(self, steady: Steady | None) -> None:
-        """What :meth:`contactfpga.driver.conversation.Conversation.steady` says after what was taken."""
+        """Set the state after the taken packets, from :meth:`contactfpga.driver.conversation.Conversation.steady`."""
         base, memory = Base(packets=self.taken), None
         if steady is not None and isinstance(steady.fit, NativeFit):
             memory = steady.fit.memory
@@ -324,9 +314,9 @@ class Port:
         self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
-        """The newest frame; None where it is not newer than this packet, which is one that was taken before
-        :meth:`settle` or came later. Raises :class:`Unsettled` where what came does not tell it. Not for several
-        threads at once."""
+        """The newest frame; None unless it is newer than packet ``packets``. Raises :class:`Unsettled` if received
+        packets have to be taken first. Not thread-safe.
+        """
         found = self._library.newest(self._address, packets, self._newest_at)
         if found <= 0:
             if found:
@@ -342,7 +332,6 @@ class Port:
         return self._frame(second, _NEWEST.size + 2 * FIELDS.itemsize + first[-1] * self._columns * _WORD)
 
     def _frame(self, fields: tuple[int, ...], start: int) -> Frame:
-        """Of these fields, with the records that begin at ``start``."""
         assert self._decodes is not None
         shape = fields[-1], self._columns
         copied = bytearray(self._newest_view[start : start + shape[0] * shape[1] * _WORD])
@@ -350,4 +339,4 @@ class Port:
 
 
 class Unsettled(Exception):
-    """The newest frame cannot be told before what came was taken."""
+    """The newest frame is unknown until received packets are taken."""

@@ -1,9 +1,8 @@
-"""A port that a thread in C reads, and everyone who waits for it: no other thread of Python's has to run first.
+"""A link whose port is read by a thread in C, so that frames wait for no other Python thread.
 
-That thread notes when bytes came and decodes frames (:mod:`contactfpga.driver.native`). Whoever calls takes what came
-and has the conversation say what it means, as it does for a :class:`~contactfpga.driver.link.Link` with a thread in
-Python. While nobody calls, a thread does so every two seconds. The newest frame is known before what came was taken, as
-long as each frame continues the one before.
+The C thread notes arrivals and decodes frames (:mod:`contactfpga.driver.native`). Calling threads let the conversation
+interpret them; without calls, a thread does so every two seconds. While frames continue one another, the newest is
+known before the others are taken.
 """
 
 from __future__ import annotations
@@ -29,12 +28,13 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 SERVE_S = 2.0
-"""Interval of taking what came while nobody calls; logs are as late as this. A file of recorded bytes has
-:data:`contactfpga.driver.link.READ_S`."""
+"""Interval in s of interpretation without calls, which delays logs; for a file of recorded bytes it is
+:data:`contactfpga.driver.link.READ_S`.
+"""
 
 
 class NativePort:
-    """A serial port whose bytes the thread in C takes: a :class:`~contactfpga.driver.transport.Transport`."""
+    """A serial port that the C thread reads: a :class:`~contactfpga.driver.transport.Transport`."""
 
     live = threaded = True
 
@@ -44,7 +44,7 @@ class NativePort:
         self.core = Port(inner.fileno(), inner.clock())
 
     def read(self, timeout_s: float) -> bytes:
-        """Never called: :class:`NativeLink` takes what came from :attr:`core`."""
+        """Never called: :class:`NativeLink` reads from :attr:`core`."""
         raise AssertionError("a NativeLink takes what came")
 
     def close(self) -> None:
@@ -57,19 +57,16 @@ class NativePort:
 
 
 class _Base(NamedTuple):
-    """State of the conversation when it had taken all that came; newer frames are shown on top of it."""
-
     steady: Steady
     packets: int
-    """Number of packets that the conversation had taken."""
     more_frames: int
-    """Number of the last frame less that of its packet, and the same for all frames that continue it."""
+    """Frame number minus packet number, constant while frames continue one another."""
 
 
 class NativeLink(Link):
     """A :class:`~contactfpga.driver.link.Link` to a board on a :class:`NativePort`.
 
-    The newest frame is shown without the lock :attr:`changed`, under which a thread may work through many frames.
+    The newest frame does not need the lock :attr:`changed`, under which threads may work long.
     """
 
     fit = NativeFit
@@ -85,7 +82,6 @@ class NativeLink(Link):
 
     @property
     def conversation(self) -> Conversation:
-        """The conversation after all that came by now."""
         self.catch_up()
         return self._said
 
@@ -95,7 +91,6 @@ class NativeLink(Link):
 
     @property
     def last_s(self) -> float:
-        """Time at which the last frame came, in s on the host's clock."""
         self.catch_up()
         return self._last_s
 
@@ -104,7 +99,7 @@ class NativeLink(Link):
         self._last_s = moment
 
     def catch_up(self) -> None:
-        """Take all that came, and what follows from how late it is."""
+        """Take everything received, and conclude from its delay."""
         with self.changed:
             if self._taking or self._inherited:
                 return
@@ -163,8 +158,7 @@ class NativeLink(Link):
             self._core.wait(seen, min(left, READ_S))
 
     def _left(self, deadline: float, timeout: float, start: int) -> float:
-        """Seconds until the deadline; raises what :meth:`wait_for` does where nothing can come by then. ``start``:
-        bytes that had come when it began to wait."""
+        """Seconds until the deadline; raises if nothing can come by then. ``start``: bytes received before the wait."""
         if self._failure is not None:
             raise self._failure.with_traceback(None)
         if (left := deadline - self.transport.clock()) > 0:
@@ -189,8 +183,9 @@ class NativeLink(Link):
             self.check_open()
 
     def _newest(self, queue: FrameQueue) -> Zones | int | None:
-        """The newest frame, none that the queue has had; if there is none yet, the number of the packet after which it
-        comes; None where the queue has to be looked at. Raises :class:`Unsettled` where what came does not tell it."""
+        """The newest frame that the queue has not had; otherwise the number of the packet after which it comes; None if
+        the queue decides. Raises :class:`Unsettled`.
+        """
         try:
             return self._show(queue)
         except Unsettled:

@@ -1,4 +1,4 @@
-"""What came in several reads of a port, with the packets among it that were decoded already."""
+"""Successive reads of a port, with decoded packets."""
 
 from __future__ import annotations
 
@@ -12,20 +12,18 @@ from contactfpga.skin.derived import Widths
 from contactfpga.wire.many import PacketTable
 
 PAUSED, NOISE = 1, 2
-"""Of a read: nobody had read before it for longer than times are known; more bytes than a packet has came without a
-delimiter."""
+"""Flags of a read: after a pause that makes times ambiguous; with too many bytes without a delimiter."""
 
 
 READ = np.dtype([("at_s", "<f8"), ("bytes", "<i8"), ("packets", "<i8"), ("records", "<i8"), ("odd", "<i8")])
-"""What came at once: bytes and packets are those of all reads up to it, ``odd`` of :data:`PAUSED` and :data:`NOISE`."""
+"""One read: ``bytes`` and ``packets`` are totals up to it, ``odd`` has flags."""
 
 
 class Reads:
     """Consecutive reads.
 
-    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes.
-    ``decoded``: of every packet, with (n,) ``sizes`` in bytes, whether it is a whole frame by what
-    :attr:`contactfpga.driver.conversation.Conversation.frame_format` said, ``frame_format``, and then its fields.
+    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes. ``decoded``: each
+    packet's fields, its bytes in (n,) ``sizes``, and whether it is a whole frame by ``frame_format``.
     """
 
     def __init__(
@@ -48,33 +46,31 @@ class Reads:
         return len(self.at_s)
 
     def paused(self, at: int) -> bool:
-        """Whether nobody had read before this read for longer than times are known."""
+        """Whether times are ambiguous because of a pause before this read."""
         return bool(self._reads["odd"][at] & PAUSED)
 
     def packets_before(self, at: int) -> int:
-        """Packets that were complete before this read."""
         return self._packets[at]
 
     def data_of(self, at: int, end: int | None = None) -> bytes:
-        """Bytes of this read, or up to another one."""
         return self._data[self._bytes[at] : self._bytes[at + 1 if end is None else end]]
 
     def decoded_at(self, at: int) -> PacketTable | None:
-        """What this read completed."""
         if self.decoded is None or len(self) == 1:
             return self.decoded
         return self.decoded.part(self._packets[at], self._packets[at + 1])
 
     def last_within(self, at: int, packets: int) -> int:
-        """Up to which read from this one on all packets are among the first ``packets``, there is nothing else to be
-        told of, no pause is as long as times are known, and the last read has a packet."""
+        """End of the unflagged reads from this one on within the first ``packets`` packets, without long pauses; the
+        last one has a packet.
+        """
         end = bisect.bisect_right(self._packets, packets, at + 1, self._next_break(at) + 1) - 1
         while end > at and self._packets[end] == self._packets[end - 1]:
             end -= 1
         return end
 
     def _next_break(self, at: int) -> int:
-        """The first read from here on that is odd, or from the next one on that came too late after the one before."""
+        """The first flagged or late read from here on."""
         if self._reads["odd"][at]:
             return at
         place = bisect.bisect_right(self._breaks, at)
@@ -90,8 +86,9 @@ class Reads:
     def last_frames(
         self, at: int, end: int, times_us: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Of each read with frames, the last one's time of ``times_us`` and bytes with the delimiter, when it came, and
-        how many they are."""
+        """For each read with frames: time and size of its last frame, arrival, and number of frames. ``times_us``: of
+        each frame.
+        """
         by = np.array(self._packets[at : end + 1])
         counts = np.diff(by)
         some = counts > 0

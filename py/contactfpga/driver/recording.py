@@ -1,4 +1,4 @@
-"""Files of recorded bytes: which may be written by `record=`, and what stands in the place of a board for `replay://`."""
+"""Files of recorded bytes: written by `record=`, and read by `replay://` in place of a board."""
 
 from __future__ import annotations
 
@@ -25,31 +25,30 @@ if TYPE_CHECKING:
 
 
 _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
-"""What looks like options that there are not."""
 
 
 class ByteFile(Protocol):
     """Recorded bytes."""
 
     def read(self, count: int, /) -> bytes:
-        """At most ``count``; b"" at the end."""
+        """At most ``count`` bytes; b"" at the end."""
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file."""
 
 
 class Tap(Protocol):
-    """Gets every byte that is read from a port."""
+    """Receives every byte read from a port."""
 
     def take(self, data: bytes, clock_s: float) -> None:
-        """Bytes that came then, on the port's clock; b"" where none came."""
+        """Bytes with their arrival on the port's clock; b"" if none came."""
 
     def close(self) -> None:
-        """No more will come; may be called twice."""
+        """No more bytes will come; may be called twice."""
 
 
 class FileTap:
-    """Writes the bytes to a file."""
+    """Tap that writes the bytes to a file."""
 
     def __init__(self, path: str | Path):
         self._path = path
@@ -57,7 +56,7 @@ class FileTap:
         forks.watch(self)
 
     def take(self, data: bytes, clock_s: float) -> None:
-        """Append them. Raises :class:`ContactFPGAError`."""
+        """Append bytes. Raises :class:`ContactFPGAError`."""
         try:
             self._file.write(data)
         except OSError as error:
@@ -71,7 +70,7 @@ class FileTap:
             raise self._failed(error) from None
 
     def forked(self) -> None:
-        """The parent writes what waits."""
+        """Leave the buffered bytes to the parent."""
         if not self._file.closed:
             forks.discard(self._file)
 
@@ -81,7 +80,7 @@ class FileTap:
 
 
 class RecordingTransport:
-    """Passes everything on, and each byte that is read to a tap."""
+    """Transport that copies each byte read to a tap."""
 
     def __init__(self, transport: Transport, tap: Tap):
         self._transport = transport
@@ -106,8 +105,7 @@ class RecordingTransport:
 
 
 def open_recorded(name: str) -> ByteFile:
-    """The file that ``replay://FILE`` names, open for reading. Raises :class:`AddressError`,
-    :class:`PortNotFound`."""
+    """The file named by ``replay://FILE``, open for reading. Raises :class:`AddressError`, :class:`PortNotFound`."""
     try:
         asked = Replay.parse(name)
         file = open_regular(files_of(asked.path)[0])
@@ -130,7 +128,7 @@ def open_recorded(name: str) -> ByteFile:
 
 
 def check(path: str | Path) -> None:
-    """Refuse a file that cannot be made or holds something, before a board is opened or built for it."""
+    """Refuse a nonempty or impossible output file before a board is opened or built."""
     place = Path(path)
     if place.is_file():
         _check_empty(path, place.stat())
@@ -141,7 +139,7 @@ def check(path: str | Path) -> None:
 
 
 def create(path: str | Path) -> BinaryIO:
-    """A file for every byte from a port; never one that holds something."""
+    """A new or empty file for every byte from a port."""
     check(path)
     try:
         # Not cut short where there came to be one after the look.
@@ -161,8 +159,9 @@ def _check_empty(path: str | Path, found: os.stat_result) -> None:
 
 
 class ReplayTransport:
-    """A recorded byte stream, as ``open(port, record=FILE)`` and `contactfpga record` write it: ``replay://FILE``, as
-    fast as it is read, or ``replay://FILE?pace=1`` in the time in which it was recorded."""
+    """A byte stream of ``open(port, record=FILE)`` or `contactfpga record`, played by ``replay://FILE``, with
+    ``?pace=1`` in its own time.
+    """
 
     live = threaded = False
 
@@ -189,7 +188,7 @@ class ReplayTransport:
 
 
 class _Pace:
-    """Holds back the packets of a recording until their time has come."""
+    """Delays the packets of a recording until their time."""
 
     def __init__(self, name: str, factor: float):
         self._name = name

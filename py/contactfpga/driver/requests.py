@@ -1,4 +1,4 @@
-"""Which frame answers which request (docs/protocol.md, Conversation)."""
+"""Assignment of frames to the requests that they answer (docs/protocol.md, Conversation)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from contactfpga.wire import protocol
 from contactfpga.wire.command import Command, encode_command
 
 MOST_APART = 5
-"""Steps between the last number that a frame repeated and the last one sent with which another one may be sent: frames
-on their way carry at most six numbers then, and the next one is the seventh."""
+"""Most steps of the last sent number beyond the last one in a frame for another request: frames on their way then have
+at most six numbers, and low bits distinguish seven.
+"""
 
 _LOWS = (1 << HEARD_BITS) - 1
-"""A number's lowest bits go round through 1 to this."""
+"""Largest value of a number's lowest bits, which cycle through 1 to this."""
 _NUMBERS = 1 << protocol.DIGIT_BITS * protocol.HEARD_DIGITS
 
 
@@ -29,19 +30,18 @@ class _Stage(enum.Enum):
 class Requests:
     """Numbers requests, and tells which ones a frame answers.
 
-    Who asks gets a ticket; tickets are counted from 1. One request may stand for several tickets. A command is a
-    request, too: while one is not answered, nothing else is sent, so that its ticket is answered by itself alone.
+    Each caller gets a ticket, counted from 1; one request may serve several. A command is a request with a ticket of
+    its own: until its answer nothing else is sent.
     """
 
     def __init__(self, rng: random.Random | None = None):
         self.retry_s = 0.5
-        """A request that is unanswered for this long is sent again, as long as someone waits for it."""
+        """Time after which an unanswered request is repeated for its caller."""
         self.pulsed: bool | None = None
-        """Whether the board reads pulses; None: unknown, so it is sent both, of which it takes one for a request."""
+        """Whether the board reads pulses; None: unknown, so both forms are sent."""
         self.answered = 0
-        """All tickets up to this one are answered."""
+        """Highest answered ticket."""
         self.answered_sent_s = 0.0
-        """When the request was sent that was answered last."""
         self._rng = rng or random.SystemRandom()
         self._out = bytearray()
         self._stage = _Stage.UNKNOWN
@@ -60,12 +60,12 @@ class Requests:
 
     @property
     def idle(self) -> bool:
-        """Every request is answered."""
         return self._tickets == self.answered
 
     def ask(self, now: float, until: float, hello: bool = False) -> int:
-        """A ticket for a frame that is scanned after now; someone waits for it until then. ``hello``: ask for a hello
-        as well."""
+        """Ticket for a frame scanned after ``now``; the caller waits until ``until``. ``hello``: request one as
+        well.
+        """
         self._tickets += 1
         self._until = max(self._until, until)
         if not self._in_flight:
@@ -73,8 +73,9 @@ class Requests:
         return self._tickets
 
     def command(self, command: Command, now: float, until: float) -> int:
-        """A ticket for a frame that is scanned after the board took this command. It may take it more than once, where
-        an answer was lost; there is one command at a time."""
+        """Ticket for a frame scanned after the board took this command, perhaps twice if an answer is lost; one at a
+        time.
+        """
         assert self._command is None, "one command at a time"
         self._tickets += 1
         self._command, self._commanding, self._command_until = command, self._tickets, until
@@ -83,26 +84,24 @@ class Requests:
         return self._tickets
 
     def end_command(self) -> None:
-        """Do not send the command again."""
         self._command, self._in_flight = None, False
 
     def poll(self, now: float, hello: bool = False) -> None:
-        """Ask again if an answer is overdue."""
+        """Repeat a request whose answer is overdue."""
         if self._tickets > self.answered and now < self._until and now >= self._sent_at + self.retry_s:
             self._send(now, hello)
 
     def data_to_send(self) -> bytes:
-        """What has to be sent to the board now."""
         data = bytes(self._out)
         self._out.clear()
         return data
 
     def sent_since(self, number: int, moment: float) -> bool:
-        """Whether this is the number sent last, and was sent since that moment."""
+        """Whether this is the last number, sent since ``moment``."""
         return number == self._number and self._sent_at >= moment
 
     def take_hello(self, heard: int, pulsed: bool, now: float) -> None:
-        """A hello that repeats this number, of a board that reads pulses or does not."""
+        """Take a hello that repeats this number; ``pulsed``: the board reads pulses."""
         learned, self.pulsed = pulsed and not self.pulsed, pulsed
         if self._stage is not _Stage.GREETING:
             return
@@ -112,7 +111,7 @@ class Requests:
             self._put(self._random(), now, hello=True)
 
     def take_frame(self, heard: int, now: float) -> None:
-        """A frame that carries these lowest bits."""
+        """Take the lowest bits of a number in a frame."""
         if self._stage is _Stage.ECHOING and heard == _low(self._number):
             self._stage = _Stage.KNOWN
             self._step = self._seen = 0
@@ -162,8 +161,9 @@ class Requests:
                     self._out += encode_command(number, command, hello, pulsed)
 
     def _random(self) -> int:
-        """A number whose lowest bits, and the next ones, have not been sent in this order of late: a frame and the one
-        after it that waited in the board while the hello went ahead cannot carry them."""
+        """A random number whose lowest bits and then the next ones are no recent sequence: frames that the hello
+        overtook cannot carry them.
+        """
         recent = list(self._recent)
         while True:
             number = self._rng.randrange(_NUMBERS)

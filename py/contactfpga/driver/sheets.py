@@ -1,7 +1,6 @@
-"""One port for several boards: an FPGA that serves several sheets says in each packet whose it is (docs/protocol.md).
+"""A port of an FPGA with several sheets, whose packets have the sheet's number (docs/protocol.md).
 
-``PORT#1`` is sheet 1 at a port. Whoever opens it gets the bytes that a board of this one sheet would send, and sends
-as to one. The port itself is opened once, for as long as one of its sheets is open.
+``PORT#1`` is sheet 1 at a port, and behaves like a board of its own. The real port is open while one of its sheets is.
 """
 
 from __future__ import annotations
@@ -23,28 +22,27 @@ from contactfpga.wire.hello import Hello, HelloReader, begins_hello
 from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
 
 READ_S = 0.05
-"""How long a sheet reads for all at a time."""
 
 MOST_WAIT = 16_384
-"""Packets that wait for a sheet at most; beyond, the oldest ones are dropped, which its numbers show."""
+"""Most packets that wait for a sheet; beyond that, the oldest are dropped."""
 
 _DAMAGED = b"\x01\x00"
-"""In place of a packet that does not say whose it is: every sheet counts it as damaged."""
+"""A packet of an unknown sheet, which every sheet counts as damaged."""
 
 
 class Sorter:
-    """Sorts what comes over a line by sheets."""
+    """Sorts packets by sheets."""
 
     def __init__(self) -> None:
         self.alone = False
-        """The board has one sheet, which has no number, as its last hello shows."""
+        """Whether the last hello is of a board with one sheet, without number."""
         self.sheets: int | None = None
-        """How many sheets the board has; None until a hello says so."""
         self._rest = b""
 
     def take(self, data: bytes) -> list[tuple[int | None, bytes]]:
-        """(sheet, packet with its delimiter) of all packets that ``data`` completes. No sheet: nobody knows whose it
-        was, and the packet is one that every sheet refuses."""
+        """(sheet, packet with its delimiter) of all packets that ``data`` completes; packets without a sheet are
+        invalid for every sheet.
+        """
         *packets, self._rest = (self._rest + data).split(b"\0")
         found = [self._sorted(packet) for packet in packets if packet]
         if len(self._rest) > LONGEST_PACKET + NUMBER_BYTES:
@@ -67,7 +65,7 @@ class Sorter:
 
 
 class SharedPort:
-    """A port whose sheets are opened one by one; safe for several threads."""
+    """A port whose sheets are opened one by one. Thread-safe."""
 
     def __init__(self, inner: Transport, baud: int):
         self.inner = inner
@@ -81,22 +79,22 @@ class SharedPort:
 
     @property
     def names(self) -> list[str]:
-        """The ports of all of its sheets, as far as the board has told of them."""
+        """Ports of all sheets known so far."""
         return [f"{self.inner.name}#{number}" for number in range(self._sorter.sheets or 0)]
 
     def add(self, sheet: SheetPort) -> None:
-        """From now on keep what comes of this sheet. Perhaps another bitstream was loaded since the last hello."""
+        """Keep packets of this sheet from now on. The bitstream may have changed."""
         with self._changed:
             self._sorter.alone = False
             self._waiting[sheet] = deque(maxlen=MOST_WAIT)
 
     def drop(self, sheet: SheetPort) -> bool:
-        """No longer; whether it was the last one."""
+        """Remove a sheet; returns whether it was the last one."""
         with self._changed:
             return self._waiting.pop(sheet, None) is not None and not self._waiting
 
     def read(self, sheet: SheetPort, timeout_s: float) -> bytes:
-        """What came of this sheet, waiting at most ``timeout_s`` for it; one of those that wait reads for all."""
+        """Received bytes of this sheet; one of the waiting sheets reads for all."""
         until = self.inner.clock() + timeout_s
         with self._changed:
             while True:
@@ -115,7 +113,7 @@ class SharedPort:
                     return b""
 
     def write(self, data: bytes) -> None:
-        """Send this as a whole: requests of two sheets that mingle are none."""
+        """Send bytes in one piece: interleaved requests of two sheets are invalid."""
         with self._writing:
             self.inner.write(data)
 
@@ -129,7 +127,7 @@ class SharedPort:
             raise PortNotFound(f"{sheet.name}: the board at {name} has the sheets 0 to {sheets - 1}")
 
     def _read_once(self, seconds: float) -> bool:
-        """Read once, with the lock held, which is released meanwhile; whether something came."""
+        """Read once, releasing the held lock meanwhile; returns whether bytes came."""
         self._reading = True
         self._changed.release()
         data, failure = b"", None
@@ -150,7 +148,7 @@ class SharedPort:
 
 
 class SheetPort:
-    """A sheet at a port that several share: a :class:`~contactfpga.driver.transport.Transport`."""
+    """A sheet at a shared port: a :class:`~contactfpga.driver.transport.Transport`."""
 
     def __init__(self, name: str, number: int, shared: SharedPort):
         self.name, self.number = name, number
@@ -170,17 +168,16 @@ class SheetPort:
 
 
 class Greetings:
-    """Hellos of the sheets at a port that is only listened to."""
+    """Hellos of the sheets at a port, without requests."""
 
     def __init__(self, port: str):
         self.heard: dict[str, Hello] = {}
-        """By the port of the sheet."""
         self._port = port
         self._sorter = Sorter()
         self._conversations: dict[int, Conversation] = {}
 
     def take(self, data: bytes, now: float) -> bool:
-        """Whether with ``data`` the last one of all came."""
+        """Add bytes; returns whether the hellos of all sheets are known."""
         for number, packet in self._sorter.take(data):
             if number is None:
                 continue
@@ -204,7 +201,7 @@ def _begin_anew() -> None:
 
 
 def share(address: SheetOf, baud: int, connect: Callable[[str, int], Transport] = connect) -> SheetPort:
-    """A sheet at a port, which is opened by ``connect`` unless it is open."""
+    """A sheet at a port, which ``connect`` opens unless it is open."""
     port, number = address.port, address.number
     with _lock:
         shared = _open.get(port)
@@ -218,7 +215,7 @@ def share(address: SheetOf, baud: int, connect: Callable[[str, int], Transport] 
 
 
 def open_at(port: str) -> list[str]:
-    """The ports of the sheets at a port that is open in this process; none where it is not."""
+    """Ports of the sheets at a port, if it is open in this process."""
     with _lock:
         shared = _open.get(port)
         return [] if shared is None or shared.failure is not None else shared.names

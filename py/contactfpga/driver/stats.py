@@ -1,4 +1,4 @@
-"""What is counted about a port."""
+"""Counters of a port."""
 
 from __future__ import annotations
 
@@ -9,32 +9,31 @@ from collections.abc import Iterable
 
 @dataclasses.dataclass
 class NetCounters:
-    """What happened between a publisher and a ``zenoh://`` port."""
+    """Counters between a publisher and a ``zenoh://`` port."""
 
     messages: int = 0
     """Messages received."""
     lost_messages: int = 0
-    """Messages that did not come: dropped by choice where the network was too slow, or while it was broken."""
+    """Messages that did not arrive, because the network was too slow or broken."""
     lost_bytes: int = 0
-    """Bytes of the board in them."""
+    """Bytes of the board in lost messages."""
     refused: int = 0
-    """Messages that were dropped: malformed, duplicate, late, from a second publisher of the key, or followed by no
-    later message."""
+    """Messages dropped as malformed, duplicate, late, of a second publisher, or followed by no later message."""
     publishers: int = 0
-    """Publishers that were heard: 1, and one more for each restart."""
+    """Publishers heard: 1, plus one for each restart."""
     breaks: int = 0
-    """Holes after which times are not known before the next hello."""
+    """Gaps after which times are unknown until the next hello."""
     passed_breaks: int = 0
-    """Those of them that were read, or left out, up to now."""
+    """Those of :attr:`breaks` that were read or skipped so far."""
     left_out: int = 0
     """Bytes that this program did not take in time."""
     denied: int = 0
-    """Messages to the board, of all programs, that the publisher did not pass on."""
+    """Messages of all programs to the board that the publisher refused."""
 
 
 @dataclasses.dataclass
 class Stats:
-    """What came over one port since it was opened.
+    """Counters of one port since it was opened.
 
     >>> with contactfpga.open("sim://") as board:
     ...     zones = board.next()
@@ -45,57 +44,57 @@ class Stats:
     frames: int = 0
     """Frames received whole and passed on."""
     lost: int = 0
-    """Frames that the board sent and that did not arrive whole. Counted from gaps in the sequence numbers, and exact at
-    each hello, which says how many frames the board has sent."""
+    """Frames that the board sent and that did not arrive whole, by gaps in the sequence numbers; exact at each hello,
+    which has the number of sent frames.
+    """
     unexplained: int = 0
-    """Frames received whole but not passed on, because their times could not be known before the next hello: after a
-    pause on the line, or when the board restarted and no hello has said so yet."""
+    """Whole frames that were not passed on, because a pause or restart made their times unknown until the next
+    hello.
+    """
     dropped: int = 0
-    """Frames that were dropped from the queue of ``Board.next``, the oldest first, because it was full."""
+    """Frames dropped from the full queue of ``Board.next``, oldest first."""
     overwritten: int = 0
-    """Frames that the board replaced by newer ones before it sent them; each gap counts modulo
-    2^``Widths.overwritten_bits``."""
+    """Frames replaced by newer ones on the board; each gap counts modulo 2^``Widths.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
-    """Packets refused, by reason: framing, crc, length, kind, content, noise."""
+    """Refused packets, by reason: framing, crc, length, kind, content, noise."""
     resynchronized: int = 0
     """Valid packets that followed damaged ones."""
     hellos: int = 0
     """Hellos received."""
     fault_reports: int = 0
-    """Reports of faults received, from a board that names them: one after each hello, and one when they change."""
+    """Fault reports received: one after each hello, and one on each change."""
     sweeps: int = 0
     """Sweeps of the pressure units received."""
     sweeps_lost: int = 0
-    """Sweeps that did not arrive, because newer ones replaced them while frames filled the line, or because they were
-    damaged; each gap counts modulo 256."""
+    """Sweeps that were damaged, or replaced by newer ones on a full line; each gap counts modulo 256."""
     sweeps_unexplained: int = 0
-    """Sweeps received but not passed on, because their times could not be known before the next frame."""
+    """Sweeps that were not passed on, because no frame told their times yet."""
     before_hello: int = 0
-    """Packets that came before the first hello, without which they cannot be read."""
+    """Packets before the first hello, which are unreadable."""
     unknown_kinds: int = 0
-    """Valid packets of kinds that this host does not know."""
+    """Valid packets of kinds unknown to this host."""
     foreign_version: int = 0
     """Packets of protocol 1."""
     foreign_skin: int = 0
-    """Frames of a board that was built from a different Skin than the one asked for."""
+    """Frames of a board with a different Skin than requested."""
     skin_changes: int = 0
     """Hellos with a different Skin than the hello before."""
     restarts: int = 0
-    """How often the board restarted, according to its hellos."""
+    """Restarts of the board, by its hellos."""
     bytes: int = 0
     """All bytes received."""
 
     net: NetCounters | None = None
-    """What happened on the network, for a ``zenoh://`` port; None for any other port."""
+    """Counters of the network for a ``zenoh://`` port; otherwise None."""
 
     def to_dict(self) -> dict[str, object]:
-        """Everything in plain Python values, ready for JSON."""
+        """All counters as plain Python values, ready for JSON."""
         net = None if self.net is None else dataclasses.asdict(self.net)
         return {**vars(self), "damaged": dict(self.damaged), "net": net}
 
 
 def total(every: Iterable[Stats]) -> Stats:
-    """All of them added up."""
+    """The sum of all counters."""
     found = Stats()
     for one in every:
         for field in dataclasses.fields(Stats):
@@ -109,7 +108,7 @@ def total(every: Iterable[Stats]) -> Stats:
 
 
 def refused(counters: NetCounters) -> str:
-    """For an error message: what else was sent under the key, if anything was."""
+    """Addition to an error message: refused messages under the key, if any."""
     if not counters.refused:
         return ""
     return f" (messages under its key that it did not send: {counters.refused}; docs/net.md says who can send there)"

@@ -1,4 +1,4 @@
-"""A queue of frames, or of all that comes, and what can be done with one."""
+"""A queue of frames, or of all events, for one listener."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from contactfpga.zones.zone import Zones
 Item = TypeVar("Item")
 
 POLL_S = 1e-9
-"""How long a timeout of 0 waits: simulated time passes only while one waits, and a recording is read only then."""
+"""Wait for a timeout of 0: simulated time and recordings advance only during a wait."""
 
 
 class Listening(Generic[Item]):
-    """What :class:`Subscription` and :class:`Events` have in common."""
+    """Common base of :class:`Subscription` and :class:`Events`."""
 
     all_events = False
 
@@ -38,7 +38,7 @@ class Listening(Generic[Item]):
 
     @property
     def maxsize(self) -> int:
-        """Frames that wait at most."""
+        """Most frames that wait."""
         return self._frames.maxsize
 
     @property
@@ -48,7 +48,7 @@ class Listening(Generic[Item]):
         return self._frames.dropped
 
     def next(self, timeout: float = 1.0) -> Item:
-        """What comes next, in order. Errors as for :meth:`Board.next`; silence as the class describes."""
+        """The next item, in order. Errors as for :meth:`Board.next`; silence as the class describes."""
         polled = is_finite(timeout) and timeout == 0
         timeout = POLL_S if polled else checked(timeout)
         now = self._link.clock()
@@ -73,8 +73,9 @@ class Listening(Generic[Item]):
             self._link.changed.notify_all()
 
     def settle(self, all_taken: Callable[[int], bool], timeout: float = 1.0) -> int:
-        """Call ``all_taken`` with the number of the board's bytes of which all frames are here or were taken, until it
-        returns true; returns how many items wait then, which come next. Raises :class:`ReadTimeout`."""
+        """Read until ``all_taken`` is true of the number of bytes whose frames are here or taken; returns the number of
+        waiting items. Raises :class:`ReadTimeout`.
+        """
         waiting = 0
 
         def settled() -> bool | None:
@@ -106,7 +107,7 @@ class Listening(Generic[Item]):
                 return
 
     async def awaited(self, timeout: float = 1.0) -> Item:
-        """:meth:`next`, while other tasks go on."""
+        """:meth:`next` as a coroutine."""
         import asyncio  # a quarter of what contactfpga.open would load
 
         if self._frames or timeout == 0:
@@ -116,7 +117,7 @@ class Listening(Generic[Item]):
         return self.next(timeout)  # which waits for nothing now, and takes no frame if we were canceled above
 
     def _wait(self, timeout: float) -> None:
-        """Until something waits, or silence is to be told."""
+        """Wait for an item, or for a silence to report."""
         timeout = checked(timeout)
         until, silent_at = self._link.clock() + timeout, self._silent_at()
         try:
@@ -126,7 +127,7 @@ class Listening(Generic[Item]):
                 raise
 
     def _silent_at(self) -> float:
-        """When it is too long since the last frame, or since silence was told last."""
+        """Time of the next silence to report."""
         if self._deadline_s is None:
             return float("inf")
         return max(self._noticed, self._link.last_s) + self._deadline_s
@@ -151,11 +152,12 @@ class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
     ...     type(events.next()).__name__
     'Zones'
 
-    It gives each :class:`Zones`; :class:`Faults`, first the present ones and then each change, even if no frame is
-    sent; the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline
-    :class:`Silence`, each time that it passes without a frame.
+    It gives each :class:`Zones`; :class:`Faults`, first the present ones and then each change, even without a frame;
+    the slots of a self-test; each sweep of pressure units as :class:`UnitSamples`; and :class:`Silence`, each time that
+    a deadline passes without a frame.
 
-    ``maxsize`` waits at most; beyond, the oldest are dropped, and frames among them counted in :attr:`dropped`.
+    At most ``maxsize`` items wait; beyond that, the oldest are dropped, and frames among them counted in
+    :attr:`dropped`.
     """
 
     all_events = True
@@ -171,8 +173,8 @@ class Subscription(Listening[Zones]):
     ...     len(frames.next())
     2
 
-    At most ``maxsize`` frames wait; beyond that, the oldest are dropped and counted in :attr:`dropped`. With a deadline
-    :class:`NoData` is raised each time that it passes without a frame.
+    At most ``maxsize`` frames wait; beyond that, the oldest are dropped and counted in :attr:`dropped`. With a
+    deadline, :class:`NoData` is raised each time that it passes without a frame.
     """
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
@@ -189,14 +191,15 @@ class Subscription(Listening[Zones]):
     # ---- for the board
 
     def shown(self, timeout: float, max_age_s: float | None) -> Zones | None:
-        """The newest frame, where it is known before the others were taken; see :meth:`Link.newest`."""
+        """The newest frame, if it is known before the others are taken; see :meth:`Link.newest`."""
         if max_age_s is not None or timeout == 0:
             return None
         return self._link.newest(self._frames, checked(timeout))
 
     def newest(self, max_age_s: float, timeout: float) -> Zones:
-        """The next frame, none that came or was scanned longer ago than this; raises :class:`NoData` as soon as there
-        can be none."""
+        """The next frame that arrived and was scanned at most ``max_age_s`` ago; raises :class:`NoData` if there can be
+        none.
+        """
         if not self._link.transport.live:
             return self.next(timeout)
         with self._link.changed:
@@ -217,56 +220,56 @@ class Subscription(Listening[Zones]):
         raise NoData(f"{silence} (allowed are {max_age_s:g} s)", silence)
 
     def put_back(self, zones: Zones) -> None:
-        """Have this frame come next."""
+        """Make this frame the next one."""
         with self._link.changed:
             self._frames.put_back(zones)
 
     def skip_to(self, zones: Zones) -> None:
-        """Drop this frame and all that came before it."""
+        """Drop this frame and all earlier ones."""
         with self._link.changed:
             self._frames.skip_to(zones)
 
     def keep_last(self) -> None:
-        """Drop all frames but the last one; raises what a hello gave cause for."""
+        """Drop all frames but the last; raises a pending error."""
         with self._link.changed:
             self._frames.keep_last()
 
     def raise_first(self) -> None:
-        """Raise what a hello gave cause for before the first frame."""
+        """Raise a pending error before the first frame."""
         with self._link.changed:
             if (error := self._frames.first_error()) is not None:
                 raise error
 
 
 def latest_scan_s(zones: Zones) -> float:
-    """When a frame of a board was scanned at the latest, on the port's clock."""
+    """Latest possible scan time of a frame, on the port's clock."""
     at_s, sigma_s = zones.host_time_s, zones.host_sigma_s
     return math.inf if at_s is None or sigma_s is None else at_s + 2 * sigma_s
 
 
 def frame_of(found: object) -> Zones:
-    """The frame that was waited for; raises the error that came in its place."""
+    """The awaited frame; raises the error that came in its place."""
     found = checked_item(found)
     assert isinstance(found, Zones)
     return found
 
 
 def checked_item(found: object) -> object:
-    """What was waited for; raises the error that came in its place."""
+    """The awaited item; raises the error that came in its place."""
     if isinstance(found, ContactFPGAError):
         raise found
     return found
 
 
 def checked(timeout: float) -> float:
-    """A timeout in seconds as a float; raises ValueError unless it is positive and finite."""
+    """A timeout in seconds; raises ValueError unless positive and finite."""
     if not is_finite(timeout) or timeout <= 0:
         raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
     return float(timeout)
 
 
 def checked_span(max_s: float) -> float:
-    """The seconds of a batch as a float; raises ValueError unless they are finite and not below 0."""
+    """The seconds of a batch; raises ValueError unless finite and not below 0."""
     if not is_finite(max_s) or max_s < 0:
         raise ValueError(f"max_s is {max_s!r}; it must be a number of seconds, 0 or more")
     return float(max_s)

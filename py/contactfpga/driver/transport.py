@@ -1,5 +1,4 @@
-"""Where bytes come from: a serial port, the simulated board, a recording, or a foreign sheet. All look alike to the
-driver."""
+"""Sources of bytes with a common interface."""
 
 from __future__ import annotations
 
@@ -27,29 +26,26 @@ SCHEMES = {
     "flexitac": "contactfpga.driver.flexitac:FlexitacPort",
     "sheet": "contactfpga.driver.sheets:share",
 }
-"""What opens the addresses of a scheme, loaded when it is used first: a function of the address, "module:attribute".
-It returns a :class:`Transport`; ``sim`` a :class:`SimulatedPort`."""
+"""Opener of each scheme's addresses as "module:attribute", loaded on first use. It makes a :class:`Transport` of an
+address, or for ``sim`` a :class:`SimulatedPort`.
+"""
 
 OPENED_BY_NAME = {Replay: "replay", Net: "zenoh", Flexitac: "flexitac"}
-"""The scheme of each kind of address whose opener takes the name alone."""
 
 CHUNK = 65_536
-"""Most bytes one read returns."""
 
 
 class Transport(Protocol):
     """Bytes to and from a board."""
 
     name: str
-    """What the user called it."""
     live: bool
-    """Whether a board is at the other end that can be asked."""
+    """Whether the other end is a board that answers requests."""
     threaded: bool
-    """Whether bytes come by themselves, so that a thread of its own has to read them; else time passes, or the
-    recording goes on, only while it is read."""
+    """Whether bytes come by themselves, and a separate thread has to read them."""
 
     def read(self, timeout_s: float) -> bytes:
-        """What is there, waiting at most ``timeout_s`` for the first byte; b"" when nothing came.
+        """Available bytes, waiting at most ``timeout_s`` for the first one; b"" if none came.
 
         Raises :class:`PortLost` when nothing can come any more, :class:`ReplayEnded` at the end of a recording.
         """
@@ -58,14 +54,14 @@ class Transport(Protocol):
         """Send ``data``; raises :class:`PortLost`."""
 
     def clock(self) -> float:
-        """Seconds on the clock that timeouts run on; simulated seconds for the simulated board."""
+        """Seconds on the clock of timeouts; simulated seconds for the simulated board."""
 
     def close(self) -> None:
-        """Give the port back; may be called twice."""
+        """Close the port; may be called twice."""
 
 
 class SerialTransport:
-    """A serial port, for this process alone, with low latency and with DTR and RTS left as they are."""
+    """A serial port, opened exclusively, with low latency, and with DTR and RTS unchanged."""
 
     live = threaded = True
 
@@ -118,37 +114,35 @@ class SerialTransport:
             self._port.close()
 
     def forked(self) -> None:
-        """Close the child's descriptor: the lock is the parent's, and ends with the last descriptor."""
+        """Close the child's descriptor; the parent keeps the lock."""
         self.close()
 
     def fileno(self) -> int:
-        """Its descriptor."""
         return int(self._port.fileno())
 
     def lost(self, error: Exception) -> PortLost:
-        """What is told of a port that is gone."""
+        """The error for a lost port."""
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
 
 
 def _quieten(library: str) -> None:
-    """Of a library that logs each read no line comes unless the program sets a level for it."""
+    """Silence a library that logs each read, unless the program sets its level."""
     logger = logging.getLogger(library)
     if logger.level == logging.NOTSET:
         logger.setLevel(logging.WARNING)
 
 
 class Named(Protocol):
-    """What has a name."""
+    """An object with a name."""
 
     name: str
 
 
 OPEN_PORTS: weakref.WeakSet[Named] = weakref.WeakSet()
-"""Serial ports that are open in this process, or for it."""
 
 
 def user_of(name: str) -> str:
-    """Who has a serial port open, and what to do about it."""
+    """The user of an open serial port, and the next step."""
     place = os.path.realpath(name)
     if all(os.path.realpath(one.name) != place for one in OPEN_PORTS):
         return "another program reads this port; close it first"
@@ -159,7 +153,7 @@ class SimulatedPort(Protocol):
     """A board in simulated time, such as :class:`contactfpga_sim.model.board.virtual.VirtualBoard`."""
 
     def read(self, seconds: float) -> bytes:
-        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        """Advance simulated time until bytes come, at most ``seconds``; returns them."""
 
     def write(self, data: bytes) -> None:
         """Send bytes to the board."""
@@ -172,14 +166,14 @@ class SimulatedPort(Protocol):
 
 
 class SimTransport:
-    """A virtual board, simulated while it is read."""
+    """A virtual board, simulated during reads."""
 
     live, threaded = True, False
 
     def __init__(self, name: str, board: SimulatedPort):
         self.name = name
         self.rng: random.Random | None = getattr(board, "rng", None)
-        """Of the numbers of requests, where the board brings its own: the same run then gives the same bytes."""
+        """The board's random generator of request numbers: equal runs give equal bytes."""
         self._board = board
         if _SIMULATED.setdefault(id(board), self) is not self:
             raise PortBusy(f"{name} is in use: this program opened it already; close that first")
@@ -201,18 +195,18 @@ class SimTransport:
 
 
 _SIMULATED: weakref.WeakValueDictionary[int, SimTransport] = weakref.WeakValueDictionary()
-"""What is open, by its board's identity: two readers would take each other's bytes."""
+"""Open transports by board, since two readers would take each other's bytes."""
 
 forks.in_child(_SIMULATED.clear)
 
 
 def counters_of(transport: Transport) -> NetCounters | None:
-    """The counters of the network between host and board; None if there is no network."""
+    """The counters of the network between host and board; None without a network."""
     return getattr(transport, "counters", None)
 
 
 def connect(name: str | SimulatedPort, baud: int) -> Transport:
-    """Open the transport that ``name`` asks for, or that a virtual board is."""
+    """Open the transport for a port name or a virtual board."""
     if not isinstance(name, str):
         if not hasattr(name, "read"):
             raise TypeError(f"port is {shown(name)}; it must be a port's name or a virtual board")
@@ -230,8 +224,7 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
-    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
-    ``skin``: where it names no file."""
+    """The board of ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default."""
     board: SimulatedPort = _opener("sim")(name, skin)
     return board
 

@@ -1,1 +1,1 @@
-"""Values and files from outside, refused with a sentence if unreadable."""
+"""Values and files from outside, refused with one sentence if invalid."""

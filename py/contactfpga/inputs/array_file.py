@@ -1,4 +1,4 @@
-""".npz and .npy files from outside. numpy would allocate whatever a header claims."""
+""".npz and .npy files from outside; numpy alone would allocate whatever a header claims."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import visible
 
 MAX_BYTES = 1 << 30
-"""Largest array; packed, a thousandth of it may be in the file."""
+"""Largest array in bytes; the file may hold a thousandth of this, compressed."""
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """numpy's compressions; others could expand a few bytes without limit."""
 NUMBERS = "biuf"
@@ -25,14 +25,13 @@ _SHOWN = 8
 
 
 class ArrayFileError(ValueError):
-    """The file has no array of numbers."""
+    """The file has no valid array of numbers."""
 
 
 def read(path: str | Path, names: Sequence[str], most: int = MAX_BYTES) -> dict[str, np.ndarray]:
-    """The named arrays in a .npz file; of a .npy file the one array, by the first name.
-
-    ``most``: bytes of an array. Raises :class:`ArrayFileError` if the first is missing or the file is damaged, and
-    OSError.
+    """The named arrays in a .npz file, or the array of a .npy file by the first name. ``most``: bytes of an array.
+    Raises
+    :class:`ArrayFileError` for a damaged file or without the first array, OSError.
     """
     with open_regular(path) as file:
         try:
@@ -64,7 +63,6 @@ def _arrays(archive: zipfile.ZipFile, names: Sequence[str], path: str, most: int
 
 
 def _array(file: BinaryIO, size: int, what: str, most: int) -> np.ndarray:
-    """The array that begins here, with ``size`` bytes including its header."""
     file.seek(0)
     version = npy.read_magic(file)
     header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0

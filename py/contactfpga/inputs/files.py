@@ -14,7 +14,7 @@ from typing import BinaryIO, TypeGuard
 
 
 def open_regular(path: str | Path) -> BinaryIO:
-    """The file, open for reading. Raises OSError, also for a file that is not regular."""
+    """A file open for reading. Raises OSError, also for a file that is not regular."""
     # Not even opening a FIFO must wait for whoever writes to it.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     try:
@@ -27,8 +27,8 @@ def open_regular(path: str | Path) -> BinaryIO:
 
 
 def read_small(path: str | Path, most: int, what: str, refused: type[Exception]) -> bytes:
-    """All bytes of a file of at most ``most``; ``what``: its kind for messages. Raises ``refused`` for a longer one,
-    OSError."""
+    """All bytes of a file; ``what``: its kind in messages. Raises OSError, and ``refused`` for more than ``most``
+    bytes."""
     with open_regular(path) as file:
         data = file.read(most + 1)
     if len(data) > most:
@@ -38,9 +38,9 @@ def read_small(path: str | Path, most: int, what: str, refused: type[Exception])
 
 @contextlib.contextmanager
 def replaced(path: str | Path) -> Iterator[Path]:
-    """A new, empty file with a secret name in the folder of ``path``, to be written. After the block it replaces
-    ``path``; if the block fails, it is removed and ``path`` is unchanged. An existing file that is not regular, such as
-    /dev/stdout into a pipe, is written directly. Raises OSError with ``path``."""
+    """A new, empty file in the folder of ``path``, which replaces ``path`` after the block, unless the block fails. An
+    existing file that is not regular, such as /dev/stdout into a pipe, is written directly. Raises OSError with
+    ``path``."""
     if Path(path).exists() and not Path(path).is_file():
         yield Path(path)
         return
@@ -67,11 +67,10 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def names_robot(port: str | None) -> TypeGuard[str]:
-    """Whether a port is the file of a robot's links, not a board as ``sim://?skin=FILE.toml``."""
     return port is not None and port.endswith(".toml") and "://" not in port
 
 
 def told(error: OSError) -> str:
-    """An OSError for a user: the file and its problem, without the number."""
+    """An OSError for a user: file and problem, without the number."""
     reason = error.strerror or str(error) or type(error).__name__
     return reason if error.filename is None else f"{os.fsdecode(error.filename)}: {reason}"

@@ -1,4 +1,4 @@
-"""TOML files from outside, refused with a sentence if a parser or reader would fail."""
+"""TOML files from outside, refused with one sentence if invalid."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _LONG_KEY = re.compile(rf"\.(?:[^.=,{{}}\[\]\n]*+\.){{{MAX_DEPTH - 1}}}")
 
 
 def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
-    """The content of a file. Raises ``refused`` for invalid TOML, OSError if unreadable."""
+    """The content of a TOML file. Raises ``refused`` for invalid TOML, OSError."""
     return parse(read_small(path, MAX_BYTES, "a TOML file", refused), path, refused)
 
 
 def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
-    """The content of a file of these bytes; ``path``: its name in messages. Raises ``refused``."""
+    """The content of a TOML file of these bytes. Raises ``refused``."""
     if len(data) > MAX_BYTES:
         raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
     try:
@@ -53,7 +53,7 @@ def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str,
 
 
 def load_table(path: str | Path, name: str, read: Callable[[Any], Table], refused: type[ValueError]) -> Table | None:
-    """The file's table of this name, converted by ``read``; None without one. Raises ``refused``, OSError."""
+    """The file's table ``name``, converted by ``read``; None without such a table. Raises ``refused``, OSError."""
     values = load(path, refused)
     if name not in values:
         return None
@@ -64,7 +64,7 @@ def load_table(path: str | Path, name: str, read: Callable[[Any], Table], refuse
 
 
 def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> dict[str, Any]:
-    """A table whose keys are fields of a dataclass; raises ``refused`` otherwise."""
+    """A table whose keys are fields of the dataclass ``kind``. Raises ``refused`` for other keys."""
     if not isinstance(values, dict):
         raise refused(f"{name} is {shown(values)}; it must be a part, [{name}]")
     known = [field.name for field in dataclasses.fields(kind)]
@@ -75,7 +75,6 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
 
 
 def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:
-    """Check 64-bit integers and the depth of tables, iteratively."""
     todo: list[tuple[str, Any, int]] = [(name, value, 1) for name, value in values.items()]
     while todo:
         name, value, depth = todo.pop()

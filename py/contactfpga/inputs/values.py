@@ -1,4 +1,4 @@
-"""Checks of values from outside: numbers, integers, and text that a terminal can show."""
+"""Checks of values from outside."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def is_finite(value: object) -> bool:
 
 
 def whole(value: object) -> int | None:
-    """The value as an int if its type is an integer, including numpy's; else None, also for 8.0."""
+    """An integer, also one of numpy, as an int; None for any other value, such as 8.0."""
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         return None
     try:
@@ -35,7 +35,7 @@ def whole(value: object) -> int | None:
 
 
 def number_in(text: str) -> float:
-    """The number in a text; NaN, which is out of every range, if it is none."""
+    """The number in a text; NaN, which is out of every range, without a number."""
     try:
         return float(text)
     except ValueError:
@@ -43,7 +43,7 @@ def number_in(text: str) -> float:
 
 
 def shown(value: Any) -> str:
-    """``repr`` of a value, short enough for a message."""
+    """``repr`` of a value, shortened for a message."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # a number of more digits than Python writes, or lists in lists in lists
@@ -52,7 +52,7 @@ def shown(value: Any) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """A hint on an unknown name: the most similar known one, or all."""
+    """A hint for an unknown name: the most similar known name, or all."""
     from difflib import get_close_matches  # for whoever misspells alone
 
     names = list(known)
@@ -61,7 +61,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def shortened(text: str) -> str:
-    """A message, long ones without their middle: it begins with the failure and ends with the next step."""
+    """A message, without its middle if it is long."""
     if len(text) <= MAX_MESSAGE:
         return text
     return f"{text[: MAX_MESSAGE // 2]}... ({len(text):,} characters) ...{text[-MAX_MESSAGE // 2 :]}"

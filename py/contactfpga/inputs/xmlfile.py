@@ -1,4 +1,4 @@
-"""XML from outside, refused with a sentence if it would fill the memory."""
+"""XML files from outside, refused with one sentence if they would fill the memory."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ MAX_ELEMENTS = 100_000
 
 
 def parse(data: bytes, path: str | Path, what: str, refused: type[Exception]) -> ElementTree.Element:
-    """The root element of a file of these bytes; ``path`` and ``what``: its name and kind in messages. Raises
-    ``refused``."""
+    """The root element of a file of these bytes; ``path``, ``what``: name and kind in messages. Raises ``refused``."""
     try:
         return ElementTree.fromstring(data, ElementTree.XMLParser(target=_Elements()))
     except _Doctype:
@@ -30,8 +29,6 @@ class _TooMany(Exception):
 
 
 class _Elements(ElementTree.TreeBuilder):
-    """Builds elements from the parser, in any encoding."""
-
     def __init__(self) -> None:
         super().__init__()
         self._count = 0
@@ -41,7 +38,6 @@ class _Elements(ElementTree.TreeBuilder):
         raise _Doctype
 
     def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
-        """Count an element, then build it."""
         self._count += 1
         if self._count > MAX_ELEMENTS:
             raise _TooMany

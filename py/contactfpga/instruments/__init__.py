@@ -1,1 +1,1 @@
-"""Measurements on a sheet by its frames: bounce, settling, broken lines, suspicious cells."""
+"""Measurements on a sheet from frames: bounce, settling, broken lines, suspicious cells."""

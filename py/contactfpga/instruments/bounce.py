@@ -1,4 +1,4 @@
-"""Bounce times of switches, from frames with cells."""
+"""Bounce times of switches from frames with cells."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from contactfpga.instruments.watch import Cell
 from contactfpga.zones.zone import Zones
 
 QUIET_US = 20_000
-"""Time without change after which a bounce has ended; later changes are another touch."""
+"""Time without change that ends a bounce; later changes are another touch."""
 
 MARGIN = 2.0
-"""Factor from the longest bounce to a proposed time."""
+"""Ratio of a proposed time to the longest bounce."""
 
 STEP_US = 100
 """Step of proposed times."""
 
 SLOW = 2.0
-"""Factor over the median bounce from which a switch is slow."""
+"""Ratio to the median bounce from which a switch is slow."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Transition:
 
     cell: Cell
     pressed: bool
-    """Whether it is a press, else a release."""
+    """Whether this is a press; otherwise it is a release."""
     us: int
     """Time from the first change to the last."""
     changes: int
-    """Number of changes; 1: no bounce visible in the frames."""
+    """Number of changes; 1: the frames show no bounce."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Proposal:
 
     @property
     def lines(self) -> str:
-        """The proposal as lines of a Skin's TOML file."""
+        """Lines of a Skin's TOML file."""
         return "\n".join(
             f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value:g}"
             for name, value in dataclasses.asdict(self).items()
@@ -55,16 +55,17 @@ class Proposal:
 
 
 class Bounce:
-    """Measures bounce in frames with cells, without debounce. A press or a release begins with a change after
-    :data:`QUIET_US` of rest and ends with the last change before as much rest."""
+    """Measures bounce in frames with cells, without debounce. A press or a release is the changes between two rests of
+    :data:`QUIET_US`.
+    """
 
     def __init__(self, on_change: bool = False) -> None:
-        """``on_change``: the board sends no frame while nothing changes."""
+        """``on_change``: whether the board sends no frame while nothing changes."""
         self._on_change = on_change
         self.bounced: list[Transition] = []
         """Presses and releases, in the order of their ends."""
         self.blips: list[Transition] = []
-        """Changes that end as they began: touches shorter than :data:`QUIET_US`, or noise."""
+        """Changes that end in the state before: touches shorter than :data:`QUIET_US`, or noise."""
         self._open: np.ndarray
         self._before: np.ndarray
         self._now: np.ndarray
@@ -75,7 +76,7 @@ class Bounce:
         self._gaps_us: dict[int, int] = {}
 
     def update(self, zones: Zones) -> None:
-        """Add the next frame. Raises :class:`ContactFPGAError` for one without cells."""
+        """Add the next frame. Raises :class:`ContactFPGAError` for a frame without cells."""
         if zones.cells is None:
             raise ContactFPGAError('zones do not tell which switch bounces; report = "cells" does')
         last, self._last = self._last, zones
@@ -97,7 +98,7 @@ class Bounce:
             self._now = zones.cells.copy()
 
     def finish(self) -> None:
-        """End the transitions at rest after the last frame."""
+        """End the transitions that are at rest after the last frame."""
         if self._last is not None:
             self._end(self._open & (self._last.time_us - self._to_us > QUIET_US))
 
@@ -118,8 +119,8 @@ class Bounce:
 
     @property
     def resolution_us(self) -> int:
-        """Median interval of frames; for a board that sends only on change, the least. 0 before the second frame. A
-        shorter bounce may be missed, and each time may be up to twice this longer."""
+        """Median interval of frames, or the least for a board that sends on change; 0 before the second frame. A
+        shorter bounce may be missed, and a measured time may be up to twice this longer."""
         if not self._gaps_us:
             return 0
         if self._on_change:
@@ -132,18 +133,18 @@ class Bounce:
         return gap_us
 
     def times_us(self, pressed: bool) -> np.ndarray:
-        """(n,) durations of all presses, or releases, ascending."""
+        """(n,) durations of all presses, or all releases, ascending."""
         return np.sort([one.us for one in self.bounced if one.pressed == pressed])
 
     def longest(self) -> dict[Cell, int]:
-        """Longest duration in us of each switch that was pressed or released; the slowest first."""
+        """Longest duration in us by switch, longest first."""
         found: dict[Cell, int] = {}
         for one in self.bounced:
             found[one.cell] = max(one.us, found.get(one.cell, 0))
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def slow(self) -> dict[Cell, int]:
-        """The outliers of :meth:`longest`: more than :data:`SLOW` times the median, and two frames."""
+        """The switches of :meth:`longest` above :data:`SLOW` times the median and two frames."""
         longest = self.longest()
         if not longest:
             return {}
@@ -151,8 +152,8 @@ class Bounce:
         return {cell: us for cell, us in longest.items() if us > most}
 
     def proposal(self) -> Proposal | None:
-        """Times that hide every bounce seen, and what frames may have missed, times :data:`MARGIN`; None if no switch
-        bounced. A press still counts at once."""
+        """Times that hide every bounce, seen or missed, times :data:`MARGIN`; None if no switch bounced. A press still
+        counts at once."""
         if not any(one.us for one in self.bounced):
             return None
         return Proposal("asym_eager_defer_pk", self._proposed_us(True), self._proposed_us(False))

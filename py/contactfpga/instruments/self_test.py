@@ -1,4 +1,4 @@
-"""The result of a board's self-test of lines and diodes (docs/faults.md)."""
+"""Result of a board's self-test of lines and diodes (docs/faults.md)."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from contactfpga.wire.faults import SelfTestSlot
 
 
 class LineFinding(NamedTuple):
-    """One finding of a self-test."""
-
     kind: Literal["fault", "untested"]
     sentence: str
 
 
 @dataclasses.dataclass(frozen=True)
 class SelfTest:
-    """A whole self-test of ``rows`` and ``columns``: each line was driven alone, and lines that rose were read.
+    """A self-test of ``rows`` and ``columns`` from ``board.self_test()``: each line is driven alone, and all lines are
+    read.
 
-    ``board.self_test()`` makes one. Here row 1 rises where row 0 is driven, and the other way round:
+    Here row 1 rises where row 0 is driven, and the other way round:
 
     >>> rows_rose = (), (0, 1), (0, 1), ()
     >>> columns_rose = (), (), (), (0,)
@@ -36,16 +35,16 @@ class SelfTest:
     guard: bool = False
     """Whether there are guard lines."""
     mask: frozenset[tuple[int, int]] | None = None
-    """(row, column) of masked switches; None: unknown."""
+    """(row, column) of masked switches; None if unknown."""
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Joined lines, bridged diodes, lines that do not rise; () without any."""
+        """Joined lines, bridged diodes, and lines that do not rise, in words."""
         return tuple(finding.sentence for finding in self.findings if finding.kind == "fault")
 
     @property
     def untested(self) -> tuple[str, ...]:
-        """Lines that cannot be tested, as they rise by themselves."""
+        """Lines that rise by themselves and so cannot be tested, in words."""
         return tuple(finding.sentence for finding in self.findings if finding.kind == "untested")
 
     @property
@@ -67,7 +66,6 @@ class SelfTest:
         return self.slots[1 + self.rows + column]
 
     def _rows_after(self, row: int) -> set[int]:
-        """Other rows that rise with a row, but not by themselves."""
         return set(self._of_row(row).rows) - {row, *self.slots[0].rows}
 
     def _columns_after_row(self, row: int) -> set[int]:
@@ -77,7 +75,6 @@ class SelfTest:
         return set(self._of_column(column).columns) - {column, *self.slots[0].columns}
 
     def _tested(self, column: bool) -> set[int]:
-        """Lines that are driven: those not fully masked."""
         masked = self.mask or frozenset()
         lines, others = (self.columns, self.rows) if column else (self.rows, self.columns)
         return {
@@ -89,7 +86,7 @@ class SelfTest:
     # ---- findings
 
     def _still(self) -> Iterator[LineFinding]:
-        """Lines that rise with none driven, and those that do not when driven."""
+        """Lines that rise with none driven, and those that do not rise when driven."""
         first = self.slots[0]
         for column in first.columns:
             cause = "its pull is too strong, or it is held at the released level"
@@ -117,7 +114,7 @@ class SelfTest:
                 yield LineFinding("fault", f"{name} {_listed(group)} joined")
 
     def _crossed(self) -> Iterator[LineFinding]:
-        """Columns that rise with a row: against the diode, whatever is pressed."""
+        """Columns that rise with a row, against the diode."""
         for row in range(self.rows):
             for column in self._columns_after_row(row):
                 either = f"row {row} and column {column} joined"
@@ -147,7 +144,7 @@ class SelfTest:
         ]
 
     def _rest(self) -> Iterator[LineFinding]:
-        """Lines that follow another one without another finding's explanation."""
+        """Lines that follow another line, not explained by other findings."""
         through_guard = set(self._reach_all(self._rows_after, self._tested(column=False)))
         for row in range(self.rows):
             fed = {below for column in self._columns_after_row(row) for below in self._of_column(column).rows}
@@ -163,7 +160,6 @@ class SelfTest:
 
 
 def _groups(after: Callable[[int], set[int]], lines: int) -> list[list[int]]:
-    """Groups of two or more lines that rise with each other."""
     groups: list[set[int]] = []
     for line in range(lines):
         both = {line} | {other for other in after(line) if line in after(other)}
@@ -179,10 +175,9 @@ def _listed(lines: list[int]) -> str:
 
 
 def merged(tests: Iterable[SelfTest]) -> tuple[LineFinding, ...]:
-    """The findings of several self-tests, each once, faults first."""
     return tuple(sorted({finding for test in tests for finding in test.findings}))
 
 
 def untried(test: SelfTest, pressed: frozenset[tuple[int, int]]) -> int:
-    """Unmasked switches of a sheet that are not among the ``pressed``."""
+    """Number of unmasked switches that are not among the ``pressed``."""
     return test.rows * test.columns - len(pressed | (test.mask or frozenset()))

@@ -1,7 +1,7 @@
 """Clocks from a row's selection until each cell reads pressed, from frames sampled at different clocks.
 
-A frame sampled early is between two usual ones. A cell counts only if it was pressed in both, and in those before: then
-its press is neither new nor bouncing.
+An early frame is between two usual ones. A cell counts only if it was pressed in both and in those before, so that its
+press is neither new nor bouncing.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ STEADY = 4
 """Consecutive frames at the full settle time in which a cell must have been pressed."""
 
 SLOW = 2.0
-"""Factor over the median time from which a cell is slow, besides those near the settle time."""
+"""Ratio to the median time from which a cell is slow."""
 NEAR = 0.75
-"""Share of the settle time that counts as near it."""
+"""Share of the settle time from which a cell is slow, too."""
 
 LINE_CELLS = 3
-"""Least number of cells of a line that can be slow itself, if most of them are."""
+"""Least cells of a slow line, most of which are slow."""
 
 
 class _Search:
-    """For each place the least sufficient clocks, by bisection; all places see the same frames."""
+    """The least sufficient clocks of each place by bisection; all places see the same frames."""
 
     def __init__(self, shape: tuple[int, ...], first: int, settle: int):
         self.too_few = np.full(shape, first - 1)
@@ -35,16 +35,14 @@ class _Search:
 
     @property
     def open(self) -> np.ndarray:
-        """Places of unknown time."""
         return np.asarray(self.enough - self.too_few > 1)
 
     @property
     def middle(self) -> np.ndarray:
-        """The next clock to try at each place."""
         return np.asarray((self.enough + self.too_few) // 2)
 
     def vote(self, clocks: int, counts: np.ndarray, enough: np.ndarray) -> None:
-        """Add a frame sampled at ``clocks``, with whether that was ``enough`` at the places where it ``counts``."""
+        """Add a frame sampled at ``clocks``; ``enough``: whether that sufficed, at the places where it ``counts``."""
         asked = counts & self.open & (self.middle == clocks)
         self._votes += np.array([asked & ~enough, asked & enough])
         no, yes = self._votes >= AGREE
@@ -62,8 +60,8 @@ class Slow:
 
 
 class Settling:
-    """Fed with frames in turn: one at the full settle time, one at :meth:`next_clocks`, one at the full settle time,
-    ...
+    """Least sampling clocks from frames: one at the full settle time, one at :meth:`next_clocks`, one at the full
+    settle time, and so on.
 
     first, settle: least and most sampling clocks; skips: the scan drives only touched rows; guard: a guard row is
     driven before row 0.
@@ -85,7 +83,7 @@ class Settling:
         self._full = full
 
     def next_clocks(self) -> int | None:
-        """The next sampling clock, which most informative places need; None: everything pressed is known."""
+        """The next sampling clock, the one that most places need; None if everything pressed is known."""
         columns = (self._after_pressed(self._full) & ~self._full).any(axis=0)
         wanted = [
             search.middle[search.open & now] for search, now in ((self._press, self._full), (self._back, columns))
@@ -122,8 +120,8 @@ class Settling:
 
     @property
     def back_clocks(self) -> np.ndarray:
-        """(columns,) least clocks after the next row's selection at which a column reads released again; at least
-        :attr:`first`, 0 if unknown."""
+        """(columns,) least clocks from the next row's selection until a column reads released; at least :attr:`first`,
+        0 if unknown."""
         return np.where(self._back.open, 0, self._back.enough)
 
     @property

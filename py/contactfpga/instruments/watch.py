@@ -1,4 +1,4 @@
-"""Watches frames for stuck, loose or dead switches, by the changes of each cell or zone."""
+"""Detection of stuck, loose or dead switches from the changes of each cell or zone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Cell = tuple[int, int]
 """(row, column)"""
 
 FEW_CELLS = 3
-"""Largest group of unchanging cells that counts as stuck switches; a larger one is rather an object."""
+"""Most cells in an unchanging group of stuck switches; a larger group is rather an object."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,20 +32,17 @@ class Suspicion:
     """
 
     kind: Literal["stuck", "held", "flutter"]
-    """``stuck``: one to three switches side by side read pressed without a change, while others came and went;
-    ``held``: the same for more switches, so more likely something lies there; ``flutter``: a switch that changes faster
-    than a hand can."""
+    """``stuck``: one to three adjacent switches read pressed without a change while others came and went. ``held``: the
+    same for more switches, on which something may lie. ``flutter``: a switch changes faster than a hand can."""
     sentence: str
     cells: tuple[Cell, ...]
-    """(row, column) of the switches; () if the frames do not show which."""
+    """(row, column) of the switches; () if the frames do not show them."""
     time_us: int
-    """Device time at which it was noticed, in us."""
+    """Device time of detection, in us."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """Thresholds of suspicion, in us of device time."""
-
     stuck_us: int
     others: int
     flutter_hz: float
@@ -56,7 +53,7 @@ class Limits:
 
 
 def away_from(cells: Iterable[Cell], reach: int, sheet: Sheet) -> np.ndarray:
-    """(rows, columns) bool: cells farther than ``reach`` from all of these, so that no contact joins them."""
+    """(rows, columns) bool: cells farther than ``reach`` from all ``cells``, so that no contact joins them."""
     away = np.ones((sheet.rows, sheet.columns), bool)
     for row, column in cells:
         columns = np.arange(column - reach, column + reach + 1)
@@ -66,7 +63,6 @@ def away_from(cells: Iterable[Cell], reach: int, sheet: Sheet) -> np.ndarray:
 
 
 def unchanged(what: str, many: bool, seconds: float, others: str, from_the_start: bool) -> str:
-    """The sentence about cells that do not change."""
     start = ", since the first frame," if from_the_start else ""
     cause = "something lies there, or they are stuck" if many else "stuck, or something small lies there"
     lasted = f"{seconds:.0f}" if seconds >= 10 else f"{seconds:.1f}"
@@ -91,17 +87,15 @@ def places(cells: np.ndarray) -> tuple[Cell, ...]:
 
 
 APART_US = 10_000
-"""Interval below which changes of a cell count once: a bouncing switch does not flutter."""
+"""Interval within which changes of a cell count once, as a switch may bounce."""
 
 QUIET = 10
-"""Share of the time for which nothing beside a stuck switch may have changed."""
+"""Divisor of the stuck time: for this part nothing beside a stuck switch may have changed."""
 
 SECOND_US = 1_000_000
 
 
 class CellHistory:
-    """Pressed cells over time."""
-
     def __init__(self, first: Zones, limits: Limits, present: np.ndarray):
         """``present``: (rows, columns) bool, False where the Skin's mask has no switch."""
         assert first.cells is not None
@@ -118,16 +112,14 @@ class CellHistory:
 
     @property
     def stuck(self) -> set[Cell]:
-        """Cells reported as stuck, without change since."""
+        """Cells reported as stuck that have not changed since."""
         return set(places(self._stuck))
 
     @property
     def flutters(self) -> set[Cell]:
-        """Cells reported to flutter."""
         return set(places(self._flutters))
 
     def take(self, zones: Zones) -> None:
-        """Add a frame."""
         assert zones.cells is not None
         cells, time_us = zones.cells, zones.time_us
         changed = cells != self._cells
@@ -144,7 +136,6 @@ class CellHistory:
         self._cells = cells.copy()
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
-        """New suspicions."""
         yield from self._unchanged(time_us)
         if time_us - self._count_from_us >= SECOND_US:
             yield from self._fluttering(time_us)
@@ -168,7 +159,8 @@ class CellHistory:
                 yield self._told(group, few, since_us, others, time_us)
 
     def _alone(self, group: np.ndarray, time_us: int) -> bool:
-        """Whether nothing is, or was recently, pressed beside the group: else it may be the rest of a contact."""
+        """Whether nothing is, or was recently, pressed beside the group; otherwise the group may belong to a
+        contact."""
         beside = ~away_from(places(group), 1, self._sheet) & ~group
         quiet_us = time_us - self._limits.stuck_us // QUIET
         return not (beside & (self._cells | (self._changed_us > quiet_us))).any()
@@ -184,7 +176,6 @@ class CellHistory:
         return Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _middle(self, group: np.ndarray) -> str:
-        """Row and column of the barycenter; for a group around a closed sheet the row alone."""
         if self._sheet.closed:
             records = around.label(group, 8)[1]
             area, x, y = around.flat(records, self._sheet.columns)[0].tolist()
@@ -209,19 +200,17 @@ class CellHistory:
 
 
 Record = tuple[int, int, int]
-"""Area and sums of a zone, or area and barycenter, as sent."""
+"""Area and sums of a zone, or area and barycenter."""
 
 Key = tuple[int, int, int, str]
-"""The record with :attr:`Zone.winding`, with which a zone has no x."""
 
 _AROUND = {"ring": "a ring around the sheet", "wound": "wound around the sheet"}
 
 
 class ZoneHistory:
-    """Zones over time. A zone with an unchanged record is the same zone."""
+    """Zones over time; an unchanged record is the same zone."""
 
     def __init__(self, first: Zones, limits: Limits, present: np.ndarray):
-        """``present``: see :class:`CellHistory`."""
         self._limits = limits
         self._present = present
         self._sheet = first.sheet
@@ -232,14 +221,13 @@ class ZoneHistory:
 
     @property
     def stuck(self) -> set[Cell]:
-        """Cells reported as stuck, where known exactly, without change since."""
+        """Cells reported as stuck, if known exactly, that have not changed since."""
         return {cell for cells in self._told.values() for cell in cells}
 
     flutters: frozenset[Cell] = frozenset()
     """Always empty: zones do not show which cells change."""
 
     def take(self, zones: Zones) -> None:
-        """Add a frame."""
         keys, time_us = _keys(zones), zones.time_us
         if keys == self._since_us.keys():
             return
@@ -252,7 +240,6 @@ class ZoneHistory:
         self._told = {key: cells for key, cells in self._told.items() if key in keys or self._may_have_joined(key)}
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
-        """New suspicions."""
         for key, since_us in self._since_us.items():
             if key in self._told or since_us > time_us - self._limits.stuck_us:
                 continue
@@ -269,7 +256,7 @@ class ZoneHistory:
             yield Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _may_have_joined(self, gone: Key) -> bool:
-        """Whether a zone is near enough to be merged into this one."""
+        """Whether a vanished zone is near enough to a present one to have merged into it."""
         middles = self._middles(gone)
         for key in self._since_us:
             away = away_from(middles, reach_of(gone[0]) + reach_of(key[0]), self._sheet)
@@ -287,18 +274,16 @@ class ZoneHistory:
         return f'a zone of {key[0]} cells at {where} (report = "cells" would tell which) pressed'
 
     def _middles(self, key: Key) -> list[Cell]:
-        """Possible cells of the barycenter: all columns if it has no x."""
+        """Possible cells of the barycenter: all columns if the zone has no x."""
         row, column = self._cell(key)
         return [(row, each) for each in range(self._sheet.columns)] if key[3] else [(row, column)]
 
     def _cell(self, key: Key) -> Cell:
-        """The cell of the barycenter; without an x only the row counts."""
         x, y = self._place(key)
         column = round(x) % self._sheet.columns if self._sheet.closed else min(round(x), self._sheet.columns - 1)
         return min(round(y), self._sheet.rows - 1), column
 
     def _place(self, key: Key) -> tuple[float, float]:
-        """x and y in cells."""
         area, x, y, _ = key
         scale = (1 << self._sheet.barycenter_bits) if self._sheet.report == "barycenter" else area
         return x / scale, y / scale
@@ -322,13 +307,12 @@ def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
 
 
 def _keys(zones: Zones) -> set[Key]:
-    """Keys of zones with a place, which ``mismatch`` frames may lack."""
+    """Keys of zones with cells; a ``mismatch`` frame may have zones without."""
     windings = zones.windings or [""] * len(zones)
     return {(area, x, y, winding) for (area, x, y), winding in zip(zones.records.tolist(), windings) if area}
 
 
 LOOKS = 100
-"""Evaluations within the time after which a switch is stuck; in between frames are only recorded."""
 
 
 class Watch:
@@ -339,13 +323,10 @@ class Watch:
     ...     watch.update(board.next())
     ()
 
-    It reads no port and waits for nothing, and its time is the frames' time.
-
-    A cell, or a zone if the board sends zones, is suspected once it has stayed pressed without a change for ``stuck_s``
-    seconds while at least ``others`` cells elsewhere came and went since its last change. If nothing else changes, the
-    watch says nothing: an arm may rest on a table. A cell is loose if it changes more than ``flutter_hz`` times per
-    second; changes within 10 ms count once, because a switch that bounces is not loose. Cells of ``skin.mask`` are left
-    out.
+    A cell, or a zone if the board sends zones, is suspected once it has been pressed without a change for ``stuck_s``
+    seconds of the frames' time while at least ``others`` cells elsewhere came and went. Without changes elsewhere
+    nothing is suspected: an arm may rest on a table. A cell is loose if it changes more than ``flutter_hz`` times per
+    second; changes within 10 ms count once. Cells of ``skin.mask`` are left out.
 
     Raises ValueError for limits that are not positive, and :class:`SkinMismatch` for frames of another Skin's sheet.
     """
@@ -365,8 +346,8 @@ class Watch:
         self._last_us = self._look_us = -1
 
     def update(self, zones: Zones) -> tuple[Suspicion, ...]:
-        """Add the next frame; returns new suspicions, each once. A board that restarts, or has another sheet, begins a
-        new history."""
+        """Add the next frame; returns new suspicions, each once. A restarted board, or another sheet, begins a new
+        history."""
         time_us = zones.time_us
         if zones.sheet != self._sheet:
             self._meet(zones.sheet)
@@ -405,13 +386,12 @@ class Watch:
 
     @property
     def never(self) -> tuple[Cell, ...]:
-        """(row, column) of switches that never read pressed: untouched and dead ones. () if the board sends no
-        cells."""
+        """(row, column) of switches that never read pressed, untouched or dead; () if the board sends no cells."""
         return () if self.seen is None else places(self._present & ~self._seen)
 
     @property
     def stuck(self) -> tuple[Cell, ...]:
-        """(row, column) of switches reported as ``stuck``, without change since."""
+        """(row, column) of switches reported as ``stuck`` that have not changed since."""
         return () if self._sheet is None else tuple(sorted(self._history.stuck))
 
     @property
@@ -421,7 +401,7 @@ class Watch:
 
     @property
     def mask(self) -> tuple[Cell, ...]:
-        """The Skin's mask with the stuck switches added, for ``skin.replace(mask=watch.mask)``."""
+        """The Skin's mask with the stuck switches, for ``skin.replace(mask=watch.mask)``."""
         return tuple(sorted(self._mask.union(self.stuck)))
 
     @property

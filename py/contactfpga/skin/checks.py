@@ -32,18 +32,14 @@ _REGISTERED: dict[str, Callable[[object], Choice]] = {
 
 
 def check_types(skin: Skin) -> dict[str, Any]:
-    """Check every field against the type that the class declares; returns choices, integers, lengths and times in their
-    final types. Lists are left to the checks of what they hold.
-
-    Equal Skins have one fingerprint, so 8.0 is no 8. An integer of numpy is accepted, and kept as Python's.
-    """
+    """Check every field's type; returns the values in their final types: Python's integers, not numpy's, and 8.0 is no
+    8."""
     _check_name(skin.name)
     return {name: check(name, getattr(skin, name)) for name, check in _type_checks(dataclasses.fields(skin))}
 
 
 @functools.cache
 def _type_checks(fields: tuple[dataclasses.Field[Any], ...]) -> list[tuple[str, Callable[[str, Any], Any]]]:
-    """The names of fields with the checks of their types, in the order in which they are refused."""
     types = {field.name: field.type for field in fields}
     types["connectivity"] = Literal[4, 8]  # int in the class, as callers compute it
     return [
@@ -106,7 +102,7 @@ def _check_name(name: object) -> None:
 
 
 def check_sheet(skin: Skin) -> dict[str, Any]:
-    """Check sheet, wiring and scan; returns the sorted mask, and the orders of the lines as tuples."""
+    """Check sheet, wiring and scan; returns the sorted mask, and the line orders as tuples."""
     for name in ("rows", "columns"):
         _within(name, getattr(skin, name), 1, limits.MAX_LINES)
     for name in ("pitch_x_mm", "pitch_y_mm"):
@@ -194,7 +190,6 @@ def _check_precharge(skin: Skin) -> None:
 
 
 def _check_ghosts(skin: Skin, mask: Mask) -> None:
-    """Check that without diodes ghosts remain distinguishable."""
     if not skin.ghosts:
         return
     wanted: dict[str, Any] = {"scan": "raster", "row_drive": "direct"}
@@ -215,7 +210,6 @@ def _check_ghosts(skin: Skin, mask: Mask) -> None:
 
 
 def check_link(skin: Skin) -> None:
-    """Check clock, baud rate and report."""
     _within("barycenter_bits", skin.barycenter_bits, 0, limits.MAX_BARYCENTER_BITS)
     if skin.report != "barycenter":
         _left_out(skin, "barycenter_bits", "set report = 'barycenter'")
@@ -235,7 +229,7 @@ def check_link(skin: Skin) -> None:
 
 
 def check_timing(skin: Skin) -> None:
-    """Check that a row's processing ends before the next, with the Skin's zone capacity."""
+    """Check times, zone capacity, and that each row is processed before the next."""
     assert skin.zone_capacity is not None
     _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
     for name in ("settle_us", "release_us", "precharge_us", "project_us"):
@@ -276,7 +270,6 @@ def _check_keep_alive(skin: Skin, derived: Derived) -> None:
 
 
 def _left_out(skin: Skin, name: str, instead: str) -> None:
-    """Check that a field that nothing uses has its default."""
     if (value := getattr(skin, name)) != getattr(type(skin), name):
         raise SkinError(f"{name} is {shown(value)}; leave it out, or {instead}")
 
@@ -287,7 +280,7 @@ def _within(name: str, value: float, low: float, high: float, unit: str = "") ->
 
 
 _PITCH_TOLERANCE = 1e-3
-"""Allowed relative error of a pitch against the radius."""
+"""Allowed relative deviation of a pitch from the radius."""
 
 
 def check_surface(skin: Skin) -> dict[str, float]:
@@ -306,7 +299,7 @@ def check_surface(skin: Skin) -> dict[str, float]:
 
 
 def _check_gap(skin: Skin, around_mm: float) -> dict[str, float]:
-    """Check that the ends of the sheet do not meet."""
+    """Check that the ends of an open sheet do not meet."""
     if skin.columns * skin.pitch_x_mm >= around_mm:
         most = math.ceil(around_mm / skin.pitch_x_mm) - 1
         advice = f"use at most {most} columns" if most else "use a larger radius_mm or a smaller pitch_x_mm"

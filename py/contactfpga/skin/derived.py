@@ -1,4 +1,4 @@
-"""Quantities derived from a Skin or its sheet: widths in bits, sizes in bytes, clocks and depths."""
+"""Quantities derived from a Skin or its sheet."""
 
 from __future__ import annotations
 
@@ -22,28 +22,27 @@ CHECK_BYTES = 3
 TIME_BITS = 24
 SEQUENCE_BITS = 8
 HEARD_BITS = 3
-"""Bits of a request's number in each frame."""
+"""Bits of a request's number that each frame repeats."""
 
 MIN_OVERWRITTEN_BITS = 4
 
 HELLO_PERIOD_US = 500_000
-"""Interval of hellos, short enough to wait for a frame and still have one every second."""
+"""Interval of hellos; one still comes every second if each waits for a frame."""
 
 HELLO_BIT = 19
-"""Bit of the us clock whose toggles, every 0.52 s, make a hello of a scan that waits due."""
+"""Bit of the us clock whose toggles, every 0.52 s, make a hello of a waiting scan due."""
 KEEP_ALIVE_BIT = 10
 """Bit of the us clock whose toggles, every 1.024 ms, count a keep-alive."""
 
 EPOCH_BITS = 22
-"""Bits of an epoch: the board counts periods of 2^22 us beside a frame's time, less than half of its range."""
+"""Log2 of an epoch in us, below half of a frame time's range."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
-"""Largest value of the stuck-line counter."""
 
 SELF_TEST = 1
 """Number of the command that tests all lines (docs/protocol.md)."""
 SAMPLE_AT = 2
-"""Number of the command that samples the columns at another clock of a row."""
+"""Number of the command that sets the clock of a row at which the columns are sampled."""
 
 
 class Widths:
@@ -82,11 +81,11 @@ class Widths:
 
     @functools.cached_property
     def record_bits(self) -> tuple[int, ...]:
-        """Bits of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter; for a sheet whose ends
-        meet, then the cells past the seam.
+        """Bits of a zone's fields on the wire: area, and sums or barycenter; on a sheet whose ends meet, also cells
+        past the seam.
 
-        With a barycenter the area is never 0. So if the sheet's cells are a power of two, all of them are sent as 0,
-        which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
+        Divided areas are never 0, so an area of all cells is sent as 0; if the cells are a power of two, this saves a
+        bit.
         """
         if not self.report.divided:
             past = (self.area_bits,) if self.sheet.closed else ()
@@ -99,7 +98,6 @@ class Widths:
 
     @functools.cached_property
     def record_bytes(self) -> int:
-        """Bytes of one zone on the wire."""
         return math.ceil(sum(self.record_bits) / 8)
 
     @functools.cached_property
@@ -109,12 +107,12 @@ class Widths:
 
     @functools.cached_property
     def trailer_bytes(self) -> int:
-        """Bytes of a frame's end, including its kind byte."""
+        """Bytes of a frame's trailer, including its kind byte."""
         return math.ceil((self._counted_bits + MIN_OVERWRITTEN_BITS) / 8) + 1
 
     @functools.cached_property
     def overwritten_bits(self) -> int:
-        """Bits that the other fields leave in the trailer, at least four."""
+        """Bits of the trailer's count of overwritten frames, at least four."""
         return 8 * (self.trailer_bytes - 1) - self._counted_bits
 
     @property
@@ -123,7 +121,7 @@ class Widths:
 
     @functools.cached_property
     def item_bytes(self) -> int:
-        """Bytes of one item of a frame: a zone or a bitmap row."""
+        """Bytes of one zone, or of one bitmap row."""
         return self.record_bytes if self.report.zones else self.bitmap_row_bytes
 
     @functools.cached_property
@@ -132,13 +130,12 @@ class Widths:
 
     @functools.cached_property
     def max_stored_bytes(self) -> int:
-        """The longest stored frame: items and trailer, stuffed."""
+        """Bytes of the longest stuffed frame without check bytes."""
         plain = self.max_items * self.item_bytes + self.trailer_bytes
         return plain + math.ceil(plain / 254)
 
     @functools.cached_property
     def max_frame_bytes(self) -> int:
-        """The longest frame on the wire, with check bytes and delimiter."""
         return self.max_stored_bytes + CHECK_BYTES + 1
 
 
@@ -161,21 +158,20 @@ LONGEST_PACKET = Widths(
 
 
 SAMPLED_BIT_CLOCKS = 4
-"""Clocks per bit from which a receiver can sample near the middle of each bit."""
+"""Least clocks per bit with which a receiver can sample near the middle of each bit."""
 
 
 def bit_clocks(clock_hz: int, baud: int) -> int:
-    """Clocks of the gateware per bit on the wire."""
     return round(clock_hz / baud)
 
 
 def pulsed(clock_hz: int, baud: int) -> bool:
-    """Whether the board needs pulses instead of bytes (docs/protocol.md): it has too few clocks per bit to sample."""
+    """Whether the board has too few clocks per bit to sample, and needs requests as pulses (docs/protocol.md)."""
     return bit_clocks(clock_hz, baud) < SAMPLED_BIT_CLOCKS
 
 
 class Derived(Widths):
-    """Clocks, widths and depths of a :class:`~contactfpga.Skin`, its ``derived``."""
+    """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
 
     def __init__(self, skin: Skin):
         super().__init__(skin.sheet)
@@ -195,14 +191,12 @@ class Derived(Widths):
 
     @property
     def commands(self) -> tuple[int, ...]:
-        """Numbers of the board's commands."""
         self_test = (SELF_TEST,) if self.skin.self_test else ()
         moves = self.scan.moves_sample and not self.report.zones
         return self_test + ((SAMPLE_AT,) if moves else ()) + self.units.commands
 
     @functools.cached_property
     def units(self) -> Units:
-        """Quantities of its pressure units."""
         return Units(self.skin)
 
     # ---- clocks in which lines are driven and read, and those of a bit on the link
@@ -212,26 +206,25 @@ class Derived(Widths):
         return self.skin.clock_hz // 1_000_000
 
     def clocks(self, us: float) -> int:
-        """Clocks that last at least this many microseconds."""
+        """The least clocks that last this many microseconds."""
         return whole(us * self.clocks_per_us)
 
     @property
     def settle_clocks(self) -> int:
-        """Time for which a row is driven: as requested, but at least until the previous slot's columns and the next row
-        are shifted."""
+        """Clocks for which a row is driven: at least until the previous slot's columns and the next row are shifted."""
         row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
         return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
 
     @property
     def first_sample_clocks(self) -> int:
-        """The least value of the command "sample at": with shift registers the previous slot's columns are complete by
-        then."""
+        """Least value of the command "sample at": shift registers are read by then."""
         return max(2, self.column_load_clocks + self.column_shift_clocks)
 
     @property
     def release_clocks(self) -> int:
-        """Time without a driven row: as requested, but at least until the columns are shifted, and the next row is
-        latched, or chosen and then shifted."""
+        """Clocks without a driven row: at least until the columns are shifted, and the next row is chosen, shifted and
+        latched.
+        """
         column = self.column_load_clocks + self.column_shift_clocks
         row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
         precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
@@ -239,12 +232,12 @@ class Derived(Widths):
 
     @property
     def precharge_clocks(self) -> int:
-        """Least time for which columns are driven before a row; 0: never."""
+        """Least clocks for which columns are driven before a row; 0: never."""
         return self.clocks(self.skin.precharge_us)
 
     @property
     def project_clocks(self) -> int:
-        """Time for which all columns are driven and rows released before these are sampled."""
+        """Clocks for which all columns are driven, and rows released, before the rows are sampled."""
         return self.clocks(self.skin.project_us)
 
     @property
@@ -253,27 +246,27 @@ class Derived(Widths):
 
     @property
     def shift_clocks(self) -> int:
-        """A bit on a chain of shift registers; at least two, for both levels of its clock."""
+        """Clocks per bit of a shift-register chain; at least two, for both levels of the shift clock."""
         return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
 
     @property
     def row_latch_clocks(self) -> int:
-        """The pulse that latches a shifted row pattern; 0 with direct rows."""
+        """Clocks of the pulse that latches a row pattern; 0 with direct rows."""
         return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
 
     @property
     def row_shift_clocks(self) -> int:
-        """From the order to shift a row pattern until it can be driven; 0 with direct rows."""
+        """Clocks from the order to shift a row pattern until its drive; 0 with direct rows."""
         return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
 
     @property
     def column_load_clocks(self) -> int:
-        """The pulse that loads all columns, sampled in its last clock; 0 with direct columns."""
+        """Clocks of the pulse that loads all columns in its last clock; 0 with direct columns."""
         return self.shift_clocks if self.skin.column_read == "74hc165" else 0
 
     @property
     def column_shift_clocks(self) -> int:
-        """Delay of a sample's columns against direct ones; 0 with direct columns."""
+        """Latency of a sample's columns against direct ones in clocks."""
         return self.column_chain_lines * self.column_load_clocks
 
     @property
@@ -283,7 +276,7 @@ class Derived(Widths):
 
     @property
     def choice_clocks(self) -> int:
-        """From a strobe until the scan can drive its next rows; 0 if it knows them beforehand."""
+        """Clocks from a strobe until the scan can drive its next rows; 0 if it knows them beforehand."""
         return self.scan.choice_clocks(self)
 
     @property
@@ -296,7 +289,7 @@ class Derived(Widths):
 
     @property
     def frame_clocks(self) -> int:
-        """One scan period: every row once, including a guard row. Frames of an adaptive scan vary."""
+        """Clocks in which every row, and a guard row, is driven once. Frames of an adaptive scan vary."""
         return self.row_clocks * self.skin.row_lines
 
     @property
@@ -305,14 +298,12 @@ class Derived(Widths):
 
     @property
     def pulsed(self) -> bool:
-        """Whether requests come as pulses: a bit is too short to sample."""
         return pulsed(self.skin.clock_hz, self.skin.baud)
 
     # ---- times, in clocks unless named otherwise
 
     @property
     def max_frame_slots(self) -> int:
-        """The most row times of a frame."""
         return self.scan.max_frame_slots(self)
 
     @property
@@ -322,27 +313,26 @@ class Derived(Widths):
 
     @property
     def skips(self) -> bool:
-        """Whether undriven rows are not passed on, except an empty one where zones must end."""
+        """Whether undriven rows are not passed on, except an empty row where zones must end."""
         return self.scan.waits and self.report.zones
 
     @property
     def min_row_clocks(self) -> int:
-        """The least clocks of a row, for debounce and labeller to finish the one before it, end mark included; and for
-        a frame to last until the one before it is packed, as the scanner's tag is kept no longer."""
+        """Least clocks of a row: debounce and labeller finish the row before, and a frame outlasts the packing of the
+        frame before."""
         return self.scan.min_row_clocks(self)
 
     @property
     def debounce_clocks(self) -> int:
-        """Delay of a row in the debounce."""
         return self.skin.columns + 3 if self.debounced else 0
 
     @property
     def packed_clocks(self) -> int:
-        """From the offer of a frame's last row to the end of its packing, without the bytes packed meanwhile."""
+        """Clocks from the offer of a frame's last row to the end of its packing, besides bytes packed meanwhile."""
         return 1 + self.debounce_clocks + self.label_clocks + 2 + 4
 
     def items_clocks(self, items: int) -> int:
-        """For a frame's items and trailer: a byte per clock, or the longer division of items."""
+        """Clocks to pack items and trailer: one per byte, or the longer division of items."""
         plain = items * self.item_bytes + self.trailer_bytes
         stuffing = math.ceil(plain / 254)
         if not self.report.divided:
@@ -351,7 +341,7 @@ class Derived(Widths):
 
     @property
     def keep_alive_frames(self) -> int:
-        """Scans, or for frames of varying length row times, within which a frame is sent."""
+        """Scans within which a frame is sent; row times for frames of varying length."""
         clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
         if self.scan.even:
             return math.floor(clocks / self.frame_clocks + 1e-9)
@@ -359,13 +349,11 @@ class Derived(Widths):
 
     @property
     def keep_alive_toggles(self) -> int:
-        """Toggles of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame, which uses the
-        remaining time."""
+        """Toggles of ``KEEP_ALIVE_BIT`` after which a waiting scan sends a frame."""
         return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_toggles
 
     @property
     def min_keep_alive_ms(self) -> float:
-        """Least keep-alive time of a scan that waits."""
         return (self._spare_toggles + 1) * (1 << KEEP_ALIVE_BIT) / 1000
 
     @property
@@ -374,28 +362,25 @@ class Derived(Widths):
 
     @property
     def hello_frames(self) -> int:
-        """Scans, or for frames of varying length row times, after which a hello is due."""
+        """Scans after which a hello is due; row times for frames of varying length."""
         periods = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
         return periods if self.scan.even else periods * self.skin.rows
 
     @property
     def press_scans(self) -> int:
-        """Scan periods that last at least debounce_press_us."""
         return whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def release_scans(self) -> int:
-        """Scan periods that last at least debounce_release_us."""
         return whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def press_ticks(self) -> int:
-        """Ticks after which a press has lasted: row times, or us of a scan that waits; docs/timing.md."""
+        """Ticks of ``debounce_press_us``: row times, or us with a waiting scan (docs/timing.md)."""
         return self._debounce_ticks(self.skin.debounce_press_us, self.press_scans)
 
     @property
     def release_ticks(self) -> int:
-        """Ticks after which a release has lasted: row times, or us of a scan that waits."""
         return self._debounce_ticks(self.skin.debounce_release_us, self.release_scans)
 
     def _debounce_ticks(self, us: float, scans: int) -> int:
@@ -407,7 +392,7 @@ class Derived(Widths):
 
     @functools.cached_property
     def tick_bits(self) -> int:
-        """Bits of a counter for a debounce time and two frames more."""
+        """Bits of a counter of ticks for a debounce time and two frames."""
         longest = max(self.press_ticks, self.release_ticks)
         if self.scan.waits:
             frame = self.max_frame_clocks + self.packed_clocks + self.items_clocks(self.max_items)
@@ -421,7 +406,7 @@ class Derived(Widths):
 
     @property
     def quotient_bits(self) -> int:
-        """Bits of a barycenter before rounding: one more fraction bit. One is computed per clock."""
+        """Bits of a barycenter before rounding, with one more fraction bit; one is computed per clock."""
         return self.cell_bits + self.skin.barycenter_bits + 1
 
     @property
@@ -444,23 +429,22 @@ class Derived(Widths):
 
     @property
     def label_row_clocks(self) -> int:
-        """The most clocks from a row to the next one that the labeller, or its replacement, can take."""
+        """The most clocks that the labeller, or its replacement, needs from a row to the next."""
         return self.labeller.row_clocks(self) if self.report.zones else 1
 
     @property
     def label_empty_row_clocks(self) -> int:
-        """The most clocks from an empty row below an empty row to the next one."""
+        """The most clocks that the labeller needs from an empty row below an empty row to the next."""
         return self.labeller.empty_row_clocks(self) if self.report.zones else 1
 
     @functools.cached_property
     def backlog(self) -> int:
-        """Capacity of the queue before the packer.
+        """Items that the queue before the packer holds.
 
-        Two rows close at most ``open_zones`` zones, which may come in one burst; if packing them is slower than two
-        rows, the rest accumulates, over at most the capacity of two frames. Bitmap rows are packed before the next one.
-        An adaptive scan omits empty rows, so that every row may close as many zones, and bitmap rows of two frames may
-        wait. A scan that waits has at most one frame under way, and its first item is taken before its end mark; a
-        power of two needs less logic.
+        Two rows close at most ``open_zones`` zones, in one burst; if packing takes longer than two rows, the rest
+        accumulates over at most two frames. An adaptive scan omits empty rows, so every row may close as many zones,
+        and bitmap rows of two frames may wait. A waiting scan has one frame under way; its depth is a power of two,
+        which needs less logic.
         """
         if self.scan.waits:
             return max(8, 1 << (self.max_items - 1).bit_length())
@@ -472,5 +456,5 @@ class Derived(Widths):
 
 
 def whole(value: float) -> int:
-    """The next integer upward, ignoring float rounding."""
+    """The next integer upward; ignores float rounding below 1e-9."""
     return math.ceil(value - 1e-9)

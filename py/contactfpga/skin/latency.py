@@ -1,4 +1,4 @@
-"""Time of a touch from the switch to the last byte on the wire."""
+"""Latency of a touch, from the switch to the last byte on the wire."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.skin.skin import Skin
 
 AROUND_S = 3e-6
-"""Sample, labeller, packer and stop bit, in s."""
+"""Time of sample, labeller, packer and stop bit in s."""
 
 
 def latency_s(skin: Skin) -> float:
-    """A bound in s for one zone: two scans, as a touch may just have missed its row, the bytes, and 3 us.
+    """Upper bound in s on the latency of one zone: two scans, as a touch may just have missed its row, the bytes, and 3
+    us.
 
     Frames count at their longest. Debounce adds the press time, a labeller with a cell per clock its clocks after the
     last row, and a dividing board those of a division.

@@ -1,4 +1,4 @@
-"""Limits of a :class:`~contactfpga.Skin` in numbers."""
+"""Limits of a :class:`~contactfpga.Skin`."""
 
 MAX_LINES = 64
 MIN_AROUND = 3

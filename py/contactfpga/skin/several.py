@@ -1,4 +1,4 @@
-"""Several sheets on one FPGA: their Skins, and what these must share."""
+"""The Skins of several sheets on one FPGA."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from contactfpga.inputs.values import shown
 from contactfpga.skin.skin import Skin
 
 MOST_SHEETS = 16
-"""Largest number of sheets, by the packets' numbering."""
+"""Largest number of sheets that packets can number."""
 
 _ALONE = ("guard", "units", "alive", "dual")
-"""Fields that only a board's single sheet can have."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Several:
-    """The sheets of one FPGA, each on shift registers of its own; they share its clock, its UART and its contact pin.
+    """The sheets of one FPGA, each on shift registers of its own; they share clock, UART and contact pin.
 
-    Their numbers are their indexes in ``skins``. Raises :class:`SkinError` for Skins that do not fit together.
+    A sheet's number is its index in ``skins``. Raises :class:`SkinError` for Skins that do not fit together.
     """
 
     skins: tuple[Skin, ...]
@@ -36,8 +35,9 @@ class Several:
 
     @classmethod
     def load(cls, path: str | Path, trust: bool = False) -> Several:
-        """Read a TOML file whose only key is ``sheets``, a list of Skin files with paths relative to its folder.
-        ``trust`` as for :meth:`Skin.load`."""
+        """Read a TOML file whose only key is ``sheets``, a list of Skin files relative to its folder; ``trust`` as in
+        :meth:`Skin.load`.
+        """
         values = tomlfile.load(path, SkinError)
         if set(values) != {"sheets"}:
             unknown = sorted(set(values) - {"sheets"})
@@ -84,5 +84,5 @@ class Several:
 
 
 def sheets_of(skins: Sequence[Skin]) -> str:
-    """The sizes of sheets in words."""
+    """Sizes of sheets in words: ``8x8, 16x4``."""
     return ", ".join(f"{skin.rows}x{skin.columns}" for skin in skins)

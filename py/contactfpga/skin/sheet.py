@@ -1,4 +1,4 @@
-"""The part of a Skin that reading its board's frames needs; the hello contains it."""
+"""The part of a Skin that is needed to read a board's frames; hellos carry it."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ class Sheet:
     connectivity: int
     report: str
     barycenter_bits: int
-    """0 with another report than ``barycenter``."""
+    """Fraction bits of a barycenter; 0 with other reports."""
     zone_capacity: int
     pitch_x_mm: float
     pitch_y_mm: float
     radius_mm: float | None
-    """None on a plane."""
+    """Radius of a sheet on a cylinder; None on a plane."""
     closed: bool = False
     """Whether the last column is a neighbor of the first."""
     ghosts: bool
-    """The sheet has no diodes: pressed switches can make others read pressed."""
+    """Whether the sheet lacks diodes, so that pressed switches can make others read pressed."""
 
     @property
     def around_mm(self) -> float | None:
-        """Circumference of a sheet whose ends meet; None for any other."""
+        """Circumference in mm of a sheet whose ends meet; otherwise None."""
         return self.columns * self.pitch_x_mm if self.closed else None
 
     def max_zones(self) -> int:
-        """The most zones a frame of this sheet can hold."""
+        """The most zones in a frame."""
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def check(self) -> None:
-        """Raises ValueError if frames of such a sheet would be unreadable."""
+        """Raises ValueError for a sheet whose frames would be unreadable."""
         lengths = {"pitch_x_mm": self.pitch_x_mm, "pitch_y_mm": self.pitch_y_mm}
         if self.radius_mm is not None:
             lengths["radius_mm"] = self.radius_mm
@@ -69,8 +69,8 @@ class Sheet:
 def max_zones(rows: int, columns: int, connectivity: int, closed: bool = False) -> int:
     """The most zones of a sheet.
 
-    With 8-connectivity every 2x2 block holds cells of at most one zone; with 4-connectivity the checkerboard is the
-    worst. Around a cylinder a row holds no more runs than half its columns.
+    With 8-connectivity every 2x2 block holds cells of at most one zone; with 4-connectivity the checkerboard has most.
+    Around a cylinder a row has at most half as many runs as columns.
     """
     if closed:
         return (math.ceil(rows / 2) if connectivity == 8 else rows) * (columns // 2)

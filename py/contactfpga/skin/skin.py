@@ -53,34 +53,35 @@ class Skin:
     radius_mm: float | None = None
     """Radius of the sheet on a cylinder in mm; None on a plane."""
     closed: bool = False
-    """The last column is a neighbor of the first, all the way round the cylinder. ``pitch_x_mm`` then follows from the
-    radius."""
+    """Whether the sheet's ends meet: the last column is a neighbor of the first, and ``pitch_x_mm`` follows from the
+    radius.
+    """
     mask: tuple[tuple[int, int], ...] = ()
-    """(row, column) of switches that are absent or broken: never pressed, never stuck."""
+    """(row, column) of absent or broken switches, which are never pressed and never stuck."""
     guard: bool = False
-    """One more row and column whose crossings are always closed, so that broken lines are reported by name
-    (docs/faults.md)."""
+    """Whether one more row and column have crossings that are always closed, to name broken lines (docs/faults.md)."""
     row_order: tuple[int, ...] = ()
     """The line that each row is soldered to, counted from 0 (docs/faults.md). (): row i is on line i."""
     column_order: tuple[int, ...] = ()
-    """The same for columns."""
+    """The line that each column is soldered to, as in ``row_order``."""
     connectivity: int = 8
     """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
 
     diodes: Literal["col2row", "row2col", "none"] = "col2row"
-    """``col2row``: the selected row is low, columns are pulled up. ``row2col``: the opposite. ``none``: as ``col2row``,
-    but without diodes; zones that ghosts may have made are flagged."""
+    """``col2row``: the selected row is low, columns are pulled up. ``row2col``: the opposite. ``none``: as ``col2row``
+    without diodes; zones that may be ghosts are flagged.
+    """
     scan: ScanName | Scan = "raster"
     """``raster`` drives one row after the other; ``adaptive`` drives untouched rows together; ``reversal`` drives all
     columns and reads the rows, and then drives only touched rows."""
     settle_us: float = 5.0
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = 1.0
-    """Time without a driven row before the next one, in us; with ``precharge_us`` at least that and two clocks."""
+    """Time without a driven row before the next one, in us; with precharge at least ``precharge_us`` and two clocks."""
     precharge_us: float = 0.0
-    """How long the board drives the columns to the released level before it drives a row, in us; 0: not at all."""
+    """Time for which the board drives the columns to the released level before it drives a row, in us; 0: never."""
     project_us: float = 1.0
-    """How long ``scan = "reversal"`` drives all columns before it reads the rows, in us."""
+    """Time for which ``scan = "reversal"`` drives all columns before it reads the rows, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin per row; ``74hc595``: rows on shift registers."""
     row_chains: int = 1
@@ -88,51 +89,57 @@ class Skin:
     column_read: Literal["direct", "74hc165"] = "direct"
     """``direct``: a pin per column; ``74hc165``: columns on shift registers."""
     column_chains: int = 1
-    """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
+    """Chains of 74HC165 that are shifted at once; columns are spread over them as in ``row_chains``."""
     shift_hz: int = 8_000_000
-    """The shift clock in Hz at most; it is clock_hz divided by a whole number, at least 2."""
+    """Highest shift clock in Hz; the actual one is clock_hz divided by a whole number, at least 2."""
     debounce: DebounceName | Debounce = "none"
-    """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as QMK names them."""
+    """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as in the keyboard firmware QMK."""
     debounce_press_us: float = 5000.0
-    """In us. With ``sym_defer_pk``, how long a press must last to count; with ``asym_eager_defer_pk``, how long a press
-    that has counted holds."""
+    """In us. With ``sym_defer_pk``, the least duration of a press that counts; with ``asym_eager_defer_pk``, the time
+    for which a press that has counted holds.
+    """
     debounce_release_us: float = 5000.0
-    """How long a release must last to count, in us."""
+    """Least duration of a release that counts, in us."""
 
     labeller: LabellerName | Labeller = "run"
-    """How zones are found. ``run``, the fastest, and ``serial``, smaller, are exact. ``projection`` uses the shadows on
-    the two axes and is wrong where these cross. ``single`` joins all pressed cells."""
+    """Method that finds zones: ``run``, the fastest, and ``serial``, smaller, are exact; ``projection`` uses the
+    shadows on the two axes and is wrong where these cross; ``single`` joins all pressed cells.
+    """
     report: ReportName = "moments"
-    """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: the
-    pressed cells as a bitmap."""
+    """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: a bitmap
+    of the pressed cells.
+    """
     barycenter_bits: int = 4
-    """With ``report = "barycenter"``, x and y are rounded to 1 / 2^barycenter_bits of a cell, halves upward."""
+    """Fraction bits of x and y with ``report = "barycenter"``, in cells; halves are rounded upward."""
     send: Literal["always", "on_change"] = "always"
-    """``always``: every frame is sent. ``on_change``: frames whose cells differ from the last one, and keep-alives."""
+    """``always``: every frame is sent. ``on_change``: only keep-alives, and frames whose cells differ from the last
+    one.
+    """
     keep_alive_ms: float = 100.0
     """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
     zone_capacity: int | None = None
-    """Zones that a frame can carry. By default the most that can occur up to 32x32, at most 256 above that, and at most
-    64 with ``report = "barycenter"``."""
+    """Most zones that a frame carries. Default: the most that can occur up to 32x32, at most 256 above that, and at
+    most 64 with ``report = "barycenter"``.
+    """
 
     fail_safe: bool = False
-    """``contact`` is high while the board knows of a fault."""
+    """Whether ``contact`` is high while the board knows of a fault."""
     alive: bool = False
-    """A pin changes its level every ms, as long as whole frames without a fault come."""
+    """Whether a pin changes its level every ms as long as whole frames without a fault come."""
     self_test: bool = False
-    """The board tests its lines against each other, at start and when the host asks; needs a scan that reads rows."""
+    """Whether the board tests its lines against each other, at start and on request; needs a scan that reads rows."""
     dual: bool = False
-    """Two copies of the gateware are compared in each clock; if they differ, both restart."""
+    """Whether two copies of the gateware are compared in each clock; if they differ, both restart."""
 
     units: int = 0
-    """Pressure units, read by an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
+    """Number of pressure units on an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
     converter: ConverterName | Converter = "mcp3208"
-    """The converter that reads the pressure units."""
+    """Converter that reads the pressure units."""
     converter_v: float = 3.3
-    """The converter's supply in V, which limits its SPI clock."""
+    """Supply of the converter in V, which limits its SPI clock."""
     unit_sums: tuple[tuple[int, ...], ...] = ()
-    """Up to four weighted sums of the units' deviations from their zeros, with a weight from -127 to 127 for each
-    unit."""
+    """Up to four weighted sums of the units' deviations from their zeros; each has a weight from -127 to 127 per unit.
+    """
 
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
@@ -149,11 +156,12 @@ class Skin:
 
     @classmethod
     def load(cls, path: str | Path, trust: bool = False, usual: Mapping[str, Any] | None = None) -> "Skin":
-        """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
-        ``[circuit]`` are not the Skin's: :func:`contactfpga.design.cover.load_cover` and
-        :func:`contactfpga.design.circuit.load_circuit` read them. A file that names a module, such as
-        ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code.
-        ``usual``: values of fields that the file leaves out, instead of their defaults."""
+        """Read a Skin from a TOML file whose keys are the fields of this class, besides the tables ``[cover]`` and
+        ``[circuit]`` (:func:`contactfpga.design.cover.load_cover`, :func:`contactfpga.design.circuit.load_circuit`).
+
+        ``trust`` allows a file to name a module, such as ``labeller = "module:attribute"``; importing it runs its code.
+        ``usual``: defaults for fields that the file leaves out. Raises :class:`SkinError`, OSError.
+        """
         values = tomlfile.load(path, SkinError)
         with trusted(trust):
             refuse_modules(values, str(path))
@@ -173,8 +181,9 @@ class Skin:
             raise SkinError(f"{path}: {error}") from None
 
     def replace(self, **changes: Any) -> "Skin":
-        """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
-        one whose division is switched on or off."""
+        """A copy with some fields changed, checked again. ``zone_capacity`` returns to its default if the sheet
+        changes, or if ``report = "barycenter"`` is set or left.
+        """
         divides = self.report == "barycenter"
         if {"rows", "columns", "connectivity", "closed"} & set(changes) or divides != (
             changes.get("report", self.report) == "barycenter"
@@ -185,7 +194,7 @@ class Skin:
         return dataclasses.replace(self, **changes)
 
     def to_toml(self) -> str:
-        """The Skin as a TOML file that :meth:`load` reads back."""
+        """TOML text that :meth:`load` reads."""
         lines = []
         for name, value in dataclasses.asdict(self).items():
             if value is not None:
@@ -196,8 +205,7 @@ class Skin:
     def fingerprint(self) -> bytes:
         """Eight bytes that differ between Skins that differ in more than their names.
 
-        They cover the fields that differ from their defaults, so that a new field with a default changes no fingerprint
-        (docs/protocol.md).
+        They hash :attr:`changed`, so that a new field with a default changes no fingerprint (docs/protocol.md).
         """
         return hashlib.sha256(json.dumps(self.changed, sort_keys=True).encode()).digest()[:8]
 
@@ -212,12 +220,12 @@ class Skin:
 
     @property
     def selects_low(self) -> bool:
-        """Whether a selected row, and a pressed column, is low; else both are high."""
+        """Whether selected rows and pressed columns are low; otherwise they are high."""
         return self.diodes != "row2col"
 
     @property
     def reads_rows(self) -> bool:
-        """Whether the board releases the rows and reads them while it drives the columns."""
+        """Whether the scan reads the rows while it drives the columns."""
         return scans.find(self.scan).reads_rows
 
     @property
@@ -232,12 +240,12 @@ class Skin:
 
     @property
     def line_of_row(self) -> tuple[int, ...]:
-        """The line of each row, and finally of the guard row."""
+        """The line of each row; the guard row's comes last."""
         return (*(self.row_order or range(self.rows)), *range(self.rows, self.row_lines))
 
     @property
     def line_of_column(self) -> tuple[int, ...]:
-        """The line of each column, and finally of the guard column."""
+        """The line of each column; the guard column's comes last."""
         return (*(self.column_order or range(self.columns)), *range(self.columns, self.column_lines))
 
     @property
@@ -247,7 +255,7 @@ class Skin:
 
     @property
     def sheet(self) -> Sheet:
-        """The part of the Skin that reading frames needs."""
+        """The part of the Skin that is needed to read its frames."""
         shared = {field.name: getattr(self, field.name) for field in dataclasses.fields(Sheet)}
         return Sheet(**shared | ({} if self.report == "barycenter" else {"barycenter_bits": 0}))
 
@@ -257,11 +265,10 @@ class Skin:
         return Derived(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone, as other processes recompute derived values."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def max_zones(self) -> int:
-        """The most zones in a frame of this sheet; see :meth:`Sheet.max_zones`."""
+        """The most zones in a frame of this sheet."""
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def _keep(self, **values: Any) -> None:
@@ -275,7 +282,6 @@ class Skin:
 
 
 def _suggesting(init: Callable[..., None]) -> Callable[..., None]:
-    """The initializer, which for an unknown field suggests the most similar one."""
     known = [field.name for field in dataclasses.fields(Skin)]
 
     @functools.wraps(init)

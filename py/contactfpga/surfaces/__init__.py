@@ -1,4 +1,4 @@
-"""Places of a sheet on its link: point and outward normal, in mm."""
+"""Surfaces of links: point and outward normal of a place on the sheet, in mm."""
 
 import functools
 
@@ -13,7 +13,7 @@ __all__ = ["Cone", "CylinderSurface", "Mesh", "MirroredSurface", "PlaneSurface",
 
 
 def of(sheet: Sheet) -> PlaneSurface | CylinderSurface:
-    """The surface of a Skin, or of a board's hello."""
+    """The surface of a sheet."""
     return _of(sheet.radius_mm)
 
 

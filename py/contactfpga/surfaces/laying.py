@@ -1,4 +1,4 @@
-"""A sheet laid on a triangle mesh: the place of each cell."""
+"""A sheet laid on a triangle mesh."""
 
 from __future__ import annotations
 
@@ -13,28 +13,24 @@ from contactfpga.surfaces.mesh import Mesh
 from contactfpga.surfaces.shapes import Floats, SurfaceError
 
 FINE = 8
-"""Rays per pitch for measuring arc lengths."""
 CHUNK = 2_000_000
-"""Pairs of ray and triangle per batch."""
 EDGE = 0.8
 """Cosine of the angle from which two triangles form an edge, not a round surface."""
 MAX_AROUND = 20_000_000
-"""Most corners times the triangles around the busiest of them: the size of a table in the library."""
+"""Most entries of the library's table: corners times the most triangles at a corner."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Triangles:
-    """A triangle mesh in mm."""
-
     corners_mm: Floats
     """(n, 3, 3)."""
     normals: Floats
-    """(n, 3, 3): normals at the corners."""
+    """(n, 3, 3) normals at the corners."""
 
     @classmethod
     def load(cls, path: str | Path, scale: float = 1.0) -> Triangles:
-        """A mesh from a file of :data:`mesh_file.SUFFIXES`, whose unit is ``scale`` mm. Raises :class:`SurfaceError`,
-        OSError."""
+        """Read a mesh from a file of :data:`mesh_file.SUFFIXES`, in units of ``scale`` mm. Raises
+        :class:`SurfaceError`, OSError."""
         mesh = mesh_file.read(path, "surface")
         corners = np.asarray(mesh.triangles, float)
         if wrong := int((~np.isfinite(corners)).any(axis=(1, 2)).sum()):
@@ -52,7 +48,7 @@ class Triangles:
         return points, normals
 
     def _hit(self, starts: Floats, ways: Floats) -> tuple[Floats, Floats]:
-        """Hits by Moeller and Trumbore, each ray with each triangle."""
+        """Hits of each ray with each triangle, after Moeller and Trumbore."""
         corner = self.corners_mm[:, 0]
         first, second = self.corners_mm[:, 1] - corner, self.corners_mm[:, 2] - corner
         aside = np.cross(ways[:, None], second[None])
@@ -84,7 +80,7 @@ class Triangles:
 
 
 def _corner_normals(mesh: Any) -> Floats:
-    """(n, 3, 3): area-weighted mean normals of the triangles at each corner on its side of edges."""
+    """(n, 3, 3): area-weighted mean normals of the triangles at each corner on the same side of edges."""
     faces, normals = np.asarray(mesh.faces), np.asarray(mesh.face_normals, float)
     most = int(np.bincount(faces.ravel()).max())
     if most * len(mesh.vertices) > MAX_AROUND:
@@ -105,18 +101,17 @@ def _corner_normals(mesh: Any) -> Floats:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Placement:
-    """The laid sheet, and its own frame's pose in the mesh's."""
+    """A sheet's lines, and the pose of its frame in the mesh's frame."""
 
     rows: int
     columns: int
     pitch_x_mm: float
     pitch_y_mm: float
     rotation: Floats
-    """(3, 3)."""
     origin_mm: Floats
 
     def projected(self, mesh: Triangles) -> Mesh:
-        """The flat sheet projected down, against z, onto the mesh; distances grow on steep parts."""
+        """The flat sheet projected against z onto the mesh; distances grow on steep parts."""
         x, y = np.meshgrid(np.arange(self.columns) * self.pitch_x_mm, np.arange(self.rows) * self.pitch_y_mm)
         flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
         down = -self.rotation[:, 2]
@@ -126,7 +121,7 @@ class Placement:
 
     def unrolled(self, mesh: Triangles, *, closed: bool = False) -> Mesh:
         """The sheet unrolled around z: column 0 goes up along z on the x side, row 0 around from there. Cells are a
-        pitch apart on the mesh along both; a closed sheet's columns share the circumference evenly."""
+        pitch apart on the mesh; columns of a closed sheet share the circumference evenly."""
         heights = self._heights(mesh)
         points, normals = np.empty((2, self.rows, self.columns, 3))
         # An arc is found between rays: fine enough that its chord is no shorter by more than a few parts in 10,000.
@@ -161,7 +156,6 @@ class Placement:
         return np.asarray(np.interp(np.arange(self.rows) * self.pitch_y_mm, ways, fine[:end]))
 
     def _seen(self, mesh: Triangles, angles: Floats, heights: Floats) -> tuple[Floats, Floats]:
-        """Hits from outside toward the axis."""
         out = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
         far = 2 * mesh.size_mm
         starts = self._placed(far * out + heights[:, None] * np.array([0.0, 0.0, 1.0]))

@@ -1,4 +1,4 @@
-"""A surface of any shape: a table of point and normal at each cell of a sheet."""
+"""A surface of any shape: a table of point and normal at each cell."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, le
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
 MAX_BYTES = 8 * 3 * MAX_LINES**2
-"""Largest array, of 64-bit numbers."""
 BEYOND = 1.0
 """Pitches beyond the outermost cells to which the surface is extrapolated."""
 STEPS = 30
@@ -29,13 +28,13 @@ class Mesh:
     """A surface with points and normals interpolated between cells."""
 
     points_mm: Floats
-    """(R, C, 3), in the link's frame."""
+    """(R, C, 3) in the link's frame."""
     normals: Floats
-    """(R, C, 3), outward unit normals."""
+    """(R, C, 3) outward unit normals."""
     pitch_x_mm: float
     pitch_y_mm: float
     closed: bool = False
-    """Whether column 0 is the neighbor of the last one."""
+    """Whether column 0 is a neighbor of the last column."""
 
     def __post_init__(self) -> None:
         points, normals = (np.array(one, float) for one in (self.points_mm, self.normals))
@@ -60,7 +59,7 @@ class Mesh:
 
     @classmethod
     def load(cls, path: str | Path) -> Mesh:
-        """Read a table that :meth:`save` wrote. Raises :class:`SurfaceError`, OSError."""
+        """Read a table of :meth:`save`. Raises :class:`SurfaceError`, OSError."""
         try:
             found = {key: one.astype(float) for key, one in array_file.read(path, KEYS, MAX_BYTES).items()}
             if missing := [key for key in KEYS if key not in found]:
@@ -76,7 +75,7 @@ class Mesh:
             raise SurfaceError(f"{path}: {error}") from None
 
     def save(self, path: str | Path) -> None:
-        """Write the table as a NPZ file."""
+        """Write the table as a .npz file."""
         pitch = np.array([self.pitch_x_mm, self.pitch_y_mm])
         with replaced(path) as new, open(new, "wb") as file:
             np.savez(file, points_mm=self.points_mm, normals=self.normals, pitch_mm=pitch, closed=np.array(self.closed))
@@ -107,7 +106,7 @@ class Mesh:
         return points, normals
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's nearest point, found from the nearest cell."""
+        """Place in mm of the surface's nearest point, searched from the nearest cell."""
         target = np.array(point_mm, float)
         rows, columns = self.lines
         nearest = int(np.linalg.norm(self.points_mm - target, axis=2).argmin())
@@ -139,7 +138,7 @@ class Mesh:
                 raise SurfaceError(f"{name} is {float(value[off].flat[0]) * pitch:g} mm; {far}")
 
     def _around(self, u: Any, v: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-        """Rows and columns of the four cells around, and the offset from the first."""
+        """Rows and columns of the four cells around a place, and the offset from the first."""
         rows, columns = self.lines
         row = np.clip(np.floor(v).astype(int), 0, rows - 2)
         if self.closed:
@@ -156,7 +155,6 @@ class Mesh:
         return np.asarray((1 - up) * bottom + up * top)
 
     def _slopes(self, u: Any, v: Any) -> tuple[Floats, Floats]:
-        """Derivatives of a point by u and v."""
         low, high, left, right, across, up = self._around(u, v)
         p = self.points_mm
         along_u = (1 - up) * (p[low, right] - p[low, left]) + up * (p[high, right] - p[high, left])

@@ -1,4 +1,4 @@
-"""Triangle meshes in files, in plain formats only, as archives or pictures may unpack to any size."""
+"""Triangle meshes in files, in plain formats only: archives and pictures may unpack to any size."""
 
 from __future__ import annotations
 
@@ -19,20 +19,19 @@ from contactfpga.surfaces.shapes import SurfaceError
 
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 COLLADA = ".dae"
-"""Format of robots' files, with lengths in any unit, which the robot's file scales."""
+"""Format of robots' meshes, whose unit the robot's file scales."""
 MAX_BYTES = 20_000_000
 MAX_TRIANGLES = 500_000
 _OBJ = re.compile(rb"^[vf][ \t].*$", re.MULTILINE)
-"""Vertices and faces; materials and groups are irrelevant, and thousands of groups take the library minutes."""
+"""Vertices and faces; thousands of groups, which are irrelevant, take the library minutes."""
 _OBJ_SKIPPED = re.compile(rb"\\\r?\n|/\S*")
 """Continued lines, and references of a face besides vertices."""
 
 
 def read(path: str | Path, extra: str, suffixes: tuple[str, ...] = SUFFIXES) -> Any:
-    """The mesh of a file as the library's object, with (n, 3) ``vertices`` and (m, 3) ``faces``, their indices.
+    """The library's mesh object of a file, with (n, 3) ``vertices`` and (m, 3) ``faces``, their indices.
 
-    ``extra``: what to install without the library. Raises :class:`SurfaceError`, :class:`~contactfpga.MissingExtra`,
-    OSError.
+    ``extra``: the extra to install. Raises :class:`SurfaceError`, :class:`~contactfpga.MissingExtra`, OSError.
     """
     path = Path(path)
     kind = path.suffix.lower()

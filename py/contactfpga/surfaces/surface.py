@@ -1,8 +1,8 @@
-"""Surfaces of a sheet on its link: a plane, a cylinder or a cone.
+"""Surfaces of a sheet on its link: plane, cylinder and cone.
 
-``place`` maps a place of the sheet laid flat, in mm, to point and outward unit normal in the link's frame; ``flat``
-returns the place of the nearest point. For arrays of one shape, ``place`` returns arrays with one more axis. A NaN
-place, that of a zone without cells, has a NaN point.
+``place`` maps a place of the flat sheet, in mm, to point and outward unit normal in the link's frame; ``flat`` maps the
+nearest point back. ``place`` of arrays returns arrays with one more axis. A NaN place, of a zone without cells, has a
+NaN point.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, le
 
 @dataclasses.dataclass(frozen=True)
 class PlaneSurface:
-    """The plane z = ``height_mm``, with outside toward larger z; x and y are the sheet's."""
+    """The plane z = ``height_mm`` with outside toward larger z; x and y are the sheet's."""
 
     height_mm: float = 0.0
 
@@ -43,13 +43,13 @@ class PlaneSurface:
         return np.where(nowhere, math.nan, points), np.where(nowhere, math.nan, shapes.UP)
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's point nearest to this one."""
+        """Place in mm of the surface's nearest point."""
         return point_mm[0], point_mm[1]
 
 
 @dataclasses.dataclass(frozen=True)
 class CylinderSurface:
-    """A cylinder about z: x goes around it, from the x axis toward the y axis, y along it."""
+    """A cylinder about z; x goes around, from the x axis toward the y axis, y along z."""
 
     radius_mm: float
 
@@ -73,7 +73,7 @@ class CylinderSurface:
         return points, np.stack([cosine, sine, np.where(nowhere, math.nan, 0.0)], axis=-1)
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's nearest point; x is within half a turn of 0."""
+        """Place in mm of the surface's nearest point; x is within half a turn of 0."""
         return shapes.off_cylinder(point_mm, self.radius_mm)
 
 
@@ -82,7 +82,7 @@ class Cone:
     """A cone about z, for instance a forearm, with a sheet bent around it without stretching.
 
     Distances on the sheet are distances on the cone. Column 0 is on a straight line from (``radius_mm``, 0, 0) toward
-    larger z; row 0 is perpendicular to it there and, as a straight strip on a cone, climbs away from it.
+    larger z; row 0 is perpendicular to it there and climbs away from it.
     """
 
     radius_mm: float
@@ -111,7 +111,7 @@ class Cone:
     def place(self, x_mm: Floats, y_mm: Floats) -> tuple[Floats, Floats]: ...
 
     def place(self, x_mm: float | Floats, y_mm: float | Floats) -> tuple[Vector, Vector] | tuple[Floats, Floats]:
-        """Point in mm and outward unit normal. Raises :class:`SurfaceError` for a place beyond the cone's tip."""
+        """Point in mm and outward unit normal. Raises :class:`SurfaceError` for a place beyond the tip."""
         sine, cosine = self._sine, self._cosine
         tip = self.radius_mm / sine  # the way from the tip to row 0 along column 0, with the slope's sign
         x, y = np.broadcast_arrays(np.asarray(x_mm, float), np.asarray(y_mm, float))
@@ -127,7 +127,7 @@ class Cone:
         return (shapes.vector(points), shapes.vector(normals)) if is_one(x_mm, y_mm) else (points, normals)
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's nearest point, within half a turn of column 0."""
+        """Place in mm of the surface's nearest point, within half a turn of column 0."""
         sine, cosine = self._sine, self._cosine
         tip = self.radius_mm / sine
         out = math.hypot(point_mm[0], point_mm[1]) - self.radius_mm
@@ -138,7 +138,7 @@ class Cone:
 
 @dataclasses.dataclass(frozen=True)
 class MirroredSurface:
-    """A surface on which x counts from the last column."""
+    """A surface whose x counts from the last column."""
 
     surface: PlaneSurface | CylinderSurface | Cone | Mesh
     width_mm: float
@@ -155,6 +155,6 @@ class MirroredSurface:
         return self.surface.place(self.width_mm - x_mm, y_mm)  # type: ignore[arg-type]
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
-        """The place, in mm, of the surface's point nearest to this one."""
+        """Place in mm of the surface's nearest point."""
         x_mm, y_mm = self.surface.flat(point_mm)
         return self.width_mm - x_mm, y_mm

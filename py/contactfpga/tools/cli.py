@@ -1,4 +1,4 @@
-"""The command `contactfpga`: the table of its commands, and its error handling."""
+"""The command `contactfpga`: table of its commands, and error handling."""
 
 from __future__ import annotations
 
@@ -43,8 +43,9 @@ COMMANDS = {
     "fit": "Find the cheapest Skin that is good enough for given scenes.",
     "study": "Run one of the studies: speed against accuracy, failures, flipped bits, the arm.",
 }
-"""Help of each command. The command is the module of this name in :mod:`contactfpga.tools.commands`, a
-:class:`Subcommand` or a :class:`TopicGroup`, imported on call."""
+"""Help of each command. Its module in :mod:`contactfpga.tools.commands`, a :class:`Subcommand` or a
+:class:`TopicGroup`, is imported on call.
+"""
 
 FIRST = {
     "view": "press a virtual sheet in the browser",
@@ -53,7 +54,6 @@ FIRST = {
     "zones": "see its contact zones, live",
     "build icebreaker --wiring": "see how to wire a sheet to a board",
 }
-"""First steps with their purpose, shown without a command."""
 
 RENAMED = {
     "chart": "study chart",
@@ -67,11 +67,11 @@ RENAMED = {
 
 
 class Subcommand(Protocol):
-    """A command, or a topic of one. Its module loads with the host alone; ``run`` imports further needs."""
+    """A command or topic. Its module needs only the host's packages; ``run`` imports further ones."""
 
     @property
     def EXTRA(self) -> str | None:  # noqa: N802
-        """The extra with all needs of the command; None if that depends on the port."""
+        """The extra with all needs of the command; None if they depend on the port."""
 
     def add_flags(self, parser: argparse.ArgumentParser) -> None:
         """Add the command's flags to its parser."""
@@ -81,7 +81,7 @@ class Subcommand(Protocol):
 
 
 class TopicGroup(Protocol):
-    """A command of several topics: a package with a module, a :class:`Subcommand`, per topic."""
+    """A command of several topics: a package with a :class:`Subcommand` per topic."""
 
     @property
     def TOPICS(self) -> dict[str, str]:  # noqa: N802
@@ -92,11 +92,11 @@ class TopicGroup(Protocol):
         """The default topic, and its place in the usage."""
 
     def run(self, topic: Callable[[], int]) -> int:
-        """Run a topic; handles the errors common to all topics."""
+        """Run a topic, with common handling of errors."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status; errors print one line with the next step."""
+    """Run one command and return its exit status; an error prints one line with the next step."""
     return interrupt.guarded(lambda: _run(arguments))
 
 
@@ -119,7 +119,6 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _first() -> str:
-    """The first steps, as lines to copy."""
     commands = [f"contactfpga {words}" for words in FIRST]
     width = max(map(len, commands))
     steps = [f"  {command:{width}}   {what}" for command, what in zip(commands, FIRST.values())]
@@ -157,7 +156,6 @@ def _parser() -> Parser:
 
 
 def _add_command(name: str, parser: Parser) -> None:
-    """Give the parser of a command its topics, or its flags."""
     module = import_module(f"{commands.__name__}.{name}")
     if hasattr(module, "TOPICS"):
         _add_topics(module, module.__name__, parser)
@@ -187,17 +185,15 @@ def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Name
 
 
 class _Help(argparse.HelpFormatter):
-    """Formatter that keeps addresses whole."""
-
     def _split_lines(self, text: str, width: int) -> list[str]:
         return terminal.wrapped(" ".join(text.split()), width).split("\n")
 
 
 class Parser(argparse.ArgumentParser):
-    """Accepts options anywhere. Plain argparse refuses a word after an option where it could have been omitted, as the
-    port in `contactfpga record FILE --seconds 2 PORT`.
+    """Parser that accepts options anywhere. Plain argparse refuses an optional word after an option, as the port in
+    `contactfpga record FILE --seconds 2 PORT`.
 
-    ``add`` adds the arguments on first use, so that a listed parser does not load their needs.
+    ``add`` adds the arguments on first use, so that listed parsers load nothing.
     """
 
     _within = False
@@ -229,13 +225,12 @@ class Parser(argparse.ArgumentParser):
         super().error(visible_lines(shortened(message)))
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """For an unknown command, suggest the intended one."""
         if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
             raise argparse.ArgumentError(action, f"{value!r} is none; {suggestion(value, action.choices)}")
         super()._check_value(action, value)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Like argparse's, but with options anywhere."""
+        """argparse's method, with options anywhere."""
         topics = self.topics
         if self.usual_topic is not None and args and args[0] not in ("-h", "--help", *topics):
             args = [self.usual_topic, *args]
@@ -249,7 +244,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def leaves(parser: Parser) -> Iterator[Parser]:
-    """The parsers of commands without topics, and of topics."""
+    """The parsers of topics, and of commands without topics."""
     for topic in parser.topics.values():
         yield from leaves(topic)
     if not parser.topics:

@@ -1,1 +1,1 @@
-"""Contacts over time, with constant ids, from successive frames' zones."""
+"""Contacts over time with constant ids."""

@@ -1,4 +1,4 @@
-"""Assignment of contacts to zones with the least total distance, and a limit on each."""
+"""Assignment of contacts to zones with the least total cost."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 Costs = Sequence[Sequence[float]]
-"""A row for each contact, a column for each zone; infinite for impossible pairs."""
+"""A row per contact, a column per zone; infinite for impossible pairs."""
 
 
 def assign(costs: Costs, alone: float) -> list[int | None]:
-    """For each row its column or None, with the least sum of pair costs plus ``alone`` for each row without one."""
+    """Column of each row, or None, with the least sum of pair costs plus ``alone`` for each row without a column."""
     found: list[int | None] = [None] * len(costs)
     for rows, columns in _groups(costs):
         if len(rows) == 1:
@@ -25,7 +25,6 @@ def assign(costs: Costs, alone: float) -> list[int | None]:
 
 
 def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns connected by finite costs, for speed."""
     groups: list[tuple[list[int], set[int]]] = []
     for row, line in enumerate(costs):
         rows, columns = [row], {column for column, cost in enumerate(line) if cost < math.inf}
@@ -40,7 +39,7 @@ def _groups(costs: Costs) -> list[tuple[list[int], list[int]]]:
 
 
 def _optimal(costs: Costs, alone: float) -> list[int | None]:
-    """The Hungarian method by shortest augmenting paths, with a lone column per row."""
+    """The Hungarian method by shortest augmenting paths, with an additional column per row of cost ``alone``."""
     size, real = len(costs), len(costs[0])
     padded = [
         [*line, *(alone if other == row else math.inf for other in range(size))] for row, line in enumerate(costs)

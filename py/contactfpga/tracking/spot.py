@@ -1,4 +1,4 @@
-"""State of a tracker: a spot on the sheet, its motion, and its contacts."""
+"""State of a tracker: spots on the sheet, their motion, and their contacts."""
 
 from __future__ import annotations
 
@@ -17,11 +17,9 @@ FAST_MM_S = 1500.0
 """Standard deviation of the speed along each axis of a contact seen once."""
 
 SAME_S = 0.003
-"""Time for which a barycenter's error stays the same: it jumps when a cell opens or closes, and denser frames add
-nothing."""
+"""Time for which a barycenter's error stays the same: it jumps with a cell, so denser frames add nothing."""
 
 COAST_S = 0.05
-"""Longest extrapolation by a speed."""
 
 
 class Known(NamedTuple):
@@ -32,7 +30,6 @@ class Known(NamedTuple):
     speed: float
 
     def later(self, seconds: float) -> Known:
-        """The covariance after a time of possible acceleration."""
         spread = SUDDEN * seconds
         place = self.place + seconds * (2 * self.both + seconds * (self.speed + spread / 3))
         return Known(place, self.both + seconds * (self.speed + spread / 2), self.speed + spread)
@@ -44,48 +41,45 @@ NEW = Known(0.0, 0.0, FAST_MM_S**2)
 
 @dataclasses.dataclass(slots=True)
 class Member:
-    """A contact of a spot."""
-
     id: int
     since_us: int
     area_mm2: float
-    """Its area when last seen alone."""
+    """Area when last seen alone."""
     dx: float = 0.0
-    """Its offset from the spot's barycenter on entering, in mm; 0 while alone."""
+    """Offset from the spot's barycenter on entering, in mm; 0 while alone."""
     dy: float = 0.0
     vx: float = 0.0
-    """Its speed on entering, in mm/s, relative to the spot's."""
+    """Speed on entering relative to the spot's, in mm/s."""
     vy: float = 0.0
     known: Known = NEW
-    """Covariance of its entry."""
+    """Covariance on entering."""
 
 
 class Spot:
-    """A zone over time."""
+    """A zone over time, with one or more contacts."""
 
     def __init__(self, zone: Zone, time_us: int, members: list[Member]):
         self.members = members
-        """Contacts of the spot, the one that names it first."""
+        """Contacts of the spot; the first gives its id."""
         self.vx = self.vy = 0.0
         self.known = NEW
         self.joined_us = time_us
         self.small_us: int | None = None
-        """Since when it is no larger than without one of its contacts."""
+        """Time since which the zone would be large enough without one of its contacts."""
         self.place(zone, time_us)
 
     def place(self, zone: Zone, time_us: int) -> None:
-        """Move it there without speed, as a zone that grew or shrank by a whole contact has not moved."""
+        """Move the spot to a zone without speed: a zone that grew or shrank by a whole contact has not moved."""
         self.zone, self.seen_us, self.held = zone, time_us, False
         self.x, self.y = self.fx, self.fy = self.from_x, self.from_y = place(zone)
         self.known = Known(error_mm2(zone), 0.0, self.known.speed)
 
     def ahead(self, time_us: int) -> tuple[float, float]:
-        """Expected place at a time."""
         seconds = min((time_us - self.seen_us) / 1e6, COAST_S)
         return self.fx + self.vx * seconds, self.fy + self.vy * seconds
 
     def follow(self, zone: Zone, time_us: int, around_mm: float | None) -> None:
-        """Continue in this zone: a Kalman filter of constant velocity."""
+        """Continue the spot in a zone, by a Kalman filter of constant velocity."""
         x, y = place(zone)
         seconds = (time_us - self.seen_us) / 1e6
         if seconds > 0:
@@ -98,7 +92,7 @@ class Spot:
             self.members[0].area_mm2 = zone.area_mm2
 
     def correct(self, off_x: float, off_y: float, known: Known, error: float) -> None:
-        """Correct by a zone at this offset from the expected place, with both uncertainties."""
+        """Correct by a zone's offset from the expected place; ``error``: variance of the zone's place."""
         at, both, speed = known
         gain, turn = at / (at + error), both / (at + error)
         self.fx, self.fy = self.fx + gain * off_x, self.fy + gain * off_y
@@ -106,7 +100,7 @@ class Spot:
         self.known = Known(at - gain * at, both - gain * both, speed - turn * both)
 
     def center(self) -> None:
-        """Shift its contacts so that their barycenter is the zone's."""
+        """Shift the contacts so that their barycenter is the zone's."""
         if len(self.members) == 1:
             only = self.members[0]
             only.dx = only.dy = only.vx = only.vy = 0.0
@@ -120,12 +114,11 @@ class Spot:
 
     @property
     def area_mm2(self) -> float:
-        """Area of all its contacts, each as last seen alone."""
         return math.fsum(one.area_mm2 for one in self.members)
 
     def spare(self) -> Member | None:
-        """The contact without which its area would fit; None if it needs all. Of several, the one farthest from its
-        middle, or the newest."""
+        """The contact without which the areas fit the zone best, then farthest from the middle, then newest; None if
+        all fit."""
         if len(self.members) == 1:
             return None
         total, area = self.area_mm2, self.zone.area_mm2
@@ -137,24 +130,22 @@ class Spot:
         return best if abs(total - best.area_mm2 - area) < abs(total - area) else None
 
     def track(self) -> Track:
-        """The track for users."""
         first = self.members[0]
         merged = tuple(one.id for one in self.members[1:]) if len(self.members) > 1 else ()
         return Track(first.id, self.zone, first.since_us, self.seen_us, self.vx, self.vy, self.held, merged)
 
 
 def place(zone: Zone) -> tuple[float, float]:
-    """Place of a zone; without ``mismatch`` every zone has one."""
+    """Place of a zone in mm; without ``mismatch`` every zone has one."""
     assert zone.x_mm is not None
     assert zone.y_mm is not None
     return zone.x_mm, zone.y_mm
 
 
 def error_mm2(zone: Zone) -> float:
-    """Variance of its barycenter along each axis: that of a cell, the resolution of closed cells."""
+    """Variance of a zone's barycenter along each axis: that of a cell over the number of cells."""
     return zone.area_mm2 / (12 * zone.area_cells)
 
 
 def radius_mm(area_mm2: float) -> float:
-    """Radius of a disc of this area."""
     return math.sqrt(area_mm2 / math.pi)

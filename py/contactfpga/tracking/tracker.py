@@ -1,7 +1,4 @@
-"""Follows contacts from frame to frame.
-
-Merging and parting zones are distinguished from lifts and touches by their areas.
-"""
+"""Follows contacts from frame to frame; areas distinguish merging and parting zones from lifts and touches."""
 
 from __future__ import annotations
 
@@ -23,11 +20,11 @@ LIMITS = {
     "shared_ms": (0.0, 60_000.0, "ms"),
     "move_mm": (0.1, 10_000.0, "mm"),
 }
-"""Least and largest value of each setting."""
+"""Least and largest value of each setting, and its unit."""
 
 
 class Tracker:
-    """Gives contacts ids that stay: hand it every frame, in order.
+    """Gives contacts constant ids; takes every frame in order.
 
     >>> tracker = contactfpga.Tracker()
     >>> with contactfpga.open("sim://?scene=two_fingers") as board:
@@ -35,14 +32,14 @@ class Tracker:
     >>> [track.id for track in tracks.active]
     [1, 2]
 
-    It neither reads nor waits: time is the frames' own, so a recording gives the same ids as the board did. The tracker
-    moves each contact on by its speed and pairs contacts with zones so that the sum of distances within the gate is
-    least. On a cylinder distances run along its surface.
+    Each contact moves on by its speed, and is paired with a zone within the gate so that the sum of distances is least;
+    on a cylinder distances run along its surface. Time is that of the frames, so a recording gives the same ids as its
+    board.
 
-    ``gate_mm``: how far from where its motion puts it, or from where it was last seen, a contact may be found.
-    ``hold_ms``: for how long a contact that no frame shows is held, so that it survives a bounce. ``shared_ms``: for
-    how long a contact that shares a zone is remembered while the zone is only as large as the others. ``move_mm``: how
-    far a contact goes from one ``move`` to the next. Raises ValueError for a setting outside its limits.
+    ``gate_mm``: largest distance of a contact from its expected or last place. ``hold_ms``: time for which a contact
+    without a zone is held, to survive a bounce. ``shared_ms``: time for which a contact that shares a zone is kept
+    while the zone is only as large as the others. ``move_mm``: distance between ``move`` events. Raises ValueError for
+    a setting outside its limits.
     """
 
     def __init__(self, gate_mm: float = 20.0, *, hold_ms: float = 5.0, shared_ms: float = 300.0, move_mm: float = 5.0):
@@ -60,12 +57,11 @@ class Tracker:
         self._events: list[Event] = []
 
     def update(self, zones: Zones) -> Tracks:
-        """The contacts after this frame, and what happened to them.
+        """The contacts and events after a frame.
 
-        A frame that is flagged ``mismatch`` may be wrong, so it changes nothing; one that is flagged ``overflow`` ends
-        no contact. Frames that were lost end none either: a contact goes on where it is found next. A frame that is
-        older than the last one, or belongs to another sheet, begins a new history. Raises TypeError for anything but a
-        frame.
+        A frame flagged ``mismatch`` changes nothing; one flagged ``overflow`` ends no contact, nor do lost frames. A
+        frame that is older than the last one, or of another sheet, begins a new history. Raises TypeError for anything
+        but a frame.
         """
         if not isinstance(zones, Zones):
             raise TypeError(f"update() takes a frame of zones, such as board.next() returns; it got {shown(zones)}")
@@ -81,7 +77,7 @@ class Tracker:
     # ---- one frame
 
     def _restart(self, zones: Zones) -> bool:
-        """End all contacts if this frame does not continue the last one."""
+        """End all contacts if a frame does not continue the last one."""
         if self._sheet is zones.sheet and zones.time_us >= self._time_us:
             return False
         restarted = zones.time_us < self._time_us or self._sheet not in (None, zones.sheet)
@@ -95,7 +91,6 @@ class Tracker:
         return restarted
 
     def _step(self, zones: Zones) -> list[Zone]:
-        """Process a frame; returns the zones without a contact."""
         pairs, lost, free = self._paired([zone for zone in zones if zone.x_mm is not None])
         winding = [zone for zone in zones if zone.winding]
         unsure = [zone for zone in free if zone.ghost] + winding
@@ -151,7 +146,6 @@ class Tracker:
         return math.hypot(across(zone_x - x, self._around_mm), zone_y - y)
 
     def _apart(self, spot: Spot, zone: Zone) -> float:
-        """Distance from a spot's expected place to a zone, in mm."""
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _expects(self, spot: Spot, zone: Zone) -> bool:
@@ -185,14 +179,13 @@ class Tracker:
                 self._say("split", members[0].id, zone, (first,))
 
     def _held(self, spot: Spot, overflow: bool) -> bool:
-        """Whether a spot missing in this frame may still exist; ends it if not."""
+        """Whether a spot missing in this frame may still exist; otherwise ends it."""
         if overflow or self._time_us - spot.seen_us < self._hold_us:
             return True
         self._end(spot)
         return False
 
     def _forget(self, spot: Spot) -> None:
-        """End a contact for which its zone has been too small for too long."""
         spare = spot.spare()
         if spare is None:
             spot.small_us = None
@@ -239,25 +232,24 @@ class Way(NamedTuple):
     off_mm: float
     """Distance from the expected place."""
     odd: float
-    """-2 times the logarithm of its density there, in 1/mm^2."""
+    """-2 times the logarithm of the zone's probability density, in 1/mm^2."""
 
 
 Apart = Callable[[Spot, Zone], float]
-"""Distance from a spot's expected place to a zone, in mm."""
 
 Pairs = list[tuple[Spot, Zone]]
 
 MOST = 0.75
-"""Share of the areas that a zone must have to be made of several spots, or several zones of one spot."""
+"""Least ratio of areas of a zone to the spots that merged into it, or of the zones to the spot that parted."""
 
 REACH = 1.5
-"""Gates for parting and merging: a zone leaves another, or enters it, within the gate plus this many radii of the
-larger zone, since feet are long. One of several contacts leaves within this many gates of its expected place."""
+"""Gates for parting and merging: a zone leaves or enters another within the gate plus this many radii of the larger
+zone, as feet are long; one of several contacts leaves within this many gates of its expected place."""
 
 
 def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_mm: float) -> dict[Spot, list[Spot]]:
-    """Lost spots that are now in another's zone. They are removed from ``lost``; a new zone that several form is
-    removed from ``free`` and paired with the largest."""
+    """Lost spots by the spot whose zone they entered; removed from ``lost``. A new zone of several is removed from
+    ``free`` and paired with the largest."""
     found: dict[Spot, list[Spot]] = {}
     area = {spot: spot.zone.area_mm2 for spot, _ in pairs}
     for spot in list(lost):
@@ -292,8 +284,8 @@ def parted(
     expects: Callable[[Spot, Zone], bool],
     gate_mm: float,
 ) -> dict[Spot, list[Zone]]:
-    """New zones that leave each spot, by its place and lost area; for a spot with several contacts, by their expected
-    places. They are removed from ``free``, a lost spot in several from ``lost``."""
+    """New zones by the spot that they leave, by place and lost area or by expected places of contacts; removed from
+    ``free``, and lost spots in several zones from ``lost``."""
     found: dict[Spot, list[Zone]] = {}
     left = {spot: zone.area_mm2 for spot, zone in pairs if spot not in merges}
     for zone in list(free):
@@ -320,12 +312,11 @@ def parted(
 
 
 def touch_mm(one: Zone, other: Zone) -> float:
-    """Distance at which two round contacts share a zone."""
     return radius_mm(one.area_mm2) + radius_mm(other.area_mm2)
 
 
 def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: float | None) -> None:
-    """Put the contacts of all these into this zone, at their expected places."""
+    """Put the contacts of all spots into a zone, at their expected places."""
     x, y = place(zone)
     for one in (spot, *others):
         ahead_x, ahead_y = one.ahead(time_us)
@@ -344,12 +335,11 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
 
 
 def _rank(member: Member) -> tuple[float, int]:
-    """Sort key of a zone's contacts, the largest first."""
     return -member.area_mm2, member.id
 
 
 def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[Way, Way]:
-    """Hypotheses of a contact's way: it kept its motion, less surely with time; or it stopped or returned."""
+    """Two hypotheses of a contact's way: it kept its motion, less surely with time; or it stopped or returned."""
     x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     off_x, off_y = across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy
@@ -366,7 +356,6 @@ def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float
 
 
 def _larger(member: Member, zone: Zone) -> float:
-    """Misfit of a zone's area for a contact of a spot, as for its place."""
     return (math.log(zone.area_mm2 / member.area_mm2) / LARGER) ** 2
 
 
@@ -380,8 +369,7 @@ def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate
 def shared_out(
     spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
 ) -> list[tuple[Zone, list[Member]]]:
-    """The zones of a parted spot with their contacts: one each by place and area, the rest where most likely; none for
-    a zone that begins a contact."""
+    """The zones of a parted spot with their contacts: one each by place and area, the rest where most likely."""
     ways = [[_ways(spot, one, zone, time_us, around_mm) for zone in zones] for one in spot.members]
     off = [[min(way.off_mm for way in both) for both in line] for line in ways]
     odd = [[min(way.odd for way in both) for both in line] for line in ways]

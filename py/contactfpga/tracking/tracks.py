@@ -1,4 +1,4 @@
-"""Output of a tracker after a frame: the present contacts, and their events."""
+"""Contacts and events after a frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Kind = Literal["down", "move", "merge", "split", "up"]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Track:
-    """One present contact, as of the frame in which it was last seen.
+    """A present contact, as of the frame in which it was last seen.
 
     >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
     >>> tracks = contactfpga.Tracker().update(zones)
@@ -22,24 +22,24 @@ class Track:
     """
 
     id: int
-    """Stays with the contact; no other contact ever has it."""
+    """Id that no other contact ever has."""
     zone: Zone
-    """Where it was last seen."""
+    """Zone in which the contact was last seen."""
     since_us: int
-    """When it came, in device time in us."""
+    """Device time at which the contact began, in us."""
     seen_us: int
-    """Device time of the frame in which it was last seen, in us."""
+    """Device time of the frame in which the contact was last seen, in us."""
     vx_mm_s: float
-    """Its speed along x in mm/s, smoothed over a few milliseconds."""
+    """Speed along x in mm/s, smoothed over a few milliseconds."""
     vy_mm_s: float
     held: bool = False
-    """This frame does not show it. It bounces, the frame leaves zones out (``overflow``, ``mismatch``), or a zone that
-    winds around the sheet may hide it."""
+    """Whether this frame lacks the contact: it bounces, the frame may leave zones out (``overflow``, ``mismatch``), or
+    a zone that winds around the sheet may hide it."""
     merged: tuple[int, ...] = ()
-    """Ids of smaller contacts in the same zone; each gets its own zone again when they part."""
+    """Ids of smaller contacts in the same zone; each gets its own zone when they part."""
 
     def to_dict(self) -> dict[str, object]:
-        """Everything in plain Python values, ready for JSON."""
+        """All values as plain Python objects for JSON."""
         return {
             "id": self.id,
             "x_mm": self.zone.x_mm,
@@ -56,7 +56,7 @@ class Track:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a contact.
+    """A change of a contact.
 
     >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
     >>> tracks = contactfpga.Tracker().update(zones)
@@ -65,21 +65,21 @@ class Event:
     """
 
     kind: Kind
-    """``down``: it begins, and ``up``: it ends, once each. ``move``: it is ``move_mm`` from where the last event saw
-    it. ``merge``: from now on it has one zone with the ``parents``. ``split``: it has a zone of its own, apart from
-    the ``parents``."""
+    """``down`` and ``up``: the contact begins and ends, once each. ``move``: it is ``move_mm`` from its place at the
+    last event. ``merge``: it shares one zone with the ``parents`` from now on. ``split``: it has a zone of its own
+    again."""
     id: int
     time_us: int
-    """Device time of the frame that showed it, in us."""
+    """Device time of the frame that showed the event, in us."""
     parents: tuple[int, ...]
-    """Ids of the other contacts in a ``merge`` or ``split``, or in a ``down`` that began as a contact parted in two."""
+    """Ids of the other contacts in a ``merge`` or ``split``, or of the contact that parted in a ``down``."""
     zone: Zone
-    """Its zone then; for ``up``, its last zone."""
+    """Zone of the contact; its last zone for ``up``."""
     seen_us: int
-    """When it was last seen, in us: ``time_us``, except for ``up``, which may come up to ``hold_ms`` later."""
+    """Device time at which the contact was last seen, in us; up to ``hold_ms`` before ``time_us`` for ``up``."""
 
     def to_dict(self) -> dict[str, object]:
-        """Everything in plain Python values, ready for JSON."""
+        """All values as plain Python objects for JSON."""
         return {
             "kind": self.kind,
             "id": self.id,
@@ -93,7 +93,7 @@ class Event:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Tracks:
-    """What :meth:`Tracker.update` returns.
+    """Contacts and events of one frame, from :meth:`Tracker.update`.
 
     >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
     >>> tracks = contactfpga.Tracker().update(zones)
@@ -104,18 +104,16 @@ class Tracks:
     time_us: int
     """Device time of the frame, in us."""
     active: tuple[Track, ...]
-    """The present contacts, one for each zone, in order of their ids."""
+    """Present contacts, one per zone, in order of their ids."""
     events: tuple[Event, ...]
-    """What happened since the frame before, in order."""
+    """Events since the frame before, in order."""
     unsure: tuple[Zone, ...] = ()
-    """Zones without a contact, because other pressed switches may have made them (:attr:`Zone.ghost`), or because they
-    go around a closed sheet and have no x (:attr:`Zone.winding`). They begin no contact. A present contact goes on in a
-    ghost, and is held while a zone winds."""
+    """Zones that begin no contact: possible ghosts (:attr:`Zone.ghost`), in which a present contact continues, and
+    zones around a closed sheet (:attr:`Zone.winding`), which hold present contacts."""
     restarted: bool = False
-    """The board's time ran backward, or its sheet changed. All contacts ended, and new ones began."""
+    """Whether the board's time ran backward, or its sheet changed: all contacts ended, and new ones began."""
 
     def _repr_html_(self) -> str:
-        """The contacts as a table in a notebook."""
         rows = [
             [f"#{track.id}", *(_mm(each) for each in (track.zone.x_mm, track.zone.y_mm)), f"{track.zone.area_cells}"]
             + [f"{track.vx_mm_s:.0f}, {track.vy_mm_s:.0f}", f"{(self.time_us - track.since_us) / 1e6:.3f}"]
@@ -125,7 +123,7 @@ class Tracks:
         return notebook.table(head, rows, f"At {self.time_us / 1e6:.6f} s")
 
     def to_dict(self) -> dict[str, object]:
-        """Everything in plain Python values, ready for JSON."""
+        """All values as plain Python objects for JSON."""
         return {
             "tracks": [track.to_dict() for track in self.active],
             "events": [event.to_dict() for event in self.events],

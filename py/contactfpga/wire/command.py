@@ -1,4 +1,4 @@
-"""Commands to a board, and the requests in bytes to one (docs/protocol.md)."""
+"""Commands to a board, and requests in bytes to a board."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from contactfpga.wire.hello import HEARD_DIGITS
 from contactfpga.wire.protocol import KIND_REQUEST, REQUEST_HELLO, may_number
 
 KIND_COMMAND = 10
-"""Kind of packets to the board."""
 WHAT_DIGITS, VALUE_DIGITS = 1, 3
 MOST_WHAT, MOST_VALUE = (1 << DIGIT_BITS * WHAT_DIGITS) - 1, (1 << DIGIT_BITS * VALUE_DIGITS) - 1
 
@@ -34,15 +33,13 @@ COMMANDS = {
     THRESHOLD: ("threshold of a pressure unit", "units"),
     SUM_THRESHOLD: ("threshold of a weighted sum", "unit_sums"),
 }
-"""Name of each command, and the Skin's option that it needs."""
+"""Name of each command by number, and the Skin's option that it needs."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """An action of a board."""
-
     what: int
-    """Its number, a key of :data:`COMMANDS`."""
+    """Key of :data:`COMMANDS`."""
     value: int = 0
 
     def __post_init__(self) -> None:
@@ -58,8 +55,7 @@ class Command:
 
 
 def encode_command(number: int, command: Command, hello: bool = False, pulsed: bool = False) -> bytes:
-    """A command with the number of a request, as on the wire; as
-    :func:`contactfpga.wire.protocol.encode_request`."""
+    """A command's bytes on the wire; arguments as in :func:`contactfpga.wire.protocol.encode_request`."""
     assert may_number(number), f"{number} is no number of a request"
     words = ((number, HEARD_DIGITS), (command.what, WHAT_DIGITS), (command.value, VALUE_DIGITS))
     plain = b"".join(digits(value, count) for value, count in words)
@@ -68,21 +64,19 @@ def encode_command(number: int, command: Command, hello: bool = False, pulsed: b
 
 
 _MARK, _ONE, _ZERO = 0xF0, 0xFF, 0x00
-"""Pulses: :func:`contactfpga.wire.framing.pulses`."""
+"""Bytes of :func:`contactfpga.wire.framing.pulses`: a mark, and the bits 1 and 0."""
 _SIZES = {KIND_REQUEST: HEARD_DIGITS + 1, KIND_COMMAND: HEARD_DIGITS + WHAT_DIGITS + VALUE_DIGITS + 1}
-"""Plain bytes of each packet."""
+"""Plain bytes of a packet by kind."""
 
 
 class RequestKind(enum.Enum):
-    """The strongest request in some bytes."""
-
     REQUEST = "requests for a frame or a hello, which change nothing"
     COMMAND = "a command"
     OTHER = "something that no host sends"
 
 
 def request_kind(data: bytes) -> RequestKind:
-    """The strongest request in these bytes, which must be whole packets."""
+    """The strongest request in these bytes, which are whole packets."""
     found = RequestKind.REQUEST if data else RequestKind.OTHER
     while data:
         mark = data[0]
@@ -103,7 +97,6 @@ def request_kind(data: bytes) -> RequestKind:
 
 
 def _without_pulses(data: bytes) -> bytes:
-    """Undo :func:`contactfpga.wire.framing.pulses` between two marks."""
     if len(data) % 8 or set(data) - {_ONE, _ZERO}:
         raise PacketError("framing", "pulses that are no bits")
     eights = (data[start : start + 8] for start in range(0, len(data), 8))

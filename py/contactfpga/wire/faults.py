@@ -1,4 +1,4 @@
-"""A board's reports on its lines: faults by name, and the slots of its self-test (docs/protocol.md)."""
+"""Reports of faulty lines, and slots of the self-test."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ KIND_FAULTS = 9
 SLOT = 1
 """Flag of a packet with a slot of the self-test."""
 SLOT_DIGITS = 2
-"""Digits of a slot's number."""
 
 STUCK, UNNAMED = "stuck", "unnamed fault"
-"""Names of a fault that the board cannot name, and before its name arrives."""
+"""A fault without a name, and one before its name arrives."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Faults:
-    """Lines that the board found faulty, counted from 0; of a board whose Skin has ``guard`` or ``self_test``.
+    """Faulty lines, counted from 0, found by a board whose Skin has ``guard`` or ``self_test``.
 
     >>> contactfpga.Faults(columns_open=(3,)).named(rows=8, columns=8).names
     ('column 3 open',)
@@ -30,20 +29,19 @@ class Faults:
     columns_open: tuple[int, ...] = ()
     """Columns that do not reach the guard row."""
     columns_stuck: tuple[int, ...] = ()
-    """Columns that read pressed while no row was driven; the guard column counts as the one after the last."""
+    """Columns that read pressed while no row was driven; the guard column's number follows the last column's."""
     joined: bool = False
     """Whether the self-test found joined lines."""
     names: tuple[str, ...] = dataclasses.field(default=(), compare=False)
     """The faults in words, sorted, as in :attr:`Zones.faults`."""
 
     def __bool__(self) -> bool:
-        """Whether there is a fault."""
         return bool(self.rows_open or self.columns_open or self.columns_stuck or self.joined)
 
     def named(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> Faults:
         """The faults with names, for a sheet of this size; masked switches check no line.
 
-        If all checked columns are open, the guard row is, and likewise for rows.
+        If all checked columns are open, the guard row is named instead, and likewise the guard column.
         """
         masked = set(mask)
         all_rows, all_columns = range(rows), range(columns)
@@ -64,7 +62,7 @@ def _open(line: str, guard: str, lines: tuple[int, ...], checked: set[int]) -> l
 
 @dataclasses.dataclass(frozen=True)
 class SelfTestSlot:
-    """What the board read in one slot of its self-test.
+    """Lines that read as selected in one slot of the self-test.
 
     >>> contactfpga.SelfTestSlot(number=1, rows=(0,), columns=()).rows
     (0,)
@@ -78,40 +76,37 @@ class SelfTestSlot:
 
 
 def digits_of(bits: int) -> int:
-    """Digits of a word of this many bits."""
     return -(-bits // DIGIT_BITS)
 
 
 def fault_bits(rows: int, columns: int, guard: bool, self_test: bool) -> int:
-    """Bits of the fault word: open rows and columns, stuck columns and guard column, and whether lines are joined; 0:
-    none."""
+    """Bits of the fault word: open rows, open columns, stuck columns with the guard column, joined lines; 0 without
+    reports."""
     return (rows + 2 * columns + 1 if guard else 0) + self_test
 
 
 def encode_faults(word: int, bits: int) -> bytes:
-    """The plain bytes of a report of faults."""
     return digits(word, digits_of(bits)) + bytes([last_byte(KIND_FAULTS)])
 
 
 def encode_slot(slot: int, word: int, bits: int) -> bytes:
-    """The plain bytes of a slot of the self-test."""
     return digits(slot, SLOT_DIGITS) + digits(word, digits_of(bits)) + bytes([last_byte(KIND_FAULTS, SLOT)])
 
 
 def is_slot(plain: bytes) -> bool:
-    """Whether a packet of this kind belongs to the self-test."""
+    """Whether an unsealed packet of this kind is a slot of the self-test."""
     return bool(plain[-1] & SLOT)
 
 
 def decode_faults(plain: bytes, rows: int, columns: int, guard: bool, self_test: bool) -> Faults:
-    """Read an unsealed fault report; raises :class:`PacketError` if this board cannot have sent it."""
+    """Read an unsealed fault report. Raises :class:`PacketError` if this board cannot have sent it."""
     parts = (rows, columns, columns + 1) if guard else (0, 0, 0)
     rows_open, columns_open, columns_stuck, joined = _lines(plain[:-1], *parts, int(self_test))
     return Faults(rows_open, columns_open, columns_stuck, bool(joined))
 
 
 def decode_slot(plain: bytes, rows: int, columns: int) -> SelfTestSlot:
-    """Read an unsealed slot of the self-test; raises :class:`PacketError` if this sheet's board cannot have sent it."""
+    """Read an unsealed slot of the self-test. Raises :class:`PacketError` as :func:`decode_faults`."""
     slot, word = plain[:SLOT_DIGITS], plain[SLOT_DIGITS:-1]
     if len(slot) < SLOT_DIGITS or not all(byte & 0x80 for byte in slot):
         raise PacketError("content", "a slot of the self-test has no number")

@@ -1,4 +1,4 @@
-"""Framing of packets: stuffing, check bytes, delimiter, and the last byte with the kind (docs/protocol.md)."""
+"""Framing of packets: stuffing, check bytes, delimiter, last byte."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ KIND_BITS = 4
 
 KIND_HELLO = 4
 KINDS = {report.name: report.kind for report in REPORTS.values()}
-"""Kind of a frame, by the Skin's ``report``."""
+"""Packet kind of a frame by the Skin's ``report``."""
 
 OLD_KINDS = (2, 3)
-"""Bytes of protocol 1 in place of a kind."""
+"""Kind bytes of protocol 1."""
 _OLD_HELLO_BITS = 0xF8, 0x20
 _OLD_HELLO_BYTES = 26
 
@@ -28,7 +28,7 @@ DIGIT_BITS = 7
 
 
 def digits(value: int, count: int) -> bytes:
-    """A number in ``count`` digits of seven bits, lowest first, none of them a zero byte."""
+    """A number in ``count`` digits of seven bits, lowest first; no digit is a zero byte."""
     assert 0 <= value < 1 << DIGIT_BITS * count, f"{value} does not fit {count} digits"
     return bytes(0x80 | value >> DIGIT_BITS * place & 0x7F for place in range(count))
 
@@ -44,7 +44,7 @@ def last_byte(kind: int, flags: int = 0) -> int:
 
 
 class PacketError(ValueError):
-    """Invalid bytes for a packet. ``reason`` is a key of the driver's counters."""
+    """A packet's bytes are invalid. ``reason`` is a key of the driver's counters."""
 
     def __init__(self, reason: str, message: str):
         super().__init__(message)
@@ -60,7 +60,6 @@ class OldPacket(PacketError):
 
 
 def kind_of(plain: bytes) -> int:
-    """Kind of an unsealed packet."""
     return plain[-1] >> FLAG_BITS
 
 
@@ -97,7 +96,7 @@ _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 def check_bytes(stuffed: bytes, before: bytes = b"") -> bytes:
     """CRC-16/MCRF4XX of ``before`` and the stuffed bytes, lowest bits first, in three nonzero bytes.
 
-    It reads bits in line order; the standard library has the mirror image.
+    The CRC takes bits in line order; the standard library's takes them mirrored.
     """
     mirrored = binascii.crc_hqx((before + stuffed).translate(_MIRRORED), 0xFFFF)
     crc = _MIRRORED[mirrored >> 8] | _MIRRORED[mirrored & 0xFF] << 8
@@ -110,19 +109,19 @@ _PULSES[DELIMITER] = bytes([_MARK])
 
 
 def pulses(data: bytes) -> bytes:
-    """Bytes for a board whose bits on the line are too short to be sampled: each zero byte becomes a low level of 5
-    bits, each bit of the others, lowest first, one of 9 bits for a zero and of 1 for a one."""
+    """Bytes as pulses, for a board whose bits on the line are too short to be sampled. A zero byte is a low level of 5
+    bits; a bit of another byte, lowest first, is one of 9 bits for 0 and of 1 for 1."""
     return b"".join(_PULSES[byte] for byte in data)
 
 
 def seal(plain: bytes, before: bytes = b"") -> bytes:
-    """A packet's bytes on the wire: stuffed, check bytes, delimiter. ``before`` as for :func:`check_bytes`."""
+    """A packet's bytes on the wire: stuffed, check bytes, delimiter; ``before`` as in :func:`check_bytes`."""
     stuffed = cobs_encode(plain)
     return stuffed + check_bytes(stuffed, before) + bytes([DELIMITER])
 
 
 def unreadable(packet: bytes) -> bool:
-    """Whether a packet from the board may be whole, which only the board's fingerprint can decide."""
+    """Whether a packet from the board may be whole, as far as can be told without its fingerprint."""
     marked = all(byte & 0x80 for byte in packet[-CHECK_BYTES:]) and packet[-1] < 0x84
     return len(packet) >= SHORTEST_PACKET and marked and not _bare(packet[-CHECK_BYTES - 1])
 
@@ -133,10 +132,9 @@ def _bare(last: int) -> bool:
 
 
 def unseal(packet: bytes, before: bytes) -> bytes:
-    """Undo :func:`seal` for a packet from the board, without its delimiter; raises :class:`PacketError`.
+    """Undo :func:`seal` for a packet from the board, without its delimiter. Raises :class:`PacketError`.
 
-    ``before``: additional bytes in the checks of all packets except hellos
-    (:func:`contactfpga.wire.protocol.check_prefix`).
+    ``before``: :func:`contactfpga.wire.protocol.check_prefix`, in the checks of all packets except hellos.
     """
     stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
     if len(stuffed) < 2:

@@ -1,4 +1,4 @@
-"""Hellos: fields by type and length, so that later boards can add fields (docs/protocol.md)."""
+"""Hellos: fields by type and length, so that later boards can add fields."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _REPORTS = tuple(report.name for report in sorted(REPORTS.values(), key=lambda r
 _SENDS = ("always", "on_change")
 _FINGERPRINT_BYTES = 8
 _CLOSED = 0x80
-"""Flag, beside the connectivity, of a sheet whose ends meet; readers that do not know it refuse the hello."""
+"""Flag of a sheet whose ends meet; a reader without this flag refuses the connectivity."""
 
 SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
 STATE_DIGITS = 16
 """Digits of the state; the last is unused."""
 
 STATE_OFFSET = 16
-"""Offset of the first digit in a hello of :func:`encode_hello`, from the leading delimiter on."""
+"""Offset of the state's first digit in a hello of :func:`encode_hello`, with its leading delimiter."""
 
 _SIZES = {
     SHEET: _SHEET.size,
@@ -46,15 +46,14 @@ _SIZES = {
     PLACE: len(SheetPlace._fields),
     CHECK: _CHECK.size,
 }
-"""Least bytes of a field."""
+"""Least bytes of a field by type."""
 _MANDATORY = {SHEET, STATE, PITCH, FINGERPRINT, RATES}
 _MOST_BYTES = 8192
-"""Most bytes of a hello."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Hello:
-    """What the board says about itself.
+    """A board's description of itself.
 
     >>> with contactfpga.open("sim://") as board:
     ...     board.hello.baud
@@ -69,11 +68,11 @@ class Hello:
     baud: int
     send: str
     guard: bool
-    """Whether the board has guard lines, and reports faults by name."""
+    """Whether the board has guard lines and so names faulty lines."""
     commands: bytes
     """Numbers of the board's commands; see :meth:`Board.command`."""
     units: UnitFacts | None = None
-    """Its pressure units; None: none."""
+    """Pressure units; None without any."""
     place: SheetPlace | None = None
     """The sheet's number among several on one FPGA, and their count; None for a board with one sheet."""
     sent: int
@@ -81,9 +80,9 @@ class Hello:
     epoch: int
     """Whole periods of 2^22 us since power-up."""
     heard: int
-    """Number of the last request received; see :func:`contactfpga.wire.protocol.may_number`."""
+    """Number of the last request received."""
     stuck: int
-    """Columns that read pressed while no row was driven, in the frame packed last; 7 stands for 7 or more."""
+    """Columns that read pressed while no row was driven, as of the last packed frame; 7 means 7 or more."""
 
     @property
     def self_test(self) -> bool:
@@ -92,16 +91,16 @@ class Hello:
 
     @property
     def pulsed(self) -> bool:
-        """Whether the board needs requests as pulses: it has fewer than 4 clocks per bit."""
+        """Whether requests must be pulses: the board has fewer than 4 clocks per bit."""
         return pulsed(self.clock_hz, self.baud)
 
 
 def encode_hello(
     skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0, place: SheetPlace | None = None
 ) -> bytes:
-    """The hello of a board of ``skin``, as on the wire, with a delimiter at either end.
+    """The hello of a board of ``skin`` on the wire, with a delimiter at either end.
 
-    ``place``: of the sheet among several; the packet itself is not numbered here.
+    ``place``: the sheet's number among several; the packet itself is not numbered here.
     """
     sheet = _SHEET.pack(
         skin.rows,
@@ -135,14 +134,14 @@ def encode_hello(
 
 
 class HelloReader:
-    """Collects hellos, which may span several packets."""
+    """Joins hellos from packets."""
 
     def __init__(self) -> None:
         self._fields: dict[int, bytes] = {}
         self._checked = bytearray()
 
     def take(self, plain: bytes) -> Hello | None:
-        """Add an unsealed hello packet; returns the hello that it completes. Raises :class:`PacketError`."""
+        """Add an unsealed hello packet; returns the hello that it completes, or None. Raises :class:`PacketError`."""
         try:
             return self._take(plain[:-1])
         except PacketError:
@@ -270,14 +269,14 @@ def find_hello(data: bytes, last: bool = False) -> int:
 
 
 class Cutter:
-    """Cuts a stream of bytes at its next hello."""
+    """Cuts a stream of bytes at the next hello."""
 
     def __init__(self) -> None:
         self.held = b""
         """The beginning of an incomplete packet."""
 
     def take(self, data: bytes) -> tuple[bytes, bytes]:
-        """Bytes before and after the cut; the latter are empty until a hello comes."""
+        """Bytes before and after the cut; without a hello, no bytes after."""
         data = self.held + data
         at = find_hello(data)
         if at >= 0:
@@ -290,13 +289,11 @@ class Cutter:
 
 
 def report_of(sheet: Sheet) -> str:
-    """A board's report."""
     precise = f" of {sheet.barycenter_bits} fraction bits" if sheet.report == "barycenter" else ""
     return f"report {sheet.report!r}{precise}"
 
 
 def describe(hello: Hello) -> str:
-    """The Skin in a board's hello."""
     sheet = hello.sheet
     name = f" named {hello.name!r}" if hello.name else ""
     return (
@@ -306,7 +303,7 @@ def describe(hello: Hello) -> str:
 
 
 def difference(hello: Hello, expected: Skin) -> str:
-    """The Skin of a board, and its difference from the expected one."""
+    """A board's Skin, and its difference from the expected one, in words."""
     told, asked = _facts(hello), _expected_facts(expected)
     differing = [f"{name} is {told[name]}, asked for was {asked[name]}" for name in told if told[name] != asked[name]]
     if differing:

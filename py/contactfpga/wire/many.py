@@ -1,5 +1,6 @@
-"""Many frames at once, as arrays. Anything but whole frames of the sheet is left to :mod:`contactfpga.wire.framing` and
-:func:`contactfpga.wire.protocol.decode_frame`, which read packets one by one and name their errors."""
+"""Many frames as arrays. Anything but a whole frame is marked invalid;
+:func:`contactfpga.wire.protocol.decode_frame` names its error.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ _LONGEST = 254
 """Bytes of a stuffed packet without full blocks."""
 _FLAG_MASK = (1 << len(FLAGS)) - 1
 OVERFLOW, MISMATCH, FAULT, MOTION = (1 << bit for bit in range(len(FLAGS)))
-"""Bits of :data:`FIELDS`' ``flags``."""
+"""Bits of ``flags`` in :data:`FIELDS`."""
 
 FIELDS = np.dtype(
     [
@@ -33,30 +34,30 @@ FIELDS = np.dtype(
     ],
     align=True,
 )
-"""Fields of a packet: whether it is a whole frame, then those of :class:`~contactfpga.wire.protocol.Frame`; ``items``
-counts its records."""
+"""Fields of a packet: validity, then those of :class:`~contactfpga.wire.protocol.Frame`; ``items`` counts its records.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class PacketTable:
-    """Consecutive packets."""
-
     packets: np.ndarray
     """(n,) of :data:`FIELDS`."""
     starts: np.ndarray
     """(n + 1,) starts of each packet's records."""
     records: np.ndarray
     """(m, 3) int64 of all packets in order: area and sums, or area and barycenter; (m, 4) for a sheet whose ends meet,
-    as :attr:`contactfpga.wire.protocol.Frame.moments`."""
+    as in
+    :attr:`contactfpga.wire.protocol.Frame.moments`.
+    """
 
     def part(self, start: int, end: int) -> PacketTable:
-        """Of some of them."""
         return PacketTable(self.packets[start:end], self.starts[start : end + 1], self.records)
 
 
 def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTable:
-    """Read packets between delimiters, of a sheet whose report has zones; ``before`` as for
-    :func:`contactfpga.wire.framing.unseal`."""
+    """Read packets without delimiters, of a sheet whose report has zones; ``before`` as in
+    :func:`contactfpga.wire.framing.unseal`.
+    """
     found = np.zeros(len(packets), FIELDS)
     sizes = list(map(len, packets))
     lengths = np.array(sizes)
@@ -126,7 +127,6 @@ def _unstuff(stuffed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked(data: np.ndarray, before: bytes) -> np.ndarray:
-    """Whether the check bytes are correct."""
     table, constant = _crc_table(data.shape[1] - CHECK_BYTES), _constant(data.shape[1] - CHECK_BYTES, before)
     crc = np.bitwise_xor.reduce(np.take(table, data[:, :-CHECK_BYTES] + _row_starts(data.shape[1])), axis=1) ^ constant
     right: np.ndarray = data[:, -1] == 0x80 | crc >> 14
@@ -157,20 +157,17 @@ def _crc_table(length: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=256)
 def _constant(length: int, before: bytes) -> int:
-    """The CRC of zero bytes."""
     low, middle, high = (byte & 0x7F for byte in check_bytes(bytes(length), before))
     return low | middle << 7 | high << 14
 
 
 def _words(data: np.ndarray) -> np.ndarray:
-    """int64 words of the last axis's bytes, lowest first."""
     padded = np.zeros((*data.shape[:-1], 8), np.uint8)
     padded[..., : data.shape[-1]] = data
     return padded.view("<i8")[..., 0]
 
 
 def _split(words: np.ndarray, widths: Sequence[int]) -> Iterator[np.ndarray]:
-    """Fields of words, lowest first, int64."""
     offset = 0
     for width in widths:
         yield words >> offset & (1 << width) - 1
@@ -186,7 +183,6 @@ def _agrees(fields: np.ndarray, items: int, widths: Widths) -> np.ndarray:
 
 
 def _possible(fields: np.ndarray, records: np.ndarray, widths: Widths) -> np.ndarray:
-    """Whether zones and cells are possible for one sheet."""
     area, x, y = (records[..., column] for column in range(3))
     scale = 1 << widths.sheet.barycenter_bits if widths.report.divided else area
     inside = (x <= (widths.sheet.columns - 1) * scale) & (y <= (widths.sheet.rows - 1) * scale) & (area > 0)

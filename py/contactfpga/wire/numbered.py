@@ -1,8 +1,7 @@
-"""Packets of a numbered sheet: several sheets share one FPGA and its line (docs/protocol.md).
+"""Packets of several sheets that share one FPGA and its line.
 
-Such a packet is an ordinary one with two bytes after its stuffed bytes, which the check also covers. Removing them and
-running the CRC backward over them keeps the check right or wrong. So sorting packets by sheet does not require knowing
-the check's prefix, and yields what a board of that one sheet would send.
+A numbered packet is an ordinary one with two bytes after its stuffed bytes, which the check covers too. Removing them
+and running the CRC backward keeps the check right or wrong, so packets can be sorted without the check's prefix.
 """
 
 from __future__ import annotations
@@ -16,9 +15,8 @@ from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
 
 KIND_NUMBERED = 11
 NUMBER_BYTES = 2
-"""Extra bytes of a numbered packet."""
 _BLOCK = 2
-"""A stuffed zero ends the packet itself; the block after it is one byte long."""
+"""COBS code of a zero after the packet and of a block of one byte."""
 _MARKS = (0x80, 0x80, 0xFC)
 """Bits of the check bytes that are not part of the CRC."""
 _BITS = (DIGIT_BITS, DIGIT_BITS, 16 - 2 * DIGIT_BITS)
@@ -26,20 +24,18 @@ _POLYNOMIAL = 0x8408
 
 
 class SheetPlace(NamedTuple):
-    """A sheet's position among those of its FPGA."""
+    """Position of a sheet among those of its FPGA."""
 
     number: int
-    """Number from 0 on."""
     sheets: int
 
 
 def closing(number: int) -> bytes:
-    """The two bytes after a packet's stuffed bytes."""
     return bytes([_BLOCK, framing.last_byte(KIND_NUMBERED, number)])
 
 
 def sheet_of(packet: bytes) -> int | None:
-    """The number in a packet without delimiters; None: none. The check is not verified."""
+    """The number in a packet without delimiters, whose check is not verified; None without a number."""
     if len(packet) < framing.SHORTEST_PACKET + NUMBER_BYTES:
         return None
     block, last = packet[-CHECK_BYTES - NUMBER_BYTES : -CHECK_BYTES]
@@ -47,20 +43,20 @@ def sheet_of(packet: bytes) -> int | None:
 
 
 def unnumbered(packet: bytes) -> bytes:
-    """The ordinary packet within a numbered one, both without delimiters."""
+    """The ordinary packet from a numbered one, both without delimiters."""
     numbered, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
     stuffed, closed = numbered[:-NUMBER_BYTES], numbered[-NUMBER_BYTES:]
     return stuffed + _moved(check, closed[::-1], _back)
 
 
 def numbered(packet: bytes, number: int) -> bytes:
-    """An ordinary packet converted to a numbered sheet's, both without delimiters."""
+    """The numbered packet from an ordinary one, both without delimiters."""
     stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
     return stuffed + closing(number) + _moved(check, closing(number), _on)
 
 
 def numbered_requests(data: bytes, number: int) -> bytes:
-    """Numbered versions of whole requests and commands with their delimiters, as bytes or as pulses."""
+    """Whole requests and commands, with delimiters, with a sheet's number, as bytes or as pulses."""
     return b"".join(_numbered_request(packet, pulsed, number) for packet, pulsed in _requests(data))
 
 
@@ -71,7 +67,6 @@ def _numbered_request(packet: bytes, pulsed: bool, number: int) -> bytes:
 
 
 def _requests(data: bytes) -> Iterator[tuple[bytes, bool]]:
-    """Each packet without delimiters, and whether it came as pulses."""
     while data:
         pulsed = data[0] != DELIMITER
         end = data.index(data[0], 1)
@@ -80,7 +75,6 @@ def _requests(data: bytes) -> Iterator[tuple[bytes, bool]]:
 
 
 def _of_pulses(bits: bytes) -> bytes:
-    """Undo :func:`contactfpga.wire.framing.pulses` for bytes without delimiters."""
     levels = [bit & 1 for bit in bits]
     return bytes(sum(levels[at + place] << place for place in range(8)) for at in range(0, len(levels), 8))
 
@@ -100,7 +94,6 @@ def _moved(check: bytes, data: bytes, step: Callable[[int, int], int]) -> bytes:
 
 
 def _on(crc: int, byte: int) -> int:
-    """The CRC after one more byte."""
     crc ^= byte
     for _ in range(8):
         crc = crc >> 1 ^ _POLYNOMIAL * (crc & 1)
@@ -108,7 +101,6 @@ def _on(crc: int, byte: int) -> int:
 
 
 def _back(crc: int, byte: int) -> int:
-    """The CRC before its last byte."""
     for _ in range(8):
         fed = crc >> 15
         crc = (crc ^ _POLYNOMIAL * fed) << 1 | fed

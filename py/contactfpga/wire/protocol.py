@@ -1,4 +1,4 @@
-"""Packets on the wire and their fields (docs/protocol.md)."""
+"""Packets on the wire and their fields."""
 
 from __future__ import annotations
 
@@ -87,14 +87,14 @@ FLAGS = ("overflow", "mismatch", "fault", "motion")
 """Names of a frame's flags, lowest bit first."""
 
 KIND_REQUEST = 5
-"""Kind of packets to the board."""
 REQUEST_HELLO = 1
 """Flag of a request for a hello as well."""
 
 
 def encode_request(number: int, hello: bool = False, pulsed: bool = False) -> bytes:
-    """A request with a number allowed by :func:`may_number`, as on the wire, with a delimiter at either end;
-    ``pulsed``: as :func:`~contactfpga.wire.framing.pulses`."""
+    """A request on the wire, with a delimiter at either end; ``number`` meets :func:`may_number`, ``pulsed`` is as in
+    :func:`~contactfpga.wire.framing.pulses`.
+    """
     assert may_number(number), f"{number} is no number of a request"
     plain = digits(number, HEARD_DIGITS) + bytes([last_byte(KIND_REQUEST, REQUEST_HELLO * hello)])
     data = bytes([DELIMITER]) + seal(plain)
@@ -102,13 +102,13 @@ def encode_request(number: int, hello: bool = False, pulsed: bool = False) -> by
 
 
 def may_number(number: int) -> bool:
-    """Whether a request may have this number: no digit is 0, nor are the bits that frames repeat."""
+    """Whether a request may have this number: neither a digit nor the bits that frames repeat are 0."""
     each = (number >> DIGIT_BITS * place & 0x7F for place in range(HEARD_DIGITS))
     return 0 <= number < 1 << DIGIT_BITS * HEARD_DIGITS and all(each) and number % (1 << HEARD_BITS) != 0
 
 
 def check_prefix(skin: Skin | Hello) -> bytes:
-    """Prefix of the frames' check: the start of the board's fingerprint."""
+    """Prefix of the check of frames: the start of the board's fingerprint."""
     return skin.fingerprint[:2]
 
 
@@ -117,34 +117,31 @@ class Frame:
     """One received frame."""
 
     sequence: int
-    """Frames sent before this one, modulo 256."""
+    """Number of frames sent before this one, modulo 256."""
     time_us: int
     """Device time of the first row's sample, modulo 2^24 us."""
     flags: frozenset[str]
     overwritten: int
-    """Complete frames that a newer one replaced before they were sent, modulo 2^``Widths.overwritten_bits``."""
+    """Number of frames that newer ones replaced before they were sent, modulo 2^``Widths.overwritten_bits``."""
     heard: int
-    """The lowest bits of the number of the last request received before the frame's scan; 0: none."""
+    """Lowest bits of the number of the last request received before the frame's scan; 0: none."""
     zones: int
-    """Zones on the sheet, including those beyond the capacity; 0 with ``report = "cells"``."""
+    """Number of zones on the sheet, including those beyond the capacity; 0 with ``report = "cells"``."""
     cells: int
-    """Pressed switches."""
+    """Number of pressed switches."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each zone in the frame; (0, 3) with another report than ``moments``. (n, 4)
-    for a sheet whose ends meet, with the cells past the seam (:mod:`contactfpga.zones.around`)."""
+    """(n, 3) int64 area, sum x, sum y of each zone with ``report = "moments"``; otherwise (0, 3). (n, 4) for a sheet
+    whose ends meet, with the cells past the seam (:mod:`contactfpga.zones.around`)."""
     bitmap: np.ndarray | None
-    """(rows, columns) bool with ``report = "cells"``, else None."""
+    """(rows, columns) bool with ``report = "cells"``; otherwise None."""
     barycenters: np.ndarray | None = None
-    """With ``report = "barycenter"`` (n, 3) int64: area, x, y of each zone in the frame, x and y in cells /
-    2^``barycenter_bits``; else None."""
+    """(n, 3) int64 area, x, y of each zone with ``report = "barycenter"``, x and y in cells / 2^``barycenter_bits``;
+    otherwise None."""
 
 
 def decode_frame(plain: bytes, widths: Widths) -> Frame:
-    """Read an unsealed frame of the sheet of ``widths``.
-
-    Raises :class:`PacketError` if its length contradicts its zone count, or, without a mismatch flag, its cells
-    contradict its zones.
-    """
+    """Read an unsealed frame of the sheet of ``widths``. Raises :class:`PacketError` if its length contradicts its zone
+    count, or, without a mismatch flag, its cells contradict its zones."""
     sheet = widths.sheet
     kind = KINDS[sheet.report]
     if kind_of(plain) != kind:
@@ -188,16 +185,13 @@ _NO_CLOSED_RECORDS.flags.writeable = False
 
 
 def no_records(sheet: Sheet) -> np.ndarray:
-    """The records of a frame without zones."""
     return _NO_CLOSED_RECORDS if sheet.closed else NO_RECORDS
 
 
 FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << len(FLAGS))]
-"""The flags of a frame by the bits of its last byte."""
 
 
 def _check_sums(frame: Frame, widths: Widths) -> None:
-    """Check that zones and cells are possible for one sheet; raises :class:`PacketError`."""
     sheet = widths.sheet
     if frame.bitmap is not None:
         carried = int(frame.bitmap.sum())
@@ -222,7 +216,6 @@ def _check_sums(frame: Frame, widths: Widths) -> None:
 
 
 def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    """(zones, 3) int64, or (zones, 4): the fields of zone records."""
     if not zones:
         return no_records(widths.sheet)
     size = widths.record_bytes
@@ -234,7 +227,7 @@ def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
 
 
 def _barycenters(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    """(zones, 3) int64 with ``report = "barycenter"``; all cells of the sheet, sent as 0, are restored."""
+    """(zones, 3) int64 with ``report = "barycenter"``; an area of all cells, sent as 0, is restored."""
     records = _records(data, zones, widths)
     if widths.cells == 1 << widths.record_bits[0] and zones:
         records[records[:, 0] == 0, 0] = widths.cells
@@ -250,7 +243,7 @@ def _bitmap(data: bytes, widths: Widths) -> np.ndarray:
 
 
 def _split(word: int, *widths: int) -> list[int]:
-    """Fields of a word, lowest first, and the rest above them."""
+    """Fields of a word, lowest first, then its remaining bits."""
     fields = []
     for width in widths:
         fields.append(word & (1 << width) - 1)

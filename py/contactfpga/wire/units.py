@@ -1,4 +1,4 @@
-"""A board's pressure units, and the commands for their zeros and thresholds (docs/protocol.md)."""
+"""Packets of pressure units, and the commands for their zeros and thresholds."""
 
 from __future__ import annotations
 
@@ -21,12 +21,11 @@ KIND_UNITS = 8
 TIME_BITS, SEQUENCE_BITS = 24, 8
 TRAILER_DIGITS = -(-(TIME_BITS + SEQUENCE_BITS) // DIGIT_BITS)
 OVER, ARMED = 1, 2
-"""Flags: a threshold is reached, and there is one."""
+"""Flags: a threshold is reached; a threshold is set."""
 
 MOST_BITS = 28
-"""Largest number of bits of a reading."""
 MOST_SUM_BITS = MOST_BITS + 7 + 3
-"""Bits of the largest magnitude of a sum: readings times weights of seven bits, of eight units."""
+"""Most bits of a sum's magnitude: readings times weights of seven bits, over eight units."""
 
 _FACTS = struct.Struct("<BBBBHI")
 FACTS_BYTES = _FACTS.size
@@ -34,34 +33,28 @@ FACTS_BYTES = _FACTS.size
 
 @dataclasses.dataclass(frozen=True)
 class UnitFacts:
-    """The pressure units in a hello."""
-
     count: int
     bits: int
-    """Bits of a reading."""
     sums: int
     sum_bits: int
-    """Bits of the largest magnitude of a sum; 0: none."""
+    """Bits of the largest magnitude of a sum; 0 without sums."""
     spacing_clocks: int
-    """Clocks from a unit's sample to the next one's; 0: simultaneous samples."""
+    """Clocks from a unit's sample to the next unit's; 0 for simultaneous samples."""
     sweep_clocks: int
     """Clocks from one sweep to the next."""
 
     @classmethod
     def of(cls, units: Units) -> UnitFacts:
-        """The units in the hello of a Skin's board."""
         skin = units.skin
         sums = len(skin.unit_sums)
         clocks = units.spacing_clocks, units.sweep_clocks
         return cls(skin.units, units.converter.bits, sums, units.sum_bits, *clocks)
 
     def encode(self) -> bytes:
-        """The value in a hello."""
         return _FACTS.pack(*dataclasses.astuple(self))
 
     @classmethod
     def decode(cls, value: bytes) -> UnitFacts:
-        """Read a hello's value. Raises ValueError."""
         facts = cls(*_FACTS.unpack_from(value))
         if not (1 <= facts.count <= 1 << INDEX_BITS and 1 <= facts.bits <= MOST_BITS and facts.sweep_clocks):
             raise ValueError(f"{facts.count} units of {facts.bits} bits, {facts.sweep_clocks} clocks a sweep")
@@ -72,33 +65,30 @@ class UnitFacts:
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """The readings of all units in turn."""
+    """Readings of all units in turn."""
 
     time_us: int
     """Device time of the first unit's sample, modulo 2^24 us."""
     sequence: int
-    """Sweeps before this one, modulo 256."""
+    """Number of sweeps before this one, modulo 256."""
     readings: tuple[int, ...]
     over: bool
     """Whether a threshold is reached."""
     armed: bool
-    """Whether the board has a threshold."""
 
 
 def plain_bytes(units: int, bits: int) -> int:
-    """Length of a packet in plain bytes, before framing."""
     return units * digits_of_reading(bits) + TRAILER_DIGITS + 1
 
 
 def encode_sweep(sweep: Sweep, bits: int) -> bytes:
-    """The plain bytes of a packet."""
     data = b"".join(digits(reading, digits_of_reading(bits)) for reading in sweep.readings)
     trailer = digits(sweep.sequence << TIME_BITS | sweep.time_us, TRAILER_DIGITS)
     return data + trailer + bytes([last_byte(KIND_UNITS, OVER * sweep.over | ARMED * sweep.armed)])
 
 
 def decode_sweep(plain: bytes, facts: UnitFacts) -> Sweep:
-    """Read an unsealed packet; raises :class:`PacketError` if this board cannot have sent it."""
+    """Read an unsealed packet. Raises :class:`PacketError` if this board cannot have sent it."""
     if len(plain) != plain_bytes(facts.count, facts.bits):
         raise PacketError("length", f"sweep of {len(plain)} bytes; {facts.count} units take another number")
     width, trailer = digits_of_reading(facts.bits), number(plain[-TRAILER_DIGITS - 1 : -1])
@@ -118,13 +108,12 @@ def zero_value(facts: UnitFacts, unit: int, reading: object) -> tuple[int, int]:
 
 
 def threshold_value(facts: UnitFacts, unit: int, deviation: object) -> tuple[int, int]:
-    """(what, value) of the command that sets the deviation from which a unit raises ``contact``; 0: never."""
+    """(what, value) of the command that sets a unit's threshold; 0: never reached."""
     return _value(THRESHOLD, "unit", unit, facts.count, "threshold", deviation, facts.bits)
 
 
 def sum_threshold_value(facts: UnitFacts, index: int, deviation: object) -> tuple[int, int]:
-    """(what, value) of the command that sets a weighted sum's threshold, rounded down to the board's steps, but not to
-    0."""
+    """(what, value) of the command that sets a sum's threshold, rounded down to the board's steps, but not to 0."""
     return _value(SUM_THRESHOLD, "sum", index, facts.sums, "threshold", deviation, facts.sum_bits)
 
 

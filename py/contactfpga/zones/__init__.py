@@ -1,1 +1,1 @@
-"""Zones of a frame and their places, many frames as arrays, and labels and ghosts found on the host."""
+"""Zones of frames: places, arrays, and labels and ghosts found on the host."""

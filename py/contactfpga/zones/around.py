@@ -1,8 +1,8 @@
-"""Zones of a sheet whose ends meet: columns counted on past the seam, and zones without a place.
+"""Zones of a sheet whose ends meet: columns counted on past the seam, and zones without an x.
 
-Records have a fourth number: the zone's cells past the seam, relative to the others. All of them: the zone is a
-``ring``, whose cells form a closed path around the cylinder. More: it is ``wound``, its cells are on more than two
-turns. Such a zone has a y but no x.
+Records have a fourth number, the zone's cells past the seam relative to the others. If this is the area, the zone is a
+``ring``: a path of its cells closes around the cylinder. If it is more, the zone is ``wound``: its cells are on more
+than two turns. Such a zone has a y but no x.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 WINDINGS = ("", "ring", "wound")
-"""Names for :func:`windings`; the first is an ordinary zone."""
+"""Names of the values of :func:`windings`; "" is an ordinary zone."""
 
 Run = tuple[int, int, int]
-"""Row, first column, column after the last one."""
+"""Row, first column, and column after the last one."""
 
 
 def windings(records: np.ndarray) -> np.ndarray:
@@ -24,8 +24,8 @@ def windings(records: np.ndarray) -> np.ndarray:
 
 
 def flat(records: np.ndarray, columns: int) -> np.ndarray:
-    """(n, 3) int64: area and sums of (n, 4) records, with columns counted on past the seam for zones with an x, which
-    is from 0 to ``columns``."""
+    """(n, 3) int64 area and sums of (n, 4) records, with columns counted on past the seam, so that x is from 0 to
+    ``columns``."""
     area, sum_x, sum_y, turned = records.T
     around = columns * np.maximum(area, 1)
     unwrapped = (sum_x + columns * turned) % around
@@ -33,12 +33,12 @@ def flat(records: np.ndarray, columns: int) -> np.ndarray:
 
 
 def across(distance: float, around: float | None) -> float:
-    """A distance along x, the shorter way around a cylinder of this circumference; None: no cylinder."""
+    """A distance along x, the shorter way around; ``around``: circumference, or None for an open sheet."""
     return distance if around is None else (distance + around / 2) % around - around / 2
 
 
 def label(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
-    """The result of :func:`contactfpga.zones.labels.label`, and the (n, 4) records of the zones."""
+    """The result of :func:`contactfpga.zones.labels.label`, and (n, 4) records of the zones."""
     runs = _runs(cells)
     neighbors = _neighbors(runs, cells.shape[1], connectivity)
     turns: dict[int, int] = {}
@@ -64,7 +64,6 @@ def _runs(cells: np.ndarray) -> list[Run]:
 
 
 def _neighbors(runs: list[Run], columns: int, connectivity: int) -> list[list[tuple[int, int]]]:
-    """The runs that touch each run, and by how many turns they are further on."""
     reach = 1 if connectivity == 8 else 0
     found: list[list[tuple[int, int]]] = [[] for _ in runs]
     of_row: dict[int, list[int]] = {}
@@ -81,7 +80,7 @@ def _neighbors(runs: list[Run], columns: int, connectivity: int) -> list[list[tu
 
 
 def _spread(seed: int, neighbors: list[list[tuple[int, int]]], turns: dict[int, int]) -> tuple[list[int], bool]:
-    """The runs of a zone, their turns, and whether they close around."""
+    """The runs of a zone, and whether they close around; adds their turns."""
     turns[seed] = 0
     found, ring = [seed], False
     for run in found:

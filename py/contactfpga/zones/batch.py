@@ -40,16 +40,17 @@ recording."""
 
 _WHICH = [("frame", np.int64), ("time_us", np.int64), ("sequence", np.int64)]
 ZONE_DTYPE = np.dtype(_WHICH + [(name, DTYPE[name]) for name in DTYPE.names or ()])
-"""Fields of :attr:`Batch.zones`: ``frame`` is the index in :attr:`Batch.frames`, whose time and sequence are repeated;
-the others are those of :class:`Zone`, with NaN for None."""
+"""Fields of :attr:`Batch.zones`: ``frame``, the index in :attr:`Batch.frames`, its time and sequence, and the fields of
+:class:`Zone`, with NaN for None.
+"""
 DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in DIVIDED_DTYPE.names or ()])
 """:data:`ZONE_DTYPE` without the sums, for ``report = "barycenter"``."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Batch:
-    """Consecutive frames and all of their zones: ``batch.zones["x_mm"]`` is an array over all zones, in mm, and
-    ``batch.frames["time_us"]`` one over all frames, in us.
+    """Consecutive frames as arrays: ``zones["x_mm"]`` over all zones, in mm; ``frames["time_us"]`` over all frames, in
+    us.
 
     >>> with contactfpga.open("sim://?scene=two_fingers") as board:
     ...     batch = board.batch()
@@ -60,12 +61,11 @@ class Batch:
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""
     zones: np.ndarray
-    """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and within these of the zones."""
+    """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and of their zones."""
     faults: tuple[tuple[str, ...], ...] = ()
     """:attr:`Zones.faults` of each frame."""
 
     def __len__(self) -> int:
-        """Number of frames."""
         return len(self.frames)
 
     def __repr__(self) -> str:
@@ -79,18 +79,18 @@ class Batch:
         return starts
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row for each zone, with the fields of :attr:`zones` as columns; ``point_mm`` and ``normal`` are three each
-        (``point_x_mm``). ``pandas.DataFrame(batch.frames)`` has a row for each frame, without zones too. Needs pandas:
-        raises :class:`MissingExtra`."""
+        """A row per zone, with the fields of :attr:`zones` as columns; ``point_mm`` and ``normal`` are three columns
+        each (``point_x_mm``). ``pandas.DataFrame(batch.frames)`` has a row per frame. Raises :class:`MissingExtra`
+        without pandas."""
         return tables.to_pandas(self.zones)
 
     def to_arrow(self) -> pyarrow.Table:
-        """The zones as a table of pyarrow, with null for NaN. Raises :class:`MissingExtra`."""
+        """The zones as a pyarrow table, with null for NaN. Raises :class:`MissingExtra` without pyarrow."""
         return tables.to_arrow(self.zones)
 
     @classmethod
     def of(cls, frames: Sequence[Zones | Run]) -> Batch:
-        """A batch of frames of one sheet."""
+        """A batch of one sheet's frames."""
         described = np.zeros(sum(len(one) if isinstance(one, Run) else 1 for one in frames), FRAME_DTYPE)
         counts = np.zeros(len(described), np.int64)
         faults: list[tuple[str, ...]] = []
@@ -110,7 +110,6 @@ class Batch:
 
 
 def _row(one: Zones) -> tuple[float, ...]:
-    """A row of :data:`FRAME_DTYPE`."""
     return (
         one.time_us,
         *(math.nan if value is None else value for value in (one.host_time_s, one.host_sigma_s, one.arrived_s)),
@@ -127,7 +126,6 @@ _FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT, "motion": 
 
 
 def _describe(run: Run, out: np.ndarray) -> None:
-    """Rows of :data:`FRAME_DTYPE` of a run's frames."""
     out["time_us"] = run.times_us
     line = run.line
     out["host_time_s"] = math.nan if line is None else line.at(run.times_us)
@@ -168,7 +166,7 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
 
 
 def _records(items: Sequence[Zones | Run]) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 3) :attr:`Zones.records`, and (m,) indexes in :data:`around.WINDINGS` for a sheet whose ends meet."""
+    """(m, 3) :attr:`Zones.records`, and for a sheet whose ends meet (m,) indexes in :data:`around.WINDINGS`."""
     sheet = items[0].sheet
     if not sheet.closed:
         records = np.concatenate([one.carried if isinstance(one, Run) else one.records for one in items])

@@ -1,24 +1,20 @@
-"""Zones and cells of a sheet without diodes that other pressed switches may have made.
+"""Ghosts: zones and cells that read pressed on a sheet without diodes because of other pressed switches.
 
-Without diodes a current takes every path through pressed switches: a selected row reads pressed in all columns joined
-with it, also over other rows. In a frame without changes the rows and columns so joined read pressed in all of their
-crossings, a *block*; blocks share no row or column. The really pressed cells of a block are unknown: any of its
-crossings that join it. So
+Current takes every path through pressed switches, so a selected row reads pressed in all columns joined with it, also
+over other rows. In a frame without changes the joined rows and columns read pressed in all their crossings, a *block*;
+blocks share no row or column. Any crossings that join a block may be the really pressed ones. So
 
-- a cell may be a ghost if its block has another row and another column, that is, if it is a corner of a rectangle whose
-  other corners are pressed, too;
-- with 4-connectivity a zone is a run of a block's rows times a run of its columns, and it may be wholly made of ghosts
-  if the block has another run of rows and another run of columns. Zones of one run of rows have the same y, others
-  never do, as two runs with one middle would overlap; likewise columns and x.
+- a cell may be a ghost if its block has another row and another column: it is a corner of a rectangle of pressed cells;
+- with 4-connectivity a zone is a run of a block's rows times a run of its columns. It may be wholly ghosts if the block
+  has another run of rows and another run of columns. Two runs of rows never have one middle, so only zones of one run
+  have the same y; likewise columns and x.
 
-Both hold exactly, in both directions. Zones of one block may also have grown, or been joined, by ghosts; they are found
-by their common x or y. Invisible is a block that is one zone: contacts may hide in it whose rows and columns, taken
-together, have no gap.
+Both hold exactly, in both directions. Zones of one block may also have grown or joined by ghosts. A block that is one
+zone may hide contacts whose rows and columns, taken together, have no gap.
 
-If a switch changes during the scan, the rows before it do not show it yet, and corners may be hidden in that frame. A
-row itself is read at once, so a ghost's own row shows another cell. So in a frame that differs from the previous one,
-everything that may have a neighbor in its row is suspect: no ghost is missed unless a switch changes twice between two
-frames.
+If a switch changes during the scan, rows scanned before lack the change, and corners may be hidden. But a row is read
+at once, so a ghost's own row shows another cell. So in a frame that differs from the previous one every cell or zone
+with another in its row is suspect; a ghost is missed only if a switch changes twice between two frames.
 """
 
 from __future__ import annotations
@@ -35,7 +31,7 @@ from contactfpga.zones import labels
 
 def cells(frame: Frame, before: Frame | None = None) -> np.ndarray:
     """(rows, columns) bool: cells of a frame with ``report = "cells"`` that may be ghosts; ``before``: the previous
-    frame, or None."""
+    frame."""
     assert frame.bitmap is not None
     pressed = frame.bitmap.astype(np.int64)
     in_row = pressed.sum(axis=1, keepdims=True)
@@ -48,9 +44,9 @@ def cells(frame: Frame, before: Frame | None = None) -> np.ndarray:
 
 
 def zones(frame: Frame, before: Frame | None = None) -> list[bool]:
-    """For each zone of a frame with ``report = "moments"`` and 4-connectivity whether it may be wholly made of ghosts.
+    """Whether each zone of a frame with ``report = "moments"`` and 4-connectivity may be wholly ghosts.
 
-    If zones are missing or wrong (``overflow``, ``mismatch``), each may be.
+    After ``overflow`` or ``mismatch``, each zone may be.
     """
     moments = frame.moments.tolist()
     if frame.flags & {"overflow", "mismatch"}:
@@ -62,10 +58,10 @@ def zones(frame: Frame, before: Frame | None = None) -> list[bool]:
 
 
 def labelled(frame: Frame, before: Frame | None, numbers: np.ndarray) -> list[bool]:
-    """For each zone of a frame with ``report = "cells"`` whether it may be wholly made of ghosts; ``numbers``: zone
-    numbers by cell, from 1.
+    """Whether each zone of a frame with ``report = "cells"`` may be wholly ghosts; ``numbers``: zone of each cell, from
+    1.
 
-    With 8-connectivity a zone may be so made if all its edge-connected parts may.
+    With 8-connectivity a zone may be wholly ghosts if each of its edge-connected parts may.
     """
     assert frame.bitmap is not None
     parts = labels.label(frame.bitmap, 4)
@@ -75,14 +71,13 @@ def labelled(frame: Frame, before: Frame | None, numbers: np.ndarray) -> list[bo
 
 
 def _as_moments(frame: Frame, parts: np.ndarray | None = None) -> Frame:
-    """The frame with the 4-connected zones of its bitmap."""
     if frame.bitmap is None:
         return frame
     return dataclasses.replace(frame, moments=labels.moments(labels.label(frame.bitmap, 4) if parts is None else parts))
 
 
 def spread(frame: Frame, before: Frame | None = None) -> bool:
-    """Whether some zones of such a frame may include ghosts made by switches elsewhere."""
+    """Whether zones of a frame with ``report = "moments"`` may include ghosts."""
     suspects = zones(frame, before)
     return any(suspects) or (
         len(suspects) > 1
@@ -91,11 +86,9 @@ def spread(frame: Frame, before: Frame | None = None) -> bool:
 
 
 def _middles(moments: list[list[int]]) -> list[Counter[tuple[int, int]]]:
-    """Number of zones with each x, and each y."""
     return [Counter(_reduced(sums[axis], sums[0]) for sums in moments) for axis in (1, 2)]
 
 
 def _reduced(total: int, area: int) -> tuple[int, int]:
-    """total / area as a reduced fraction, for exact comparison."""
     shared = math.gcd(total, area)
     return total // shared, area // shared

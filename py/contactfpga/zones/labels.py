@@ -1,4 +1,4 @@
-"""Zones of pressed cells, found on the host: with ``report = "cells"`` the board sends no zones."""
+"""Zones of a bitmap, found on the host: with ``report = "cells"`` the board sends none."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import numpy as np
 
 
 def label(cells: np.ndarray, connectivity: int) -> np.ndarray:
-    """(rows, columns) int64: the number of each pressed cell's zone, from 1 in the order of the zones' first cells; 0
-    where nothing is pressed. ``connectivity``: 8 joins cells that share a corner, 4 only those that share an edge."""
+    """(rows, columns) int64: zone of each pressed cell, from 1 in the order of first cells; otherwise 0.
+
+    ``connectivity``: 8 joins cells that share a corner, 4 only those that share an edge.
+    """
     reach = 1 if connectivity == 8 else 0
     runs: list[tuple[int, int, int]] = []  # row, first column, column after the last one
     parents: list[int] = []
@@ -33,7 +35,7 @@ def label(cells: np.ndarray, connectivity: int) -> np.ndarray:
 
 
 def moments(labels: np.ndarray) -> np.ndarray:
-    """(n, 3) int64: area, sum x and sum y of each zone of :func:`label`, in the order of their numbers."""
+    """(n, 3) int64 area, sum x and sum y of each zone of :func:`label`."""
     y, x = np.nonzero(labels)
     number = labels[y, x] - 1
     sums = np.zeros((int(labels.max(initial=0)), 3), np.int64)
@@ -49,6 +51,5 @@ def _root(parents: list[int], run: int) -> int:
 
 
 def _join(parents: list[int], one: int, other: int) -> None:
-    """Join two zones, whose root is the first run."""
     first, second = sorted((_root(parents, one), _root(parents, other)))
     parents[second] = first

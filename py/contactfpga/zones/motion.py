@@ -9,8 +9,8 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones import around
 
 LIMIT = 1.0
-"""Smallest motion in pitches per scan that is reported: a frame's rows are sampled in turn, so a zone may be off by
-about its contact's motion meanwhile."""
+"""Least reported motion in pitches per scan. Rows are sampled in turn, so a zone may be off by about the motion of its
+contact during a scan."""
 
 _SEQUENCES = 256
 
@@ -18,16 +18,16 @@ Places = list[tuple[float, float]]
 
 
 def adjacent(frame: Frame, before: Frame) -> bool:
-    """Whether no frame was lost or overwritten between these two. With ``send = "on_change"`` the first is valid until
-    the scan before the second."""
+    """Whether no frame was lost or overwritten between two frames. With ``send = "on_change"`` the first frame holds
+    until the scan before the second."""
     return (frame.sequence - before.sequence) % _SEQUENCES == 1 and frame.overwritten == before.overwritten
 
 
 def moved(records: np.ndarray, earlier: np.ndarray, sheet: Sheet) -> bool:
-    """Whether a zone is farther than :data:`LIMIT` pitches from each zone of an adjacent frame with as many.
+    """Whether a zone is more than :data:`LIMIT` pitches from each zone of an adjacent frame with as many.
 
-    Both as :attr:`contactfpga.Zones.records`, or for a sheet whose ends meet :attr:`contactfpga.Zones.closed_records`.
-    Zones without an x are compared by y, and only with each other.
+    Records are :attr:`contactfpga.Zones.records`, or :attr:`contactfpga.Zones.closed_records` of a sheet whose ends
+    meet, where zones without an x are compared by y, only with each other.
     """
     if len(records) != len(earlier) or np.array_equal(records, earlier):
         return False
@@ -42,13 +42,12 @@ def _far(places: Places, old: Places, columns: int | None = None) -> bool:
 
 
 def _around(records: np.ndarray, sheet: Sheet) -> tuple[Places, Places]:
-    """Places of the zones with an x, and of those without, with x = 0."""
+    """Places of zones with an x, and of zones without one, with x = 0."""
     winds = around.windings(records) > 0
     flat = around.flat(records, sheet.columns)
     return _places(flat[~winds], sheet), [(0.0, y) for _, y in _places(flat[winds], sheet)]
 
 
 def _places(records: np.ndarray, sheet: Sheet) -> Places:
-    """x and y in pitches of the zones with a place."""
     steps = 1 << sheet.barycenter_bits if sheet.report == "barycenter" else None
     return [(x / (steps or area), y / (steps or area)) for area, x, y in records.tolist() if area]

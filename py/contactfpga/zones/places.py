@@ -1,7 +1,6 @@
-"""Places of zones by a table: where contacts of a known kind are, given their zone.
+"""Places of contacts of one known kind, such as a finger of known size, from a table by zone.
 
-A zone's barycenter is that of its cells. If only contacts of one kind touch, such as a finger of known size, those with
-cells of this number and this barycenter within the cell have another mean place. The table has it.
+The table has the mean place of such contacts for each area and each barycenter's offset within its cell.
 """
 
 from __future__ import annotations
@@ -25,11 +24,11 @@ MAX_KEYS = 1 << 20
 
 
 class PlaceTable:
-    """Mean places of contacts, relative to a zone's barycenter.
+    """Mean places of contacts, relative to their zones' barycenters.
 
-    ``pitch_mm``: (2,) the sheet's, along columns and rows; ``keys``: (n, 3) int, a zone's area in cells and the
-    remainders of its sums of columns and rows after division by it; ``offsets_mm``: (n, 2) from the barycenter to the
-    place. Raises ValueError for arrays of other shapes or values.
+    ``pitch_mm``: (2,) along columns and rows. ``keys``: (n, 3) int, a zone's area in cells and the remainders of its
+    sums of columns and rows after division by the area. ``offsets_mm``: (n, 2) from barycenter to place. Raises
+    ValueError for other shapes or values.
     """
 
     def __init__(self, pitch_mm: np.ndarray, keys: np.ndarray, offsets_mm: np.ndarray):
@@ -40,10 +39,10 @@ class PlaceTable:
         }
 
     def place_mm(self, zone: Zone) -> tuple[float, float] | None:
-        """Place in mm of this zone's contact; None for a zone without a place.
+        """Place in mm of a zone's contact; None for a zone without an x.
 
-        The barycenter, if the table lacks such a zone or ``report = "barycenter"`` sends no sums. The table does not
-        apply at an edge of the sheet, where cells are missing. Raises ValueError for a sheet of another pitch.
+        Without an entry, or without sums (``report = "barycenter"``), this is the barycenter. The table does not hold
+        at an edge of the sheet. Raises ValueError for a sheet of another pitch.
         """
         if zone.x_mm is None or zone.y_mm is None:
             return None
@@ -63,7 +62,7 @@ class PlaceTable:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a table of :meth:`save`. Raises ValueError for another file, and OSError."""
+        """Read a table of :meth:`save`. Raises ValueError for another file, OSError."""
         held = array_file.read(path, NAMES, 24 * MAX_KEYS)
         missing = [name for name in NAMES if name not in held]
         if missing:

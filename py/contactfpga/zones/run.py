@@ -1,4 +1,4 @@
-"""Consecutive frames of one sheet as arrays, converted to :class:`~contactfpga.Zones` one by one on demand."""
+"""Consecutive frames of one sheet as arrays, converted to :class:`~contactfpga.Zones` on demand."""
 
 from __future__ import annotations
 
@@ -17,31 +17,26 @@ from contactfpga.zones.zone import HostLine, HostLines, Zones
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """One frame or more, of a sheet with a diode per switch and a report of zones."""
+    """At least one frame, of a sheet with diodes and a report of zones."""
 
     sheet: Sheet
     packets: np.ndarray
-    """(n,) of :data:`contactfpga.wire.many.FIELDS`, all valid."""
+    """(n,) valid packets of :data:`contactfpga.wire.many.FIELDS`."""
     starts: np.ndarray
-    """(n + 1,) starts of each frame's records; the first need not be 0."""
+    """(n + 1,) starts of each frame's records; the first may be above 0."""
     records: np.ndarray
-    """(m, 3) int64, or (m, 4) for a sheet whose ends meet, at least up to the last start."""
+    """(m, 3) int64, or (m, 4) for a sheet whose ends meet."""
     times_us: np.ndarray
-    """(n,) int64, since power-up."""
     line: HostLine | HostLines | None
-    """When they arrived, together or each by itself, and their times on the host's clock; None in a recording."""
+    """Arrival times and times on the host's clock, for all frames or each; None in a recording."""
     before: Frame | None = None
-    """The frame before the first one."""
     faults: tuple[str, ...] = (STUCK,)
-    """Faults of its flagged frames; see :attr:`Zones.faults`."""
     history: UnitHistory | None = None
-    """Of the board's pressure units."""
 
     def __len__(self) -> int:
         return len(self.packets)
 
     def after(self, index: int) -> Run:
-        """The run without the first frames."""
         return dataclasses.replace(
             self,
             packets=self.packets[index:],
@@ -53,7 +48,7 @@ class Run:
 
     @property
     def carried(self) -> np.ndarray:
-        """(k, 3): the records of its own frames."""
+        """(k, 3) or (k, 4) records of the run's own frames."""
         return self.records[self.starts[0] : self.starts[-1]]
 
     def __getitem__(self, index: int) -> Zones:
@@ -79,12 +74,11 @@ class Run:
 
     @functools.cached_property
     def _plain(self) -> tuple[list[tuple[int, ...]], list[int], list[int]]:
-        """The fields as Python's numbers, converted at once for speed."""
         return self.packets.tolist(), self.starts.tolist(), self.times_us.tolist()
 
 
 def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Frame:
-    """A frame of :data:`contactfpga.wire.many.FIELDS` and its records."""
+    """A frame from a row of :data:`contactfpga.wire.many.FIELDS` and its records."""
     _, time_us, sequence, heard, cells, zones, overwritten, flags, _ = fields
     divided = sheet.report == "barycenter"
     frame = object.__new__(Frame)  # whose own way to begin takes most of the time of this

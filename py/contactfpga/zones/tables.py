@@ -1,4 +1,4 @@
-"""Zones as tables of pandas and Arrow, which are imported on demand."""
+"""Zones as tables of pandas and pyarrow, which are imported on demand."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ VECTORS = {
     "point_mm": ("point_x_mm", "point_y_mm", "point_z_mm"),
     "normal": ("normal_x", "normal_y", "normal_z"),
 }
-"""Fields of three numbers, each with a column of its own."""
 
 
 def columns(records: np.ndarray, **same: int) -> dict[str, np.ndarray]:
-    """The fields of (n,) structured records as n numbers or texts each; before them, ``same`` in every row."""
+    """Columns of n values from (n,) structured records, after constant columns ``same``."""
     found = {name: np.full(len(records), value) for name, value in same.items()}
     for name in records.dtype.names or ():
         if name in VECTORS:

@@ -1,4 +1,4 @@
-"""Readings of pressure units over time, interpolated to a frame's moment."""
+"""Readings of pressure units, interpolated to a frame's time."""
 
 from __future__ import annotations
 
@@ -11,16 +11,12 @@ from collections.abc import Sequence
 from contactfpga.wire.units import Sweep, UnitFacts
 
 KEPT = 8192
-"""Sweeps stored for a frame's moment, about a second."""
 _ROUNDING = 1 / math.sqrt(12)
-"""Standard deviation of a reading that is rounded to whole steps."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class UnitSamples:
-    """What the pressure units read at one moment, or in one sweep.
-
-    ``zones.units`` is one, or None for a board without units:
+    """Readings of the pressure units at one moment, or in one sweep.
 
     >>> samples = contactfpga.UnitSamples(time_us=0, readings=(512.0,), sigma=(0.3,), saturated=(False,))
     >>> samples.readings[0]
@@ -28,12 +24,12 @@ class UnitSamples:
     """
 
     time_us: int
-    """Device time since power-up: of a frame's first row, to which the readings are interpolated, or of a sweep's first
-    sample."""
+    """Device time since power-up: of the frame's first row, to which the readings are interpolated, or of the sweep's
+    first sample."""
     readings: tuple[float, ...]
-    """Reading of each unit, in steps of its converter."""
+    """Reading of each unit in steps of its converter."""
     sigma: tuple[float, ...]
-    """Standard deviations of the readings, from rounding and from changes between two sweeps, without noise."""
+    """Standard deviation of each reading, from rounding and from changes between two sweeps, without noise."""
     saturated: tuple[bool, ...]
     """Whether a unit read 0 or full scale, so that its true reading is unknown."""
 
@@ -61,7 +57,7 @@ class UnitHistory:
         self._lock = threading.Lock()
 
     def add(self, sweep: Sweep, time_us: int) -> UnitSamples | None:
-        """Add a sweep with its first sample's time, unless it is not later than the one before."""
+        """Add a sweep with the time of its first sample; a sweep that is not later than the last is ignored."""
         with self._lock:
             if self._times_us and time_us <= self._times_us[-1]:
                 return None
@@ -76,8 +72,8 @@ class UnitHistory:
         return UnitSamples(time_us, sweep.readings, (_ROUNDING,) * len(saturated), saturated)
 
     def at(self, time_us: int) -> UnitSamples | None:
-        """Each unit's reading at a moment, interpolated between its neighboring samples; None if one of them is
-        missing, or forgotten."""
+        """Each unit's reading at a time, interpolated between two samples; None if a sample has not come, or is
+        forgotten."""
         with self._lock:
             found = [self._unit_at(time_us - unit * self._spacing_us, unit) for unit in range(self.facts.count)]
         if None in found:
@@ -97,11 +93,11 @@ class UnitHistory:
 
 
 def _spread(share: float, change: float, gap_us: float) -> float:
-    """Uncertainty of an interpolated reading, whose change may be a step; times are truncated to us."""
+    """Standard deviation of an interpolated reading whose change may be a step; times are truncated to us."""
     timing = change / gap_us * _ROUNDING
     return math.sqrt(_ROUNDING**2 + share * (1 - share) * change**2 + timing**2)
 
 
 def only(lows: Sequence[int], highs: Sequence[int], value: int) -> list[int]:
-    """Units with no other reading than this."""
+    """Units that only ever read ``value``."""
     return [unit for unit, (low, high) in enumerate(zip(lows, highs, strict=True)) if low == high == value]

@@ -1,4 +1,4 @@
-"""Zones of a frame: contact zones in cells, in mm, and on the link's surface."""
+"""Zones of a frame, in cells, in mm, and on the link's surface."""
 
 from __future__ import annotations
 
@@ -54,41 +54,39 @@ class Zone:
     """
 
     area_cells: int
-    """Pressed cells."""
+    """Number of pressed cells."""
     sum_x: int | None
-    """Sum of the cells' columns, exact; None with ``report = "barycenter"``, which does not send it. Where the ends of
-    the sheet meet, columns are counted on past the seam, so that the zone's x is this sum / area; not in a zone that is
-    :attr:`winding`."""
+    """Sum of the cells' columns, exact; None with ``report = "barycenter"``. On a sheet whose ends meet, columns are
+    counted on past the seam, so that x is this sum / area, unless the zone is :attr:`winding`."""
     sum_y: int | None
-    """Sum of the cells' rows, exact; None likewise."""
+    """Sum of the cells' rows, exact; None with ``report = "barycenter"``."""
     area_mm2: float
     """Area of the cells in mm2, measured on the sheet."""
     x_mm: float | None
-    """Barycenter along the columns in mm, on the sheet laid flat; column 0 lies at 0. It is off by at most
-    :attr:`Zones.rounding_mm`. None for a zone without cells, which lies nowhere: only a frame that is flagged
-    ``mismatch`` can hold one. Where the ends of the sheet meet it lies from 0 to the circumference; None for a zone
-    that is :attr:`winding`, which has a y but no x, no point and no normal."""
+    """Barycenter along the columns in mm, on the sheet laid flat, within :attr:`Zones.rounding_mm`; column 0 lies at 0.
+    On a sheet whose ends meet, x is from 0 to the circumference. None for a zone that is :attr:`winding`, and for one
+    without cells, which only a frame flagged ``mismatch`` can have."""
     y_mm: float | None
-    """Barycenter along the rows in mm; row 0 lies at 0. It is off by at most :attr:`Zones.rounding_mm`. None as
-    ``x_mm``."""
+    """Barycenter along the rows in mm, within :attr:`Zones.rounding_mm`; row 0 lies at 0. None for a zone without
+    cells."""
     point_mm: Vector | None
-    """Barycenter in the link's frame in mm; it lies on the surface. None as ``x_mm``."""
+    """Barycenter on the surface in the link's frame, in mm. None without an x."""
     normal: Vector | None
-    """Outward unit normal at that point. None as ``x_mm``."""
+    """Outward unit normal at the point. None without an x."""
     ghost: bool = False
-    """On a sheet without diodes: other pressed switches may have made all of it, with nothing pressed here."""
+    """On a sheet without diodes: other pressed switches may have made the whole zone."""
     winding: str = ""
-    """On a sheet whose ends meet: ``ring``, a way through the zone's cells leads round the cylinder and back to where
-    it began, or ``wound``, it does not, but the cells lie on more than two turns. Else empty."""
+    """On a sheet whose ends meet: ``ring`` if a path of the zone's cells closes around the cylinder; ``wound`` if none
+    does, but the cells lie on more than two turns. Otherwise ""."""
 
     @property
     def centroid_mm(self) -> tuple[float, float] | None:
-        """(:attr:`x_mm`, :attr:`y_mm`), the zone's barycenter or centroid; None if it has no x."""
+        """(:attr:`x_mm`, :attr:`y_mm`), the barycenter; None without an x."""
         return None if self.x_mm is None or self.y_mm is None else (self.x_mm, self.y_mm)
 
 
 def order(zone: Zone) -> tuple[bool, float, bool, float, int]:
-    """Sort key of zones; those without a place come last."""
+    """Sort key of zones: y, x, area; zones without a place come last."""
     return zone.y_mm is None, zone.y_mm or 0.0, zone.x_mm is None, zone.x_mm or 0.0, zone.area_cells
 
 
@@ -100,7 +98,7 @@ def line_of(zone: Zone) -> str:
 
 
 def records_of(frame: Frame, sheet: Sheet) -> np.ndarray:
-    """(n, 3) int64: area and sums, or barycenters, of each zone of a frame, in no particular order."""
+    """(n, 3) int64 area and sums, or area and barycenter, of a frame's zones, unsorted."""
     if sheet.closed:
         return around.flat(closed_records(frame, sheet), sheet.columns)
     if frame.bitmap is not None:
@@ -109,7 +107,7 @@ def records_of(frame: Frame, sheet: Sheet) -> np.ndarray:
 
 
 def closed_records(frame: Frame, sheet: Sheet) -> np.ndarray:
-    """(n, 4) int64 records as received, of a sheet whose ends meet."""
+    """(n, 4) int64 records, as received, of a sheet whose ends meet."""
     return frame.moments if frame.bitmap is None else around.label(frame.bitmap, sheet.connectivity)[1]
 
 
@@ -134,17 +132,16 @@ class Zones(Sequence[Zone]):
         history: UnitHistory | None = None,
     ):
         self.frame = frame
-        """The frame as it came over the wire."""
+        """The frame as received."""
         self.sheet = sheet
         """The sheet, from the board's hello."""
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, since power-up."""
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
-        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test they have names:
-        ``row 3 open``, ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open``
-        (all columns are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; or
-        ``unnamed fault`` if the name has not come yet. Otherwise there is only ``stuck``; ``board.hello.stuck`` says
-        how many columns are."""
+        """Faults that the board noticed, sorted. With guard lines or a self-test these are names: ``row 3 open``,
+        ``column 7 open``, ``column 2 stuck`` (it read pressed while no row was driven), ``guard row open`` (all columns
+        are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``, or ``unnamed fault`` until
+        the names come. Otherwise ``stuck``."""
         self._before = before
         self._line = line
         self._history = history
@@ -157,13 +154,13 @@ class Zones(Sequence[Zone]):
 
     @property
     def arrived_s(self) -> float | None:
-        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` except for ``sim://``;
-        None in a recording."""
+        """Arrival of the frame's last byte on :meth:`Board.clock` in s, which is ``time.monotonic`` except for
+        ``sim://``; None in a recording."""
         return None if self._line is None else self._line.arrived_s
 
     @property
     def host_time_s(self) -> float | None:
-        """:attr:`time_us` on that clock, as far as it was known when the frame arrived (docs/clock.md); None in a
+        """:attr:`time_us` on :meth:`Board.clock` in s, as estimated when the frame arrived (docs/clock.md); None in a
         recording."""
         return None if self._line is None else self._line.at(self.time_us)
 
@@ -174,20 +171,18 @@ class Zones(Sequence[Zone]):
 
     @property
     def units(self) -> UnitSamples | None:
-        """What the pressure units read at :attr:`time_us`, interpolated between their samples before and after it. None
-        for a board without units, and until both samples have come: when a frame arrives, the later one is usually
-        still on its way. So ask again a few sweeps later, or take the newest readings, with their own time, from
-        :meth:`Board.events`. Once found, the readings are kept; if you first ask after more than about a second, they
-        are gone."""
+        """Readings of the pressure units at :attr:`time_us`, interpolated between two samples. None for a board without
+        units, and until both samples have come, usually after the frame: ask again a few sweeps later, but within a
+        second, or take the newest readings from :meth:`Board.events`."""
         if self._units is None and self._history is not None:
             self._units = self._history.at(self.time_us)
         return self._units
 
     @functools.cached_property
     def flags(self) -> frozenset[str]:
-        """Names from :data:`contactfpga.wire.protocol.FLAGS`. Also ``ghost`` if a sheet without diodes may show cells
-        as pressed that are not, as a zone of their own (:attr:`Zone.ghost`) or added to another zone; and ``motion`` if
-        a zone moved by more than a pitch since the scan before, so that its place may be off by as much."""
+        """Names from :data:`contactfpga.wire.protocol.FLAGS`; also ``ghost`` if, without diodes, pressed cells may be
+        ghosts, and ``motion`` if a zone moved by more than a pitch since the scan before, so that its place may be off
+        by as much."""
         found = set()
         if self.sheet.ghosts and self._has_ghosts():
             found.add("ghost")
@@ -208,33 +203,33 @@ class Zones(Sequence[Zone]):
 
     @property
     def sequence(self) -> int:
-        """Frames the board sent before this one, modulo 256."""
+        """Number of frames sent before this one, modulo 256."""
         return self.frame.sequence
 
     @property
     def overwritten(self) -> int:
-        """Frames that the board replaced by newer ones before they were sent, modulo what the trailer has room for."""
+        """Number of frames that newer ones replaced before they were sent, modulo a power of two."""
         return self.frame.overwritten
 
     @property
     def total_zones(self) -> int:
-        """Zones on the sheet, including those that the frame had no room for."""
+        """Number of zones on the sheet, including those beyond the frame's capacity."""
         return self.frame.zones if self.frame.bitmap is None else len(self)
 
     @property
     def pressed(self) -> int:
-        """Pressed cells on the whole sheet."""
+        """Number of pressed cells on the sheet."""
         return self.frame.cells
 
     @property
     def cells(self) -> np.ndarray | None:
-        """(rows, columns) bool with ``report = "cells"``; None for a board that sends only zones."""
+        """(rows, columns) bool with ``report = "cells"``; otherwise None."""
         return self.frame.bitmap
 
     @property
     def ghost_cells(self) -> np.ndarray | None:
-        """Cells that other pressed cells may have made, on a sheet without diodes (:mod:`contactfpga.zones.ghosts`):
-        (rows, columns) bool with ``report = "cells"``, otherwise None."""
+        """(rows, columns) bool with ``report = "cells"``: cells that may be ghosts (:mod:`contactfpga.zones.ghosts`);
+        otherwise None."""
         return None if self.frame.bitmap is None else self._ghost_cells
 
     @functools.cached_property
@@ -254,7 +249,6 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def _labels(self) -> np.ndarray:
-        """(rows, columns) int with ``report = "cells"``: the number of each cell's zone, from 1."""
         assert self.frame.bitmap is not None
         if self.sheet.closed:
             return around.label(self.frame.bitmap, self.sheet.connectivity)[0]
@@ -262,7 +256,7 @@ class Zones(Sequence[Zone]):
 
     @property
     def rounding_mm(self) -> tuple[float, float]:
-        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``,
+        """Largest error of x_mm and y_mm from the board's rounding: half a step with ``report = "barycenter"``,
         otherwise 0."""
         if self.sheet.report != "barycenter":
             return 0.0, 0.0
@@ -271,8 +265,8 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def array(self) -> np.ndarray:
-        """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones. It has no ``sum_x`` and
-        ``sum_y`` with ``report = "barycenter"``. It has NaN where a zone has None."""
+        """(n,) read-only structured array of :data:`DTYPE`, with NaN for None; without sums for ``report =
+        "barycenter"``."""
         dtype = DTYPE if self.frame.barycenters is None else DIVIDED_DTYPE
         array = np.zeros(len(self), dtype)
         for row, zone in zip(array, self._zones):
@@ -283,12 +277,12 @@ class Zones(Sequence[Zone]):
         return array
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row for each zone: :attr:`time_us`, :attr:`sequence`, and the fields of :attr:`array`. ``point_mm`` and
-        ``normal`` are three columns each (``point_x_mm``). Needs pandas: raises :class:`MissingExtra`."""
+        """A row per zone: :attr:`time_us`, :attr:`sequence`, and the fields of :attr:`array`, with ``point_mm`` and
+        ``normal`` in three columns each. Raises :class:`MissingExtra` without pandas."""
         return tables.to_pandas(self.array, time_us=self.time_us, sequence=self.sequence)
 
     def to_arrow(self) -> pyarrow.Table:
-        """The zones as a table of pyarrow, with null for None. Raises :class:`MissingExtra`."""
+        """The zones as a pyarrow table, with null for None. Raises :class:`MissingExtra` without pyarrow."""
         return tables.to_arrow(self.array, time_us=self.time_us, sequence=self.sequence)
 
     @functools.cached_property
@@ -334,21 +328,21 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def records(self) -> np.ndarray:
-        """(n, 3) int64: area and sums, or barycenters, of each zone as received, in no particular order."""
+        """(n, 3) int64 area and sums, or area and barycenter, of each zone as received, unsorted."""
         if self.frame.bitmap is None or self.sheet.closed:
             return records_of(self.frame, self.sheet)
         return labels.moments(self._labels)
 
     @functools.cached_property
     def windings(self) -> list[str]:
-        """:attr:`Zone.winding` of each of :attr:`records`; empty unless the ends of the sheet meet."""
+        """:attr:`Zone.winding` of each of :attr:`records`; empty for an open sheet."""
         if not self.sheet.closed:
             return []
         return [around.WINDINGS[index] for index in around.windings(self.closed_records).tolist()]
 
     @property
     def closed_records(self) -> np.ndarray:
-        """(n, 4) int64, for a sheet whose ends meet: records with the cells past the seam
+        """(n, 4) int64 records of a sheet whose ends meet, with the cells past the seam
         (:mod:`contactfpga.zones.around`)."""
         return closed_records(self.frame, self.sheet)
 
@@ -365,11 +359,10 @@ class Zones(Sequence[Zone]):
         return "\n".join([f"<Zones: {', '.join(self._head)}", *map(line_of, self)]) + ">"
 
     def _repr_svg_(self) -> str:
-        """The sheet in a notebook: pressed cells where they are known, and a circle of each zone's area."""
         return self.svg()
 
     def svg(self, width_px: int = notebook.WIDTH_PX) -> str:
-        """The sheet's picture as SVG text."""
+        """SVG of the sheet: known pressed cells, and a circle of each zone's area."""
         sheet = self.sheet
         circles = [
             (zone.x_mm, zone.y_mm, notebook.radius_mm(zone.area_mm2))
@@ -384,7 +377,7 @@ class Zones(Sequence[Zone]):
         )
 
     def to_dict(self) -> dict[str, object]:
-        """Everything in plain Python values, ready for JSON."""
+        """All values as plain Python objects for JSON."""
         values: dict[str, object] = {
             name: getattr(self, name)
             for name in (
@@ -421,28 +414,26 @@ Times = TypeVar("Times", int, np.ndarray)
 
 
 class HostLine(NamedTuple):
-    """A linear map from device time to the host's clock, as known when its frames arrived, and their arrival."""
+    """Arrival of frames, and the linear map from device time to the host's clock as known then."""
 
     arrived_s: float
-    """Arrival of their last bytes."""
     base_us: int
-    """A device time."""
+    """Reference device time."""
     base_s: float
-    """The host's clock at that moment."""
+    """The host's clock at ``base_us``."""
     rate: float
     """Seconds of the host's clock per second of device time."""
     sigma_s: float
-    """Standard deviation of :meth:`at`'s result."""
 
     def at(self, time_us: Times) -> float | Times:
-        """The host's clock in s at a device time in us, for frames that arrived by :attr:`arrived_s`."""
+        """The host's clock in s at a device time in us, at most :attr:`arrived_s`."""
         at_s = self.base_s + (time_us - self.base_us) * (self.rate * 1e-6)
         return np.minimum(at_s, self.arrived_s) if isinstance(at_s, np.ndarray) else min(at_s, self.arrived_s)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
 class HostLines:
-    """A :class:`HostLine` for each of many frames: arrays (n,) of what is a number there."""
+    """A :class:`HostLine` for each of n frames, as (n,) arrays."""
 
     arrived_s: np.ndarray
     base_us: np.ndarray
@@ -451,16 +442,13 @@ class HostLines:
     sigma_s: np.ndarray
 
     def at(self, times_us: np.ndarray) -> np.ndarray:
-        """As :meth:`HostLine.at`, of each frame."""
         at_s: np.ndarray = np.minimum(self.base_s + (times_us - self.base_us) * (self.rate * 1e-6), self.arrived_s)
         return at_s
 
     def of(self, index: int) -> HostLine:
-        """That of one frame."""
         return HostLine(*(values[index].item() for values in self._fields()))
 
     def after(self, index: int) -> HostLines:
-        """Without the first frames."""
         return HostLines(*(values[index:] for values in self._fields()))
 
     def _fields(self) -> tuple[np.ndarray, ...]:

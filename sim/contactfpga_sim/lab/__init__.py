@@ -1,1 +1,1 @@
-"""Speed against accuracy, the cheapest Skin that will do, where methods fail, and the arm that stops in time."""
+"""Studies that make the tables and pictures of the pages."""

@@ -1,4 +1,4 @@
-"""Makes the tables and pictures of the pages: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
+"""Make the pages' tables and pictures: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class StudyError(ContactFPGAError):
 
 
 def lacking(needs: Iterable[str]) -> list[str]:
-    """The needs that are absent: programs, and paths with a slash."""
+    """The absent needs: programs, and paths with a slash."""
     return [one for one in needs if not (Path(one).exists() if "/" in one else shutil.which(one))]
 
 
 def make(study: Study) -> None:
-    """Write all sections and pictures of a study. Raises :class:`StudyError`, :class:`MissingExtra`."""
+    """Write a study's sections and pictures. Raises :class:`StudyError`, :class:`MissingExtra`."""
     if absent := lacking(study.needs):
         raise StudyError(f"{study.name} needs {', '.join(absent)}")
     for name in {study.page_of(section) for section in study.sections}:
@@ -63,7 +63,7 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
 
 
 def stale(study: Study) -> Iterator[str]:
-    """A line for each section whose stored fingerprint is out of date."""
+    """A line per section with an outdated fingerprint."""
     for name in study.sections:
         page = study.page_of(name)
         written = writer.sections((DOCS / page).read_text(encoding="utf-8"))[name]
@@ -78,7 +78,7 @@ def listed(study: Study) -> str:
 
 
 def main() -> int:
-    """Run the command and return its exit status."""
+    """Run the command; return its exit status."""
     args = _parser().parse_args()
     names = flags.known("study", args.name, list(studies.STUDIES))
     chosen = [studies.STUDIES[name] for name in names]
@@ -112,7 +112,6 @@ def _make_all(chosen: Iterable[Study], strict: bool) -> int:
 
 @contextlib.contextmanager
 def _settings(args: argparse.Namespace) -> Iterator[None]:
-    """Configure the studies' worker processes and their cache of earlier results."""
     with contextlib.ExitStack() as stack:
         stack.callback(setattr, pool, "usual_jobs", pool.usual_jobs)
         pool.usual_jobs = args.jobs

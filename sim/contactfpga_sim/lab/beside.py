@@ -14,15 +14,14 @@ FOLDER = "tables"
 """Folder of the CSV files within the pages."""
 _TABLE = re.compile(r"(?:^\|.*\|(?:\n|\Z))+", re.MULTILINE)
 _HEAD = 2
-"""Lines of a table above its rows."""
 _PARTED = re.compile(
     rf"^(?:(?:\|.*\n)+\n)?All \[\d+ rows(?:, \d+ columns)?\]\(({FOLDER}/[\w-]+\.csv)\)\.", re.MULTILINE
 )
 
 
 def part(text: str, kept: str, file: Path, heads: str = "") -> str:
-    """A section with only the rows of its longest table that match the regular expression ``kept``, and a link to the
-    file with all. If no row matches, only the link stays. ``heads`` is one for the headers of the columns that stay."""
+    """A section with the rows of its longest table that match the regular expression ``kept``, and a link to the
+    file with all; only the link if none matches. ``heads`` matches the headers to keep."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]
@@ -38,7 +37,7 @@ def part(text: str, kept: str, file: Path, heads: str = "") -> str:
 
 
 def whole(page: Path, name: str) -> str:
-    """A section of a page with all rows, as its study made it."""
+    """A section of a page with all rows."""
     text = writer.sections(page.read_text(encoding="utf-8"))[name].text
     return _PARTED.sub(lambda found: _table((page.parent / found[1]).read_text(encoding="utf-8")), text)
 

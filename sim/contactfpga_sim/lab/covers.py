@@ -1,7 +1,4 @@
-"""Covers of the switches in the studies: one for each idea of how a touch reaches a switch.
-
-Switches, foam and gaps are parts that one can buy or cut; the choice is an assumption, nothing was built.
-"""
+"""Covers of switches in the studies, of parts that one can buy or cut; nothing was built."""
 
 from __future__ import annotations
 
@@ -10,17 +7,15 @@ from collections.abc import Callable
 from contactfpga.design.cover import Cap, Cover, Switch
 
 GAP_MM = 0.6
-"""Gap between two caps."""
 
 FOAM_M = 2e-3
-"""Thickness of the foam on caps."""
 
 DOME = Switch(force_n=0.4, travel_m=0.2e-3, spread=0.1, hysteresis=0.2)
 """A light metal dome switch."""
 
 
 def bare(pitch_mm: float) -> Cover | None:
-    """No cover and no force: a switch closes when its middle is under the contact."""
+    """No cover, no force: a switch closes if its middle is under the contact."""
     return None
 
 
@@ -30,12 +25,12 @@ def paper(pitch_mm: float) -> Cover:
 
 
 def capped(pitch_mm: float, switch: Switch = DOME) -> Cover:
-    """Proud caps under a whole sheet of foam."""
+    """Proud caps under whole foam."""
     return Cover("frictionless", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3))
 
 
 def tiled(pitch_mm: float, switch: Switch = DOME) -> Cover:
-    """Proud caps, each under a foam tile of its own."""
+    """Proud caps, each under its own foam tile."""
     return Cover("frictionless", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3), cut=True)
 
 
@@ -45,4 +40,4 @@ COVERS: dict[str, Callable[[float], Cover | None]] = {
     "caps": capped,
     "tiles": tiled,
 }
-"""Covers by name, as functions of the pitch in mm."""
+"""Covers by name, as functions of pitch in mm."""

@@ -15,8 +15,8 @@ from contactfpga_sim.model.board.cache import cache_folder, put, ready, scratch,
 
 
 def made_by(module: str, *skins: Skin) -> str:
-    """Key of a module's results for Skins, as far as code decides: the module with its imports, all without docstrings,
-    and the Skins with their choices."""
+    """Key of a module's results for Skins: the module with its imports, without docstrings, and the Skins with their
+    choices."""
     code = sources.digest(module, documented=False)
     key = (code, *((skin.to_toml(), sources.own(own_files(skin))) for skin in skins))
     return hashlib.sha256(repr(key).encode()).hexdigest()
@@ -33,7 +33,7 @@ def _path(kind: str, key: str) -> Path:
 
 
 def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
-    """The value of ``new()``, cached under the key; it must be plain JSON."""
+    """The cached value of ``new()``, which must be plain JSON."""
     if (before := found(kind, key)) is not None:
         return before
     path = _path(kind, key)

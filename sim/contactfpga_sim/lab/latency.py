@@ -1,4 +1,4 @@
-"""From a touch of a resting sheet to the last byte and to the contact pin, on the compiled gateware."""
+"""Times from a touch of a resting sheet to the last byte and the contact pin, on compiled gateware."""
 
 from __future__ import annotations
 
@@ -16,35 +16,30 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import ReceivedFrame, Receiver
 
 GOLDEN = 0.6180339887498949
-"""Golden ratio: its multiples sample an interval evenly, whatever their number."""
+"""Golden ratio, whose multiples sample an interval evenly."""
 
 SCANS = 40
 """Scans within which a touch must be reported, beyond twice its debounce time."""
 
 TRIES = 50
-"""Attempts if a touch meets a hello or a keep-alive."""
 
 CHANGES = 100
-"""Changes of a moving contact."""
 
 MOVING_FRAMES = 300
-"""Approximate frames for the rate."""
 
 
 class RecordedTouch(NamedTuple):
-    """A touch and the bytes around it; times in clocks from the touch."""
+    """A touch and the bytes around it, in clocks from the touch."""
 
     last: int
-    """End of the last byte of its complete frame."""
+    """End of the complete frame's last byte."""
     pin: int
-    """Rise of the contact pin."""
     received: ReceivedFrame
-    """The complete frame; its times are from power-up."""
+    """The complete frame, in times from power-up."""
     start: int
-    """Time of the touch, from power-up."""
     stream: ByteStream
     byte: int
-    """Index of that last byte in the stream."""
+    """Index of the complete frame's last byte."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,14 +49,12 @@ class Latency:
     touch_to_last_byte_us: Spread
     touch_to_contact_us: Spread
     change_to_last_byte_us: Spread
-    """From the loss of a corner to the last byte, for a contact that moved before, so that the line is busy."""
+    """Time from the loss of a corner to the last byte, for a moving contact on a busy line."""
     frames_per_s: float
-    """Frame rate while the contact moves."""
+    """Rate while the contact moves."""
     bytes: int
-    """Largest frame with the contact, on the wire."""
     touches: int
     recorded: tuple[RecordedTouch, ...] = dataclasses.field(default=(), repr=False)
-    """The recorded touches."""
 
 
 class Late(ContactFPGAError):
@@ -69,8 +62,8 @@ class Late(ContactFPGAError):
 
 
 def places(skin: Skin, height: int, width: int) -> list[np.ndarray]:
-    """A contact of height x width cells, (R, C) bool, at every place of the sheet, without masked switches; omitted if
-    all are masked."""
+    """A contact of height x width cells, (R, C) bool, at every place of the sheet, without masked switches; omitted
+    if all are masked."""
     if not (1 <= height <= skin.rows and 1 <= width <= skin.columns):
         raise ValueError(f"the contact has {height}x{width} cells; the sheet has {skin.rows}x{skin.columns}")
     found = []
@@ -91,11 +84,11 @@ def measure(
     step: Callable[[str, int], None] = lambda name, of: None,
     around_us: tuple[int, int] = (0, 0),
 ) -> Latency:
-    """Latency of a contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
+    """Latency of a contact of ``cells``, rows and columns, at every place, or at ``touches`` of them.
 
-    Each touch follows a report of an empty sheet, at phases spread evenly over a scan. Touches that meet a hello or a
-    keep-alive are repeated. ``step(kind, number of them)`` is called after each. ``around_us``: time in us before a
-    touch, and after its frame, in which all bytes are recorded.
+    Each touch follows a report of an empty sheet, at phases spread evenly over a scan; touches that meet a hello or
+    keep-alive are repeated. ``step(kind, number of them)`` follows each. ``around_us``: recorded time before a touch,
+    and after its frame.
 
     Raises ValueError for a contact that does not fit, and :class:`Late`.
     """
@@ -136,7 +129,7 @@ class Bench:
 
     def __init__(self, skin: Skin):
         self.line: list[tuple[int, int]] = []
-        """The bytes seen: clock at the end of the stop bit, and the byte. Readers may clear it."""
+        """Bytes seen: clock at the end of the stop bit, and byte. Readers may clear it."""
         self._cells: int | None = None  # in the last frame that was seen
         self._skin = skin
         self._derived = skin.derived
@@ -158,17 +151,14 @@ class Bench:
         self._board.close()
 
     def send(self, data: bytes) -> None:
-        """Bytes from the host to the board."""
         self._board.send(data)
 
     def idle(self, clocks: int) -> None:
-        """Let this many clocks pass."""
         self._board.run(clocks)
         self._drop()
 
     def touch(self, cells: np.ndarray, share: float, before: int = 0, after: int = 0) -> RecordedTouch:
-        """Touch the sheet at this share of a scan; ``before`` and ``after``: recorded clocks before the touch and after
-        its complete frame."""
+        """Touch at this share of a scan, recording clocks ``before`` the touch and ``after`` its frame."""
         rest = max(3, before // self._scan + 2)
         for _ in range(TRIES):
             self._let_go()
@@ -195,7 +185,7 @@ class Bench:
         return RecordedTouch(last, pin - start, one, start, ByteStream(times, values, -before, until), byte)
 
     def change(self, contacts: list[np.ndarray], number: int, size: int) -> int:
-        """Clocks from a change to the last byte of its frame: the contact moves by some places, then loses a corner."""
+        """Clocks from a change to its frame's last byte: the contact moves, then loses a corner."""
         hold = max(1, size * 10 * self._derived.bit_clocks // 2)
         places = [contacts[(11 * number + place) % len(contacts)] for place in range(8)]
         for cells in places:
@@ -209,7 +199,7 @@ class Bench:
         return one.last + self._byte - start
 
     def moving(self, contacts: list[np.ndarray], size: int) -> float:
-        """Frames per second while the contact moves by one place, twice per frame time."""
+        """Frames per second while the contact moves by one place twice per frame time."""
         hold = max(1, size * 10 * self._derived.bit_clocks // 2)
         clocks = max(MOVING_FRAMES * 2 * hold, MOVING_FRAMES // 4 * self._scan)
         self._drop()

@@ -1,7 +1,5 @@
-"""Fingerprints of the code behind a section of a page. Moving or documenting code does not change them.
-
-They cover the set of statements of all reached modules, without imports, comments, docstrings and positions.
-"""
+"""Fingerprints of a section's code: the set of statements of all reached modules, without imports, comments,
+docstrings and positions."""
 
 from __future__ import annotations
 
@@ -18,7 +16,6 @@ from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.model.board import sources
 
 LENGTH = 8
-"""Hexadecimal digits in a fingerprint."""
 
 
 def fingerprint(study: Study, section: str) -> str:
@@ -30,7 +27,6 @@ def fingerprint(study: Study, section: str) -> str:
 
 
 def _netlists(study: Study, section: str) -> list[str]:
-    """Keys of the netlists that a section measures."""
     from contactfpga_sim.lab import size
 
     with size.keys_alone() as keys, contextlib.redirect_stderr(io.StringIO()):
@@ -65,7 +61,6 @@ def _marks(file: Path) -> tuple[str, ...]:
 
 
 def _says_nothing(statement: ast.AST) -> bool:
-    """Whether a statement is an import, a docstring, or typing."""
     if isinstance(statement, ast.If):
         return isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
     if isinstance(statement, ast.Expr):
@@ -74,7 +69,7 @@ def _says_nothing(statement: ast.AST) -> bool:
 
 
 def _plain(node: object) -> object:
-    """A syntax tree as plain values, equal in all Python versions with this syntax."""
+    """A syntax tree as plain values, equal in all Python versions."""
     if isinstance(node, ast.AST):
         return type(node).__name__, *_fields(node)
     if isinstance(node, list):

@@ -1,4 +1,4 @@
-"""Workers for the pieces of a chart, a fit or a sweep, and their progress."""
+"""Workers for pieces of a chart, fit or sweep, and their progress."""
 
 from __future__ import annotations
 
@@ -19,18 +19,15 @@ GRACE_S = 0.5
 """Time for a worker to clean up before it is killed."""
 
 usual_jobs: int | None = None
-"""Default number of processes; None: one per core."""
+"""Default processes; None: one per core."""
 
 LINE_S = 5.0
-"""Interval of progress lines if they cannot be overwritten."""
 
 
 @contextlib.contextmanager
 def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Executor]:
-    """An executor of this many processes, :data:`usual_jobs` for None, or of the cluster with this scheduler.
-
-    If the block ends by an error or Ctrl-C, remaining work is dropped, and no process stays.
-    """
+    """An executor of ``jobs`` processes, :data:`usual_jobs` for None, or of the Dask cluster with this scheduler. If
+    the block ends by an error or Ctrl-C, remaining work is dropped, and no process stays."""
     if dask is not None:
         with _cluster(dask) as workers:
             yield workers
@@ -58,7 +55,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 def alone() -> None:
-    """Call first in a worker: it and its children become one group that ends as a whole, and with its parent."""
+    """Call first in a worker: it and its children become a group that ends as a whole, and with its parent."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
     signal.signal(signal.SIGTERM, _leave)
@@ -78,7 +75,6 @@ def _outlive_nobody() -> None:
 
 
 def _end_children() -> None:
-    """End all worker processes and their children."""
     children = multiprocessing.active_children()
     _signal(children, signal.SIGTERM)
     until = time.monotonic() + GRACE_S
@@ -98,8 +94,7 @@ def _signal(children: list[multiprocessing.process.BaseProcess], number: signal.
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[str, int], None]]:
-    """Progress on standard error: each call, with a kind of work and its number of pieces, counts a piece. Bars on a
-    terminal, else occasional lines."""
+    """Progress on standard error: each call, with a kind of work and its pieces, counts one."""
     with _bars() if terminal.of(sys.stderr).live else contextlib.nullcontext(_Lines()) as step:
         yield step
 
@@ -121,8 +116,6 @@ def _bars() -> Iterator[Callable[[str, int], None]]:
 
 
 class _Lines:
-    """Progress as plain lines."""
-
     def __init__(self) -> None:
         self._done: dict[str, int] = {}
         self._said = time.monotonic()

@@ -1,8 +1,8 @@
-"""The entry of a study. Each study has a folder beside this file, unless scripts make all of it, and an entry in
+"""Entries of studies. Each study has a folder beside this file, unless scripts make all of it, and an entry in
 ``studies.py``.
 
-An entry names functions as ``module:function`` of the study's folder, or ``folder/file.py:function`` of the project's,
-so that reading it needs none of the study's imports.
+An entry names functions as ``module:function`` of its folder, or ``folder/file.py:function`` of the project's, so that
+reading it imports nothing.
 """
 
 from __future__ import annotations
@@ -19,58 +19,57 @@ from typing import Any
 from contactfpga_sim.lab import writer
 
 NO_ROW = "^$"
-"""For :attr:`Section.kept`: the page has a link to the table instead of rows of it."""
+""":attr:`Section.kept` of a page that only links to the table."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Section:
-    """A table or other text between two markers of a page."""
+    """Text between two markers of a page."""
 
     makes: str
-    """The function of its text; it takes the study's result, or nothing."""
+    """The function of its text, of the study's result or of nothing."""
     page: str = ""
-    """Page in ``docs``; empty for the study's page."""
+    """Page in ``docs``; empty: the study's."""
     needs: tuple[str, ...] = ()
-    """Needs beyond :attr:`Study.needs`. If one is absent, the section is unchanged."""
+    """Needs beyond :attr:`Study.needs`; without one the section stays."""
     sample: str = ""
-    """A function without arguments that makes part of the text, such as a row, in less than a minute."""
+    """Function without arguments that makes part of the text in less than a minute."""
     kept: str = ""
-    """Regular expression for the rows of its longest table that the page keeps; empty: all."""
+    """Regular expression of rows to keep of its longest table; empty: all."""
     heads: str = ""
-    """Regular expression for the headers of the columns that the page keeps; empty: all."""
+    """Regular expression of column headers to keep; empty: all."""
     of_netlists: bool = False
-    """Whether it shows measurements by :mod:`.size`, so that netlists, not reached code, decide whether it is out of
-    date."""
+    """Whether netlists (:mod:`.size`), not reached code, date it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Study:
-    """A study's outputs and needs."""
+    """Outputs and needs of a study."""
 
     name: str
-    """Name of the study's folder."""
+    """Name of its folder."""
     title: str
     page: str
     """Page in ``docs``."""
     minutes: float
     """Minutes on two cores without cached results."""
     sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
-    """Sections by marker name, in the order of making."""
+    """Sections by marker, in order of making."""
     compute: str = ""
-    """The function whose result sections and pictures share, called on first use."""
+    """Function of the result that sections and pictures share, called on first use."""
     pictures: str = ""
-    """The function that draws into the pages' folder and returns the files."""
+    """Function that draws into the pages' folder and returns files."""
     extra: str = "sim"
-    """The extra of ``pyproject.toml`` with its imports."""
+    """Extra of ``pyproject.toml`` with its imports."""
     needs: tuple[str, ...] = ()
     """Needed programs, and paths with a slash."""
 
     def page_of(self, section: str) -> str:
-        """The page in ``docs`` with this section."""
+        """Page in ``docs`` with this section."""
         return self.sections[section].page or self.page
 
     def module(self, place: str) -> str:
-        """The module of a function, or its file."""
+        """Module of a function, or its file."""
         module = place.partition(":")[0]
         return module if "/" in module else f"{__package__}.{self.name}.{module}"
 
@@ -87,7 +86,7 @@ class Study:
 
 
 class StudyRun:
-    """One run of a study, which computes its result once, on first use."""
+    """One run of a study, which computes its result once."""
 
     def __init__(self, study: Study):
         self.study = study
@@ -97,7 +96,7 @@ class StudyRun:
         return self.study.function(self.study.compute)()
 
     def call(self, place: str, *given: object) -> Any:
-        """Call the function at a place. Text is returned as pages spell it."""
+        """Call a function; text is returned as pages spell it."""
         function = self.study.function(place)
         parameters = inspect.signature(function).parameters.values()
         wanted = sum(one.default is one.empty for one in parameters)
@@ -105,6 +104,5 @@ class StudyRun:
         return writer.spelled(found) if isinstance(found, str) else found
 
     def text(self, section: str) -> str:
-        """The text of a section."""
         text: str = self.call(self.study.sections[section].makes)
         return text

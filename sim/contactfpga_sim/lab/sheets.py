@@ -9,7 +9,7 @@ from contactfpga.skin import Skin, SkinError
 
 
 def adaptive_skin(rows: int, columns: int) -> Skin:
-    """A sheet with 5 us settle and 1 us release per row, and the slowest possible clock of its adaptive scan."""
+    """A sheet with 5 us settle, 1 us release and the slowest clock of its adaptive scan."""
     zones = min(64, math.ceil(rows / 2) * math.ceil(columns / 2))
     for megahertz in (12, 24, 36, 48):
         with contextlib.suppress(SkinError):

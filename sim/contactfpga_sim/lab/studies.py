@@ -1,4 +1,4 @@
-"""The studies' outputs and needs, in the order of their names."""
+"""All studies, in the order of their names."""
 
 from __future__ import annotations
 
@@ -540,4 +540,4 @@ _ALL = (
     ),
 )
 STUDIES = {study.name: study for study in _ALL}
-"""The studies by name."""
+"""Studies by name."""

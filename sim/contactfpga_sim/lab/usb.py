@@ -1,15 +1,13 @@
-"""The USB serial chip between a board's UART and the host's USB controller: when bytes are delivered.
+"""The USB serial chip between UART and host: when bytes are delivered.
 
-From FTDI's AN232B-04, "Data Throughput, Latency and Handshaking":
+By FTDI's AN232B-04, "Data Throughput, Latency and Handshaking": A packet is closed when it is full, and at the event
+character unless that is its first byte. The latency timer of 1 to 255 ms, by default 16 ms, runs from the last sent
+packet. When it ends, the open packet is sent, even if empty.
 
-- A packet is closed when it is full, and at the event character unless that is the packet's first byte.
-- The latency timer of 1 to 255 ms, by default 16 ms, runs from the last sent packet. When it ends, the open packet is
-  sent, even if empty.
-
-From the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and a
+By the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and a
 packet's time on the bus (tables 5-9 and 5-10).
 
-Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip then sends all closed
+Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip sends all closed
 packets in order. Real controllers ask again within a frame, so bytes may be up to one frame earlier. The timer counts
 frames. The bus is otherwise idle, without errors or bit stuffing, and a byte is in the chip when its stop bit ends.
 """
@@ -28,20 +26,19 @@ from contactfpga.driver.health import EVENT_CHAR, LATENCY_MS
 from contactfpga_sim.lab.spread import MixedTimes
 
 STATUS_BYTES = 2
-"""Status bytes at the beginning of each packet (AN232B-04)."""
+"""Status bytes at the start of each packet (AN232B-04)."""
 
 OVERHEAD_BYTES = {False: 13, True: 55}
-"""Bus bytes of a bulk packet besides its data: full speed, high speed (USB 2.0, tables 5-9 and 5-10)."""
+"""Bus bytes of a bulk packet besides data: full and high speed (USB 2.0, tables 5-9 and 5-10)."""
 
 BITS_PER_US = {False: 12, True: 480}
 
 DEFAULT_TIMER_MS = 16
-"""Latency timer after power-up, without an event character."""
 
 LONGEST_TIMER_MS = 255
 
 _TICKS_PER_CLOCK = 16_000
-"""Twice the 8,000 microframes per second, so that all times, and midpoints, are whole ticks."""
+"""Twice 8,000 microframes per second, so that midpoints are whole ticks."""
 
 _NEVER = np.iinfo(np.int64).max // 2
 
@@ -52,7 +49,6 @@ class BridgeSettings:
 
     chip: Bridge
     timer_ms: int = LATENCY_MS
-    """Latency timer, 1 to 255 ms."""
     event: int | None = EVENT_CHAR & 0xFF
     """Event character; None: none."""
 
@@ -62,7 +58,7 @@ class BridgeSettings:
 
     @property
     def period_us(self) -> int:
-        """Period in us of the timer's packets while no byte arrives."""
+        """Period of the timer's packets without bytes."""
         return self.period_frames * self.chip.frame_us
 
     @property
@@ -71,13 +67,13 @@ class BridgeSettings:
         return math.ceil(1000 * self.timer_ms / self.chip.frame_us)
 
     def packet_us(self, data_bytes: int) -> float:
-        """Time in us on the bus of a packet with this many UART bytes."""
+        """Bus time of a packet with this many UART bytes."""
         high_speed = self.chip.high_speed
         return 8 * (OVERHEAD_BYTES[high_speed] + STATUS_BYTES + data_bytes) / BITS_PER_US[high_speed]
 
 
 class BridgeChip:
-    """The chip, byte by byte, in any time unit, that of ``timer``. ``sent``: time of the last packet."""
+    """The chip, byte by byte, in ``timer``'s time unit. ``sent``: time of the last packet."""
 
     def __init__(self, payload_bytes: int, timer: float, event: int | None = None, sent: float = 0.0):
         self._payload_bytes, self._timer, self._event = payload_bytes, timer, event
@@ -91,7 +87,7 @@ class BridgeChip:
         self._coming.append((time, value))
 
     def take(self, now: float) -> list[bytes]:
-        """The packets that the host reads; call it at the start of each frame."""
+        """Packets that the host reads; call it at the start of each frame."""
         while self._coming and self._coming[0][0] <= now:
             self._receive(self._coming.popleft()[1])
         packets, self._closed = self._closed, []
@@ -122,11 +118,10 @@ class ByteStream(NamedTuple):
 
 
 def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte: int) -> MixedTimes:
-    """Delivery time of the byte with this number, in us from the stream's origin, over all equally likely phases of the
-    chip against the board.
+    """Delivery time of a byte, in us from the stream's origin, over all equally likely phases of chip and board.
 
-    In each phase the chip is empty once in its first period (:attr:`BridgeSettings.period_us`) from ``since``. So the
-    byte must be later than that period; on a line without rests, by another one. Raises ValueError if the stream is too
+    In each phase the chip is empty once in its first period (:attr:`BridgeSettings.period_us`) from ``since``: the byte
+    must be later than that period; on a line without rests, by another one. Raises ValueError if the stream is too
     short.
     """
     phases = _Phases(settings, clock_hz, stream)
@@ -137,8 +132,8 @@ def delivered(settings: BridgeSettings, clock_hz: int, stream: ByteStream, byte:
 
 
 class _Phases:
-    """The chip in all of its phases at once, in ticks. A phase stands for its neighborhood in which each byte is
-    between the same two frames."""
+    """The chip in all phases at once, in ticks. A phase stands for its neighborhood with each byte between the same
+    frames."""
 
     def __init__(self, settings: BridgeSettings, clock_hz: int, stream: ByteStream):
         self._settings = settings
@@ -155,7 +150,7 @@ class _Phases:
         self.widths = np.tile(ends - edges, settings.period_frames)
 
     def _closings(self, values: np.ndarray) -> np.ndarray:
-        """Last byte of a packet by its first byte, unless the timer ends it; the number of bytes if it stays open."""
+        """Last byte of a packet by its first, unless the timer ends it; the number of bytes if open."""
         count = len(values)
         found = np.arange(count + 1) + self._settings.chip.payload_bytes - 1
         if self._settings.event is not None:
@@ -165,7 +160,7 @@ class _Phases:
         return np.minimum(found, count)
 
     def sent(self, byte: int) -> tuple[np.ndarray, np.ndarray]:
-        """By phase the tick of the frame that sends a byte, and the bus time in us to the end of its packet."""
+        """Tick of the frame that sends a byte, and bus time in us to its packet's end, by phase."""
         opened = np.searchsorted(self._times, self._first, "right")
         if (opened > byte).any():
             raise ValueError(f"byte {byte} comes before the chip has sent once; give more of what was sent before it")
@@ -189,7 +184,7 @@ class _Phases:
     def _send(
         self, start: np.ndarray, at: np.ndarray, by_timer: np.ndarray, byte: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Bytes sent in a frame, up to the packet with the byte: first unsent byte, and bus time in us."""
+        """First unsent byte after a frame, up to the byte's packet, and bus time in us."""
         start, us = start.copy(), np.zeros(len(start))
         while True:
             closing = self._closing[start]

@@ -1,7 +1,5 @@
-"""Markdown tables, and sections of pages: text between ``<!-- figures: NAME of FINGERPRINT -->`` and ``<!-- end -->``.
-
-The fingerprint is of the code that made the text; a section that was never made has none.
-"""
+"""Markdown tables, and sections of pages between ``<!-- figures: NAME of FINGERPRINT -->`` and ``<!-- end -->``; a
+section that was never made has no fingerprint."""
 
 from __future__ import annotations
 
@@ -14,7 +12,6 @@ from contactfpga.inputs.files import write_text
 from contactfpga.tools.console import outputs
 
 Tables = Mapping[str, Callable[[], str]]
-"""The maker of each table, by name."""
 
 _SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end -->", re.DOTALL)
 
@@ -24,11 +21,10 @@ class PageSection(NamedTuple):
 
     text: str
     fingerprint: str
-    """Empty if none is stated."""
 
 
 def sections(page: str) -> dict[str, PageSection]:
-    """The sections of a page's text, by name."""
+    """Sections of a page's text, by name."""
     return {name: PageSection(text, fingerprint) for name, fingerprint, text in _SECTION.findall(page)}
 
 
@@ -38,22 +34,22 @@ def line(cells: Iterable[str]) -> str:
 
 
 def table(head: Sequence[str], lines: Iterable[str]) -> str:
-    """A whole table; ``lines``: as :func:`line` makes them."""
+    """A table of lines by :func:`line`."""
     return "\n".join([line(head), "|---" * len(head) + "|", *lines])
 
 
 def table_of(rows: Sequence[Sequence[str]]) -> str:
-    """A whole table from cells; the first row is the head."""
+    """A table of cells; the first row is the head."""
     return table(rows[0], map(line, rows[1:]))
 
 
 def spelled(text: str) -> str:
-    """Text of a terminal, as pages spell it: µs for us."""
+    """Terminal text as pages spell it: µs for us."""
     return re.sub(r"(?<!-)\bus\b", "µs", text)
 
 
 def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
-    """A page's text with the sections among ``tables`` rewritten, with their fingerprint; None keeps it."""
+    """A page's text with sections among ``tables`` rewritten, with their fingerprint; None keeps it."""
 
     def made(match: re.Match[str]) -> str:
         name, before = match[1], match[2]
@@ -67,7 +63,7 @@ def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
 
 
 def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
-    """Write the tables into a page with :func:`update`, each as soon as it is made."""
+    """:func:`update` a page, with each table as soon as it is made."""
     for name, measure in tables.items():
         before = path.read_text(encoding="utf-8")
         if name in sections(before):
@@ -75,8 +71,7 @@ def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
 
 
 def page(path: str | Path, option: str = "page") -> Path:
-    """The page, checked to be writable before the measurements. Raises
-    :class:`~contactfpga.tools.console.outputs.OutputError`."""
+    """The page, checked to be writable. Raises :class:`~contactfpga.tools.console.outputs.OutputError`."""
     if not Path(path).is_file():
         raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")
     return outputs.file(path, option)

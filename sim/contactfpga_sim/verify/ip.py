@@ -1,4 +1,4 @@
-"""A Skin's gateware as Verilog for another design: the core, its assertions, a testbench with vectors, an example."""
+"""A Skin's gateware as Verilog for another design, with assertions, testbench, vectors and example."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Port:
 
 
 def ports(skin: Skin, core: Core) -> list[Port]:
-    """Clock, reset and all others in the vectors' order: inputs, then outputs."""
+    """Clock, reset, then the other inputs and outputs in the vectors' order."""
     found = [(name, member.flow == In, len(getattr(core, name))) for name, member in core.signature.members.items()]
     every = [("clk", True, 1), ("rst", True, 1), *sorted(found, key=lambda port: not port[1])]
     said = {name: text.format(clock_hz=skin.clock_hz, baud=skin.baud) for name, text in MEANINGS.items()}
@@ -113,7 +113,7 @@ def record_fields(skin: Skin) -> dict[str, int]:
 
 
 def closing_fields(skin: Skin) -> dict[str, int]:
-    """Bits of each field of the word that closes a frame, lowest first."""
+    """Bits of each field of a frame's closing word, lowest first."""
     return {name: len(Signal(shape)) for name, shape in closing_layout(skin.derived).members.items()}
 
 
@@ -152,8 +152,7 @@ def verilog(skin: Skin) -> str:
 def _started(text: str) -> str:
     """Verilog that four-state simulators compute correctly from the first clock on.
 
-    It computes a block once something in it changes. Yosys writes into most blocks a signal for that, which here does
-    change once, and comes into all others. What memories give begins with 0. Wires of no bits, which nothing uses, go.
+    They compute a block once something in it changes, so each block gets a signal that changes once.
     """
     text = re.sub(r"^  wire \[-1:0\] \S+ ;\n", "", text, flags=re.MULTILINE)
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
@@ -161,7 +160,6 @@ def _started(text: str) -> str:
 
 
 def _triggered(module: str) -> str:
-    """:func:`_started` for one module."""
     alone = re.compile(r"^  always @\*\n    (.*;)$", re.MULTILINE)
     found = re.search(r"^  reg (\\\$auto\$verilog_backend\S+ ) = 0;\n", module, re.MULTILINE)
     if not found and not alone.search(module):
@@ -173,7 +171,7 @@ def _triggered(module: str) -> str:
 
 
 def _head(skin: Skin) -> str:
-    """Header that names the sources. Yosys writes operands in their own widths, which Verilog extends correctly."""
+    """Header that names the sources."""
     return (
         f"// contactfpga {__version__}: {skin.rows}x{skin.columns} switches, Skin {skin.fingerprint.hex()}. Made by "
         "`contactfpga ip`.\n/* verilator lint_off WIDTHEXPAND */\n/* verilator lint_off WIDTHTRUNC */\n"
@@ -185,8 +183,8 @@ def _head(skin: Skin) -> str:
 def vectors(skin: Skin, core: Core, known: list[Port]) -> list[int]:
     """Inputs and outputs of each clock as a word, inputs lowest, in Amaranth's simulator.
 
-    After the hello two switches close and open again. The streams' readers stall in a quarter of the clocks, that of
-    the records at all of the second scan and the third.
+    After the hello two switches close and open. The streams' readers stall in a quarter of the clocks, the records'
+    reader in all of the second and third scans.
     """
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[0, 0] = cells[-1, -1] = True
@@ -209,7 +207,7 @@ def simulated(
     clocks: int,
     takes: Callable[[int], tuple[bool, bool]],
 ) -> list[int]:
-    """The words of so many clocks. ``takes``: whether bytes and records are taken in a clock, if there are any."""
+    """Words of these clocks. ``takes``: whether bytes and records are taken in a clock."""
     stimulus = InputDriver(skin, timeline)
     m = Module()
     m.domains.sync = clock_domain = ClockDomain()
@@ -273,7 +271,6 @@ module {NAME}_sva (
 
 
 def _of_records(skin: Skin) -> str:
-    """Assertions about the stream of records, in SystemVerilog."""
     fields = closing_fields(skin)
     place = dict(zip(fields, itertools.accumulate(fields.values(), initial=0), strict=False))
 
@@ -310,7 +307,7 @@ def _of_records(skin: Skin) -> str:
 
 
 def testbench(known: list[Port], clocks: int) -> str:
-    """A testbench that plays the vectors and compares every output in every clock."""
+    """A testbench that plays the vectors and compares all outputs in every clock."""
     inside = known[1:]
     takes, gives = ([port for port in inside if port.takes is taken] for taken in (True, False))
     wide, out = (sum(port.bits for port in some) for some in (takes, gives))
@@ -399,7 +396,6 @@ def constraints(skin: Skin, known: list[Port]) -> str:
 
 
 def _fields(fields: dict[str, int]) -> str:
-    """Fields and their bits, as a line of Markdown."""
     places = itertools.accumulate(fields.values(), initial=0)
     there = [
         (name, place, place + bits - 1) for (name, bits), place in zip(fields.items(), places, strict=False) if bits
@@ -408,7 +404,7 @@ def _fields(fields: dict[str, int]) -> str:
 
 
 def readme(skin: Skin, known: list[Port]) -> str:
-    """The ports, the settings and how to try it."""
+    """Ports, settings, and how to try the core."""
     rows = "".join(
         f"| `{port.name}` | {'in' if port.takes else 'out'} | {port.bits} | {port.meaning} |\n" for port in known
     )

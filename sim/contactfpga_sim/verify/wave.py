@@ -1,4 +1,4 @@
-"""A touch as a waveform: every signal of the gateware, from a scan before a switch closes until its frame is sent."""
+"""A touch as a waveform: every signal of the gateware until the frame is sent."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, ports
 
 MOST_CLOCKS = 400_000
-"""Most clocks, some minutes in Amaranth's simulator."""
+"""Most clocks: some minutes in Amaranth's simulator."""
 SHEET = ("rows", "columns", "contact")
-"""Pins shown first; the others follow in data order."""
+"""Pins shown first."""
 STAGES = ("row", "record", "item", "byte")
 FS = 10**15
-"""Femtoseconds per second; the file's time unit is 1 fs."""
+"""Femtoseconds per second; the file counts in fs."""
 
 
 class WaveError(ContactFPGAError):
@@ -37,7 +37,7 @@ class WaveError(ContactFPGAError):
 
 @dataclasses.dataclass(frozen=True)
 class SimulatedTouch:
-    """A simulated touch, in clocks from power-up."""
+    """A simulated touch; clocks count from power-up."""
 
     begins: int
     """Start of the waveform."""
@@ -45,7 +45,7 @@ class SimulatedTouch:
     ends: int
     """One bit after the last byte of the frame."""
     zones: Zones
-    """Zones that the host receives."""
+    """Zones received by the host."""
     trace: Trace
 
 
@@ -60,10 +60,10 @@ def finger(skin: Skin) -> np.ndarray:
 
 
 def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> SimulatedTouch:
-    """Press these (rows, columns) bool cells in the middle of a scan, after the hello; write the waveform.
+    """Press (rows, columns) bool cells in the middle of a scan after the hello, and write the waveform.
 
-    Raises :class:`WaveError` without a frame of theirs within :data:`MOST_CLOCKS`, and
-    :class:`~contactfpga_sim.verify.cosim.compare.Mismatch` if the gateware differs from the golden model in any clock.
+    Raises :class:`WaveError` without a frame of these within :data:`MOST_CLOCKS`, and
+    :class:`~contactfpga_sim.verify.cosim.compare.Mismatch` if the gateware differs from the golden model.
     """
     if cells.shape != (skin.rows, skin.columns) or not cells.any():
         rows, columns = cells.shape
@@ -84,13 +84,11 @@ def simulate(skin: Skin, cells: np.ndarray, vcd: Path) -> SimulatedTouch:
 
 
 def _hello(skin: Skin) -> int:
-    """Clocks of the hello at power-up, with the scan that it waits for."""
     scan, size = skin.derived.frame_clocks, len(protocol.encode_hello(skin))
     return 2 * scan + 10 * size * skin.derived.bit_clocks
 
 
 def _sent(skin: Skin, timeline: Timeline, touched: int) -> tuple[int, Zones]:
-    """When the first frame with the touch is over on the line, and the frame, by the golden model."""
     bits, cycles = skin.derived.bit_clocks, 2 * touched
     while cycles <= MOST_CLOCKS:
         conversation = Conversation("the golden model")
@@ -104,7 +102,7 @@ def _sent(skin: Skin, timeline: Timeline, touched: int) -> tuple[int, Zones]:
 
 
 def cut(lines: Iterable[str], begin: int) -> Iterator[str]:
-    """The lines of a VCD file from a time on, which becomes 0. Each signal begins with its value at that time."""
+    """The lines of a VCD file from a time on, which becomes 0. Each signal begins with its value then."""
     lines, last = iter(lines), dict[str, str]()
     for line in lines:
         yield re.sub(r"^(\$var \w+ \d+ \S+ )\$", r"\1", line)  # readers take no name that begins so
@@ -123,18 +121,17 @@ def cut(lines: Iterable[str], begin: int) -> Iterator[str]:
 
 
 def _name(change: str) -> str:
-    """The short name of the changing signal: after the space, or after a single bit."""
     return change.split()[1] if change[0] in "bBrRsS" else change[1:].strip()
 
 
 def shown(skin: Skin) -> list[str]:
-    """Ports to show in a viewer: pins of the sheet, transfers between stages, the line."""
+    """Ports to show in a viewer: sheet, transfers between stages, line."""
     stages = [name for stage in STAGES for name in (*LEVELS, *PAYLOADS) if name.startswith(stage)]
     return [*SHEET, *ports(tuple(stages), skin), "tx"]
 
 
 def layouts(skin: Skin, vcd: Path) -> list[Path]:
-    """Write viewer settings beside the waveform: a save file for GTKWave, commands for Surfer."""
+    """Write viewer settings beside the waveform: a GTKWave save file, and commands for Surfer."""
     gtkw, surfer = vcd.with_suffix(".gtkw"), vcd.with_suffix(".sucl")
     with vcd.open(encoding="ascii") as lines:
         bits = _ports(lines)
@@ -146,7 +143,6 @@ def layouts(skin: Skin, vcd: Path) -> list[Path]:
 
 
 def _ports(lines: Iterable[str]) -> dict[str, int]:
-    """Bits of each signal by name, of the outermost module with the name."""
     found: dict[str, int] = {}
     for line in lines:
         match line.split():

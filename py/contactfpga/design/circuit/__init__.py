@@ -1,7 +1,6 @@
 """The sheet as a circuit: levels, currents and times of its lines, switches, diodes and pins.
 
-One model for all users: `contactfpga settle`, the check of a Skin that states its circuit, the virtual board, the study
-of failures. SI units; capacitances in pF and times in us where a name says so.
+Units are SI; capacitances are in pF and times in us where a name says so.
 """
 
 from contactfpga.design.circuit.static import Problem, check, load_checked, problems

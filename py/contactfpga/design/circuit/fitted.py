@@ -1,9 +1,7 @@
 """Values of a sheet's circuit from the times in which its cells read pressed (`contactfpga wire --settle`).
 
-A cell's time is the model's for as many pressed switches in its row, times a factor of its row and one of its column,
-which scatter with a median of 1. The fit is for the whole sheet. One number of pressed switches determines the
-capacitance of the lines; two also the resistance of a closed switch. Resistors of pins and lines are taken from the
-given circuit, as they form one product with the capacitance; so is VIL, below which a pin surely reads low.
+A cell's time is the model's, times a factor of its row and one of its column with a median of 1. One number of pressed
+switches in a row determines the capacitance of the lines, two also the resistance of a closed switch.
 """
 
 from __future__ import annotations
@@ -20,49 +18,44 @@ from contactfpga.design.circuit.phases import Levels
 from contactfpga.design.circuit.values import LIMITS, Circuit, CircuitError
 
 NAMES = ("line_pf", "switch_ohm")
-"""Fields of :class:`Circuit` that are fitted, in order, one per informative reading."""
+"""Fitted fields of :class:`Circuit`, one per informative reading."""
 PROBABILITY = 0.95
-"""Default probability that all intervals hold."""
 LEAST_LINES = 3
-"""Least number of fully measured rows, and of columns."""
 ROUNDS, CLOSE, STEP = 20, 1e-3, 0.03
-"""Newton's method takes at most this many rounds, ends at this relative change, and differentiates over this relative
-step. The model's times jump by some 1e-4, from its discrete steps."""
+"""Newton's method: most rounds, relative change at its end, and relative step of the derivative."""
 NEARLY = 0.02
-"""Accepted change if it does not converge; intervals are several times wider."""
+"""Accepted relative change without convergence."""
 DRAWS = 20_000
-"""Random draws that give the factor of the intervals."""
 HARMONICS = 6
 SCATTER = 2.0
-"""Lines count as scattering if their means vary by this many times what their cells explain."""
+"""Ratio of the lines' variance to that of their cells from which lines scatter."""
 MOST_FREEDOM = 1e6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SettleReading:
-    """Time of each cell of a sheet to read pressed, with the same number of pressed switches in all rows."""
+    """Time of each cell to read pressed, with the same number of pressed switches in all rows."""
 
     pressed: int
-    """Pressed switches in each row that pull their column, including a guard column."""
+    """Pressed switches in each row that pull their column, a guard column included."""
     clocks: np.ndarray
-    """(rows, columns) least clocks at which a cell reads pressed; 0 if unknown."""
+    """(rows, columns) least clocks at which a cell reads pressed; 0: unknown."""
     first: int
-    """Earliest sampling clock of the board: a cell with this value may be faster."""
+    """Earliest sampling clock; a cell with this value may be faster."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FittedValue:
-    """A field of :class:`Circuit` with its interval."""
+    """A field of :class:`Circuit`; all intervals of a fit hold together with its probability."""
 
     name: str
     value: float
     low: float
     high: float
-    """Upper end; all intervals of a fit together cover the true values with its probability."""
 
     @property
     def told(self) -> bool:
-        """Whether the interval is within the limits of a circuit; otherwise the readings do not determine the value."""
+        """Whether the readings determine the value, by an interval within a circuit's limits."""
         least, most, _ = LIMITS[self.name]
         return least < self.low and self.high < most
 
@@ -75,14 +68,11 @@ class FittedCircuit:
     """The given circuit with the fitted values."""
     values: tuple[FittedValue, ...]
     rows: int
-    """Number of rows whose cells were measured."""
     columns: int
-    """Number of columns whose cells were measured."""
 
 
 def settle_s(circuit: Circuit, rows: int, columns: int, diodes: str, pressed: int) -> float:
-    """Seconds from selecting a row until its slowest column reads pressed; infinite if never. ``pressed``: the number
-    of pressed switches in each row."""
+    """Seconds from selecting a row until its slowest pressed column reads pressed; infinite if never."""
     network = Network(circuit, np.tile(np.arange(columns) < pressed, (rows, 1)))
     done = phases.passed(phases.settle(network, Levels.of(circuit, diodes)))
     return float(done.phase.arrived(done.trace.seconds, done.trace.volts)[:pressed].max())
@@ -97,11 +87,10 @@ def fit_circuit(
     diodes: str = "col2row",
     probability: float = PROBABILITY,
 ) -> FittedCircuit:
-    """The circuit of a sheet from one or two readings. ``rows`` and ``columns`` include guard lines. ``probability``:
-    the share of sheets in which all intervals together cover the truth.
+    """The circuit of a sheet from one or two readings; ``rows`` and ``columns`` include guard lines.
 
-    Raises :class:`CircuitError` for fewer than three fully measured rows or columns, for cells faster than the board's
-    first sample, or if no values fit.
+    All intervals together cover the truth with ``probability``. Raises :class:`CircuitError` for fewer than three fully
+    measured rows or columns, for cells faster than the board's first sample, or if no values fit.
     """
     readings = sorted(readings, key=lambda one: one.pressed)[: len(NAMES)]
     names = NAMES[: len({one.pressed for one in readings})]
@@ -140,7 +129,6 @@ def fit_circuit(
 
 
 def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
-    """Rows and columns with complete cells, after removing the lines with the most gaps."""
     rows, columns = ([*range(count)] for count in known.shape)
     while rows and columns and not known[np.ix_(rows, columns)].all():
         gaps = ~known[np.ix_(rows, columns)]
@@ -160,7 +148,6 @@ def _whole(known: np.ndarray) -> tuple[list[int], list[int]]:
 def _solved(
     times: Callable[[np.ndarray], np.ndarray], start: np.ndarray, goal: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The values with the logarithms of times in ``goal``, and their derivatives."""
     values = start.astype(float)
     low, high = (np.array([LIMITS[name][end] for name in names], float) for end in (0, 1))
     for number in range(ROUNDS):
@@ -187,8 +174,6 @@ def _solved(
 
 
 def _rounding_variance(clocks: np.ndarray) -> float:
-    """Variance of the logarithm of the mean by rounding to clocks; if times scatter little, up to half a clock,
-    uniformly."""
     variance = max(0.0, float(clocks.var()) - 1 / 12)
     harmonics = np.arange(1, HARMONICS + 1)
     off = float(np.sum(np.exp(-4 * np.pi**2 * harmonics**2 * variance) / (2 * np.pi**2 * harmonics**2)))
@@ -196,8 +181,7 @@ def _rounding_variance(clocks: np.ndarray) -> float:
 
 
 def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
-    """The variance of the mean of (rows, columns) cells and its degrees of freedom (Satterthwaite), by two-way analysis
-    of variance; negative line variances count as 0."""
+    """Variance of the mean of (rows, columns) cells and its degrees of freedom (Satterthwaite)."""
     rows, columns = cells.shape
     mean = cells.mean()
     by_row, by_column = cells.mean(axis=1) - mean, cells.mean(axis=0) - mean
@@ -214,7 +198,7 @@ def _mean_variance(cells: np.ndarray) -> tuple[float, float]:
 
 
 def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, n) covariance of the means of (n, rows, columns), including rounding, and (n,) degrees of freedom."""
+    """(n, n) covariance of the means of (n, rows, columns) cells, and (n,) degrees of freedom."""
     count = len(cells)
     covariance, degrees = np.empty((count, count)), np.empty(count)
     alone = [_mean_variance(each) for each in cells]
@@ -232,7 +216,6 @@ def _covariance(cells: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _factor(covariance: np.ndarray, degrees: np.ndarray, probability: float) -> float:
-    """Standard deviations that no value exceeds with this probability."""
     rng = np.random.default_rng(0)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)

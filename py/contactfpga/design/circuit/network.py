@@ -1,7 +1,6 @@
 """A sheet's circuit as equations: charge and current of every line and of every pressed switch's diode.
 
-Volts are those of a sheet whose selected row is low (``diodes = "col2row"``). The other direction is its mirror image:
-high and low are exchanged, and levels count from the supply.
+Volts are those of a sheet whose selected row is low (``diodes = "col2row"``); the other direction is its mirror image.
 """
 
 from __future__ import annotations
@@ -16,14 +15,13 @@ PF = 1e-12
 LEAK_S = 1e-12
 """Leakage of each line, which gives undriven lines a level."""
 FORWARD = 0.5
-"""Share of the junction voltage above which its capacitance continues linearly, as in SPICE."""
+"""Share of the junction voltage above which its capacitance is linear, as in SPICE."""
 OFF = float("nan")
-"""Value for a pin that does not drive."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CircuitState:
-    """Volts of the lines, columns before rows, and across the junctions of the pressed switches."""
+    """Volts of the lines, columns before rows, and across the junctions of pressed switches."""
 
     lines: np.ndarray
     junctions: np.ndarray
@@ -31,7 +29,7 @@ class CircuitState:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """Drives of the lines, columns before rows: (lines,) volts, :data:`OFF` where a pin does not drive."""
+    """Volts of the pins, columns before rows; :data:`OFF` where a pin does not drive."""
 
     volts: np.ndarray
 
@@ -43,11 +41,7 @@ class Drive:
 
 
 class Network:
-    """A sheet with pressed switches.
-
-    ``pressed``: (rows, columns) bool. ``bare``: (rows, columns) bool, switches without a diode, which conduct both
-    ways.
-    """
+    """A sheet with ``pressed`` switches, (rows, columns) bool; ``bare`` ones have no diode and conduct both ways."""
 
     def __init__(self, circuit: Circuit, pressed: np.ndarray, bare: np.ndarray | None = None):
         self.circuit = circuit
@@ -73,11 +67,11 @@ class Network:
         return found
 
     def drive_s(self, drive: Drive) -> np.ndarray:
-        """(lines,) siemens between each line and its pin's level; 0 where it does not drive."""
+        """(lines,) siemens between each line and its pin's level; 0 for a pin that does not drive."""
         return np.where(np.isnan(drive.volts), 0.0, 1 / self.circuit.drive_ohm)
 
     def pin_amperes(self, lines: np.ndarray, drive: Drive) -> np.ndarray:
-        """(..., lines) current out of each driving pin, for volts of the same shape."""
+        """(..., lines) amperes out of each driving pin, for volts of the same shape."""
         return np.asarray(self.drive_s(drive) * (np.nan_to_num(drive.volts) - lines))
 
     def unpressed(self) -> CircuitState:
@@ -115,7 +109,7 @@ def current(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held_back(diode: Diode, volts: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """A limited Newton guess for one that is ``wanted`` far up the exponential: the junction voltage of its current."""
+    """A Newton guess far up the exponential, limited to the junction voltage of its current."""
     step, knee = diode.emission * THERMAL_V, knee_v(diode)
     far = (wanted > knee) & (np.abs(wanted - volts) > 2 * step)
     if not far.any():

@@ -8,8 +8,7 @@ import numpy as np
 
 
 def named(rows: int, columns: int) -> Mapping[str, np.ndarray]:
-    """(rows, columns) bool each. The selected row and the omitted line are the middle ones, with a neighbor on each
-    side."""
+    """(rows, columns) bool by name; the selected row and the omitted line are the middle ones."""
     row, column = middle(rows), middle(columns)
     none = np.zeros((rows, columns), bool)
     found = {name: none.copy() for name in ("nothing", "one cell", "one row", "one row but a cell", "one column")}

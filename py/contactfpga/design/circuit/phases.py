@@ -13,21 +13,21 @@ from contactfpga.design.circuit.patterns import middle
 from contactfpga.design.circuit.values import Circuit
 
 FULL = 0.95
-"""Share of the supply at which a line counts as charged, and a row as released."""
+"""Share of the supply at which a line is charged and a row released."""
 NEAR_V = 0.05
 """Distance from its rest below which a line no longer pulls others."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Volts in the frame of :mod:`contactfpga.design.circuit.network` that surely read low, and surely high."""
+    """Volts in the frame of :mod:`contactfpga.design.circuit.network` that surely read low and high."""
 
     low: float
     high: float
 
     @classmethod
     def of(cls, circuit: Circuit, diodes: str = "col2row") -> Levels:
-        """Levels of a circuit; a sheet whose selected row is high is computed as its mirror image."""
+        """Levels of a circuit, mirrored for a sheet whose selected row is high."""
         if diodes == "row2col":
             return cls(circuit.supply_v - circuit.high_v, circuit.supply_v - circuit.low_v)
         return cls(circuit.low_v, circuit.high_v)
@@ -35,8 +35,10 @@ class Levels:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Phase:
-    """The sheet rests under the first drive; each further one but the last acts for its time; the phase ends when all
-    lines are within their limits under the last."""
+    """A phase of a scan, which ends when all lines are within their limits under the last drive.
+
+    The sheet rests under the first drive; each further one but the last acts for its time.
+    """
 
     name: str
     network: Network
@@ -49,11 +51,11 @@ class Phase:
     """(lines,) lower limits in volts; negative infinite for a free line."""
 
     def bad(self, volts: np.ndarray) -> np.ndarray:
-        """Lines outside their limits: bool of the same shape."""
+        """Bool of the same shape: lines outside their limits."""
         return np.asarray((volts > self.most) | (volts < self.least))
 
     def arrived(self, seconds: np.ndarray, volts: np.ndarray) -> np.ndarray:
-        """(lines,) time from which each line is within its limits for good, 0 if always; infinite if not at the end."""
+        """(lines,) time from which each line stays within its limits, 0 if always, infinite if not at the end."""
         bad = self.bad(volts)
         found = np.zeros(volts.shape[1])
         found[bad[-1]] = math.inf
@@ -74,7 +76,7 @@ class PhaseResult:
 
     @property
     def seconds(self) -> float:
-        """From the last change of drive until all lines are within their limits; infinite if never."""
+        """Time from the last change of drive until all lines stay within their limits; infinite if never."""
         return float(self.phase.arrived(self.trace.seconds, self.trace.volts).max())
 
 
@@ -118,7 +120,6 @@ def _any(network: Network) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rows(network: Network, row: int | None = None) -> np.ndarray:
-    """All rows at the released level, except the selected one."""
     volts = np.full(network.rows, network.circuit.supply_v)
     if row is not None:
         volts[row] = 0.0
@@ -126,8 +127,7 @@ def _rows(network: Network, row: int | None = None) -> np.ndarray:
 
 
 def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
-    """All lines released, columns undriven, a row selected: pressed columns must be low, others high. Precharged or
-    pulled columns make no difference."""
+    """A row is selected with columns undriven: pressed columns must be low, others high."""
     row = middle(network.rows) if row is None else row
     supply, columns = network.circuit.supply_v, network.columns
     most, least = _any(network)
@@ -138,8 +138,7 @@ def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
 
 
 def pulled_release(network: Network, levels: Levels, dip_v: float = 0.0) -> Phase:
-    """A selected row is released, and resistors pull its columns back: they must be high, and stay so when the next row
-    lowers them by ``dip_v``."""
+    """A selected row is released, and resistors pull its columns back: they must be high, also ``dip_v`` lower."""
     most, least = _any(network)
     least[: network.columns] = min(levels.high + dip_v, FULL * network.circuit.supply_v)
     selected = Drive.of(OFF, _rows(network, middle(network.rows)), network)
@@ -156,7 +155,7 @@ def row_release(network: Network) -> Phase:
 
 
 def precharge(network: Network, gap_s: float) -> Phase:
-    """``gap_s`` after the row is released the columns drive: they must be charged."""
+    """Columns drive ``gap_s`` after the row is released: they must be charged."""
     supply = network.circuit.supply_v
     most, least = _any(network)
     least[: network.columns] = FULL * supply
@@ -167,10 +166,9 @@ def precharge(network: Network, gap_s: float) -> Phase:
 
 
 def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phase:
-    """Columns drive, rows are undriven: touched ones must be high, others low.
+    """Columns drive and rows are undriven: touched rows must be high, others low.
 
-    The rows start at the released level; ``lifted``: all lines start at the other one, and the rising columns lift the
-    rows.
+    Rows start at the released level; with ``lifted`` at the other one, and rising columns lift them.
     """
     supply, columns = network.circuit.supply_v, network.columns
     touched = network.pressed.any(axis=1)
@@ -183,7 +181,7 @@ def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phas
 
 
 def project_columns(network: Network, levels: Levels) -> Phase:
-    """Columns are undriven and all rows selected: touched columns must be low, others high."""
+    """All rows are selected with columns undriven: touched columns must be low, others high."""
     supply, columns = network.circuit.supply_v, network.columns
     touched = network.pressed.any(axis=0)
     most, least = _any(network)

@@ -33,7 +33,7 @@ class Problem:
 
 @dataclasses.dataclass(frozen=True)
 class Worst:
-    """Levels in volts of the real sheet and currents in mA, at rest."""
+    """Levels of the real sheet and pin currents, at rest."""
 
     level_v: float
     """Level of the line that is read."""
@@ -44,7 +44,7 @@ class Worst:
 
 
 def scan(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Worst:
-    """A selected row with all of its columns pressed: its pin carries the current of all pulls."""
+    """A selected row with all columns pressed, whose pin carries the current of all pulls."""
     network = Network(circuit, patterns.named(rows, columns)["one row"])
     levels = Levels.of(circuit, diodes)
     phase = phases.settle(network, levels)
@@ -78,7 +78,7 @@ def shown_v(circuit: Circuit, diodes: str, volts: float) -> float:
 def problems(
     circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", projects: bool = False
 ) -> list[Problem]:
-    """Design errors of a sheet; ``projects``: with projections of all rows, as in ``scan = "reversal"``."""
+    """Design errors of a sheet; with ``projects`` also in projections, as in ``scan = "reversal"``."""
     found = _problems(circuit, "column_pull_ohm", lambda one: scan(one, rows, columns, diodes), _SCAN, columns, diodes)
     if projects:
         judge = _problems(
@@ -93,7 +93,6 @@ class _Words:
     level: str
     current: str
     low: bool
-    """Whether the line that is read goes low where the selected row is low."""
 
 
 _SCAN = _Words(
@@ -130,7 +129,6 @@ def _problems(
 
 
 def _helps(circuit: Circuit, pull: str, worst: Callable[[Circuit], Worst]) -> str:
-    """The least sufficient pull, or the remaining obstacle."""
     ohms = getattr(circuit, pull)
     while (ohms := _rounded(ohms * 1.2)) <= LARGEST_OHM:
         one = worst(circuit.replace(**{pull: ohms}))
@@ -143,7 +141,6 @@ def _helps(circuit: Circuit, pull: str, worst: Callable[[Circuit], Worst]) -> st
 
 
 def _rounded(ohms: float) -> float:
-    """Round up to two digits."""
     digits = 10 ** (len(str(int(ohms))) - 2)
     return float(-(-ohms // digits) * digits)
 
@@ -158,8 +155,7 @@ def check(circuit: Circuit, skin: Skin) -> None:
 
 
 def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
-    """The circuit in a Skin's file, if it works with a board of this Skin; None without a table. Raises CircuitError
-    for a sheet whose pins would carry too much, or whose levels are too near to VIL or VIH."""
+    """The circuit in a Skin's file; None without a table. Raises CircuitError as :func:`check` does."""
     circuit = load_circuit(path)
     if circuit is not None:
         try:

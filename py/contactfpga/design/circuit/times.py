@@ -16,7 +16,6 @@ from contactfpga.skin import Skin
 MARGIN = 1.3
 """Ratio of recommended to computed times."""
 STEP_US = 0.01
-"""Step to which recommendations are rounded up."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,7 +23,7 @@ class Time:
     """Duration of a phase with its slowest pattern."""
 
     seconds: float
-    """Duration; infinite if it never ends."""
+    """Infinite if the phase never ends."""
     pattern: str
 
     def us(self, margin: float) -> float | None:
@@ -41,19 +40,19 @@ class Needs:
     precharge: Time
     """From columns being driven until they are charged."""
     settle: Time
-    """From selecting a row until pressed columns read pressed and all others released."""
+    """From selecting a row until pressed columns read pressed and others released."""
     release: Time
     """From deselecting a row until columns may drive."""
     pulled_release: Time
-    """From deselecting a row until the pulls have lifted the columns, without precharge."""
+    """From deselecting a row until pulls have lifted the columns, without precharge."""
     project: Time
-    """From undriving the rows until touched ones read touched and all others untouched."""
+    """From undriving the rows until touched ones read touched and others untouched."""
     project_columns: Time
-    """From selecting all rows until touched columns read touched and all others untouched."""
+    """From selecting all rows until touched columns read touched and others untouched."""
     pressed: static.Worst
     """A pressed column, and the pin of its row."""
     touched: static.Worst
-    """A touched row in a projection, and the pin of the column that feeds it."""
+    """A touched row in a projection, and the pin of its column."""
     unpressed_v: float
     """Level to which neighbors pull an unpressed column after a precharge."""
     unpressed_margin_v: float
@@ -64,7 +63,7 @@ class Needs:
 
 @functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
-    """Compute times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
+    """Times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
@@ -73,7 +72,6 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
     release, released = sheet.worst(patterns.RELEASE, phases.row_release)
 
     def precharged(network: Network) -> Phase:
-        """The precharge after the gap; a row that is never released counts once it is at rest."""
         return phases.precharge(network, min(release.seconds, phases.longest_s(network)))
 
     precharge, charged = sheet.worst(patterns.RELEASE, precharged)
@@ -99,7 +97,7 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
 
 
 def needed_by(skin: Skin, circuit: Circuit) -> Needs:
-    """Compute the needs of a Skin's sheet, including guard lines."""
+    """Needs of a Skin's sheet with its guard lines."""
     return needed(circuit, skin.row_lines, skin.column_lines, skin.diodes)
 
 
@@ -116,8 +114,7 @@ def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str
 
 
 def check_times(circuit: Circuit, skin: Skin) -> None:
-    """Raise :class:`CircuitError` if a time of the Skin is shorter than its circuit needs, with :data:`MARGIN`; 64x64
-    needs some 3 s."""
+    """Raise :class:`CircuitError` if a time of the Skin is shorter than its circuit needs with :data:`MARGIN`."""
     wanted = recommended_us(skin, needed_by(skin, circuit))
     short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
     if not short:
@@ -141,7 +138,6 @@ class _Sheet:
 
 
 def _lowest(passed: PhaseResult) -> float:
-    """Volts of the unpressed column that is pulled farthest."""
     network, least = passed.phase.network, passed.phase.least[: passed.phase.network.columns]
     unpressed = passed.trace.volts[:, : network.columns][:, least > -math.inf]
     return float(unpressed.min(initial=network.circuit.supply_v))

@@ -1,4 +1,4 @@
-"""A network in time: the implicit method TR-BDF2 with error-controlled steps, and the state at rest."""
+"""A network in time, by the implicit method TR-BDF2 with error control, and its state at rest."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from contactfpga.design.circuit.network import CircuitState, Drive, Network, cha
 from contactfpga.design.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
-"""Share of the first half in a step, so that both halves have the same equations."""
+"""Share of the first half in a step; both halves have the same equations."""
 SHARE_1, SHARE_0 = 1 / (GAMMA * (2 - GAMMA)), (1 - GAMMA) ** 2 / (GAMMA * (2 - GAMMA))
 ERROR = (-3 * GAMMA**2 + 4 * GAMMA - 2) / (12 * (2 - GAMMA))
 FIRST_S = 1e-12
 ERROR_V = 1e-3
-"""Allowed error of a step."""
 CLOSE_V = 1e-5
-"""Newton's method ends when no voltage moves by more; the remaining error is far less."""
+"""Newton's method ends when no voltage moves by more."""
 DIVERGED_V = 1e3
-"""A larger move of a line shows that Newton's method diverges."""
+"""Move of a line from which Newton's method diverges."""
 ROUNDS, STEPS = 60, 20_000
 FOREVER_S = 1e6
 
@@ -37,8 +36,6 @@ class Waveform:
 
 @dataclasses.dataclass(eq=False)
 class _Rates:
-    """Charges and currents of a state."""
-
     line_c: np.ndarray
     cell_c: np.ndarray
     line_a: np.ndarray
@@ -48,7 +45,7 @@ class _Rates:
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
-    """The solution of a symmetric system in two halves, which avoids slow library threads beyond 100 lines."""
+    """Solution of a symmetric system in two halves, to avoid slow library threads beyond 100 lines."""
     side = matrix[:count, count:]
     both = np.linalg.solve(matrix[:count, :count], np.column_stack([side, right[:count]]))
     across, alone = both[:, :-1], both[:, -1]
@@ -57,8 +54,6 @@ def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
 
 
 class _DriveEquations:
-    """A network under a drive."""
-
     def __init__(self, network: Network, drive: Drive):
         self.network, self.diode = network, network.circuit.diode
         siemens = network.drive_s(drive)
@@ -75,12 +70,11 @@ class _DriveEquations:
         return _Rates(net.farads @ state.lines, cell_c, line_a, junction_a - cell_a, cell_f, cell_s)
 
     def _gathered(self, cells: np.ndarray) -> np.ndarray:
-        """Cell currents summed out of columns and into rows."""
         out = np.bincount(self.network.column_of, cells, self.count)
         return np.asarray(out - np.bincount(self.network.row_of, cells, self.count))
 
     def eliminated(self, rates: _Rates, share: float) -> tuple[np.ndarray, np.ndarray]:
-        """The matrix of the lines alone for ``charge + share * current``, and the divisor of each cell's equation."""
+        """Matrix of the lines alone for ``charge + share * current``, and divisor of each cell's equation."""
         net = self.network
         through = share * net.cell_s
         own = rates.cell_f + share * rates.cell_s + through
@@ -93,7 +87,6 @@ class _DriveEquations:
         return matrix, own
 
     def correction(self, rates: _Rates, share: float, lines: np.ndarray, cells: np.ndarray) -> CircuitState:
-        """The solution of the linear equations with these right sides."""
         net = self.network
         matrix, own = self.eliminated(rates, share)
         through = share * net.cell_s
@@ -103,7 +96,7 @@ class _DriveEquations:
     def solved(
         self, guess: CircuitState, share: float, lines: np.ndarray, cells: np.ndarray
     ) -> tuple[CircuitState, _Rates] | None:
-        """The state with this ``charge + share * current``; None if Newton's method does not converge."""
+        """State with this ``charge + share * current``; None if Newton's method does not converge."""
         for _ in range(ROUNDS):
             rates = self.rates(guess)
             step = self.correction(
@@ -142,7 +135,7 @@ def run(
     seconds: float,
     enough: Callable[[np.ndarray], bool] = lambda volts: False,
 ) -> Waveform:
-    """The lines for this long, or until ``enough`` accepts their volts."""
+    """Simulate the lines for this long, or until ``enough`` accepts their volts."""
     equations = _DriveEquations(network, drive)
     state, rates = start, equations.rates(start)
     times, volts, now, step = [0.0], [start.lines], 0.0, FIRST_S
@@ -166,7 +159,6 @@ def run(
 
 
 def _ahead(diode: Diode, start: CircuitState, middle: CircuitState) -> CircuitState:
-    """A guess of the end of a step."""
     on = (1 - GAMMA) / GAMMA
     junctions = middle.junctions + on * (middle.junctions - start.junctions)
     lines = middle.lines + on * (middle.lines - start.lines)
@@ -176,7 +168,6 @@ def _ahead(diode: Diode, start: CircuitState, middle: CircuitState) -> CircuitSt
 def _step(
     equations: _DriveEquations, state: CircuitState, rates: _Rates, step: float
 ) -> tuple[tuple[CircuitState, _Rates], tuple[CircuitState, _Rates], float] | None:
-    """Middle and end of a step, and its error in volts."""
     share = GAMMA * step / 2
     middle = equations.solved(state, share, rates.line_c - share * rates.line_a, rates.cell_c - share * rates.cell_a)
     if middle is None:

@@ -1,4 +1,4 @@
-"""The values of a sheet's circuit, and the table `[circuit]` in a Skin's file; nothing is computed."""
+"""The values of a sheet's circuit, and the table `[circuit]` of a Skin's file."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from contactfpga.inputs.values import is_finite, shown
 
 
 class CircuitError(ContactFPGAError, ValueError):
-    """An impossible or unworkable circuit; the message names the value and the limit."""
+    """An impossible or unworkable circuit."""
 
 
 def _check_limits(where: str, values: Diode | Circuit) -> None:
-    """Check each number against the lowest and the highest value that its field declares."""
     for one in dataclasses.fields(values):
         if not one.metadata:
             continue
@@ -30,8 +29,7 @@ def _check_limits(where: str, values: Diode | Circuit) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Diode:
-    """A Shockley junction with a series resistance and a depletion charge: SPICE's IS, N, RS, CJO, VJ and M, without
-    breakdown or diffusion charge."""
+    """A Shockley junction with series resistance and depletion charge: SPICE's IS, N, RS, CJO, VJ and M."""
 
     saturation_a: float = field(metadata={"limits": (1e-18, 1e-3), "spice": "IS"})
     emission: float = field(metadata={"limits": (0.5, 5.0), "spice": "N"})
@@ -46,25 +44,25 @@ class Diode:
 
 
 SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 11.0, 0.3, 0.5)
-"""A small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
+"""Small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
 SILICON = Diode(2.5e-9, 1.75, 0.6, 2.0, 0.75, 0.4)
-"""A small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
+"""Small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
 DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Circuit:
-    """The sheet with its wires and the board's pins. Raises :class:`CircuitError` for impossible values.
+    """A sheet with its wires and the board's pins. Raises :class:`CircuitError` for impossible values.
 
-    Each line is one capacitance; its resistance is between it and its pin, as if all switches were at the far end.
+    A line's resistance is that to its pin, as if all switches were at the far end.
     """
 
     line_pf: float = field(default=30.0, metadata={"limits": (0.1, 100_000.0, "pF")})
-    """Capacitance of a line to ground, with its pin, in pF."""
+    """Capacitance of a line to ground, with its pin."""
     crossing_pf: float = field(default=2.0, metadata={"limits": (0.0, 1000.0, "pF")})
-    """Capacitance of a row to a column at their crossing, with an open switch, in pF."""
+    """Capacitance of a row to a column at a crossing with an open switch."""
     neighbor_pf: float = field(default=3.0, metadata={"limits": (0.0, 10_000.0, "pF")})
-    """Capacitance of a line to each neighbor, in pF."""
+    """Capacitance of a line to each neighbor."""
     pin_ohm: float = field(default=40.0, metadata={"limits": (1.0, 10_000.0, "ohm")})
     """Resistance of a driving pin, high or low."""
     series_ohm: float = field(default=0.0, metadata={"limits": (0.0, 100_000.0, "ohm")})
@@ -76,18 +74,18 @@ class Circuit:
     diode: Diode = SCHOTTKY
     """Diode in series with each switch; in a file also ``"schottky"`` or ``"silicon"``."""
     column_pull_ohm: float = field(default=100_000.0, metadata={"limits": (100.0, 1e8, "ohm")})
-    """Resistor that pulls or keeps a column at its released level."""
+    """Resistor that keeps a column at its released level."""
     row_pull_ohm: float = field(default=10_000.0, metadata={"limits": (100.0, 1e8, "ohm")})
-    """Resistor that pulls a row to its untouched level; used by projections alone."""
+    """Resistor that pulls a row to its untouched level, for projections alone."""
     supply_v: float = field(default=3.3, metadata={"limits": (1.0, 5.5, "V")})
-    """Supply of the board's pins, in V."""
+    """Supply of the board's pins."""
     low_v: float = field(default=0.8, metadata={"limits": (0.1, 5.0, "V")})
     """VIL: the highest level that surely reads low."""
     high_v: float = field(default=2.0, metadata={"limits": (0.2, 5.5, "V")})
     """VIH: the lowest level that surely reads high."""
     pin_ma: float = field(default=8.0, metadata={"limits": (0.1, 100.0, "mA")})
-    """Largest permanent pin current: 8 mA is specified for an iCE40's pin at 3.3 V, and for an ECP5's with its usual
-    drive strength. Charging pulses may be higher."""
+    """Largest permanent pin current; 8 mA is specified for pins of an iCE40 at 3.3 V and of an ECP5 with its usual
+    drive strength."""
 
     def __post_init__(self) -> None:
         _check_limits("circuit", self)
@@ -105,7 +103,7 @@ class Circuit:
         return self.pin_ohm + self.series_ohm + self.line_ohm
 
     def replace(self, **changes: Any) -> Circuit:
-        """A copy with some values changed, checked again."""
+        """A checked copy with some values changed."""
         return dataclasses.replace(self, **changes)
 
 
@@ -119,7 +117,7 @@ THERMAL_V = 8.617333e-5 * 300.15
 
 
 def knee_v(diode: Diode) -> float:
-    """Voltage above which Newton's method is limited, as the exponential outruns it."""
+    """Voltage above which Newton's method is limited."""
     step = diode.emission * THERMAL_V
     return step * math.log(step / (math.sqrt(2) * diode.saturation_a))
 
@@ -130,8 +128,6 @@ def load_circuit(path: str | Path) -> Circuit | None:
 
 
 def _read(values: Any) -> Circuit:
-    """The circuit of a TOML table, whose keys are the fields of :class:`Circuit`. ``diode`` is a name or a table of the
-    fields of :class:`Diode`."""
     given = dict(tomlfile.fields_of(Circuit, "circuit", values, CircuitError))
     if isinstance(diode := given.get("diode"), str):
         if diode not in DIODES:

@@ -1,7 +1,7 @@
-"""The soft cover between a contact and the switches: which of them close. SI units, stress positive in compression.
+"""The soft cover between a contact and the switches: which of them close.
 
-The paper is Battaglia et al., "Combining Haptic Sensing with Safe Interaction"; its equations are cited by number, with
-misprints corrected. K. L. Johnson, "Contact mechanics" (1985), is cited by name.
+Units are SI; stress is positive in compression. The paper is Battaglia et al., "Combining Haptic Sensing with Safe
+Interaction", cited by equation number with misprints corrected; Johnson is K. L. Johnson, "Contact mechanics" (1985).
 """
 
 from contactfpga.design.cover.answer import CoverError, NoSolution

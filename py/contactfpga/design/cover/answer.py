@@ -13,24 +13,24 @@ from contactfpga.inputs.values import is_finite, shown
 Floats = NDArray[np.float64]
 
 MAX_LENGTH_M = 1.0
-"""Upper limit of a cover's lengths on a robot: whoever writes 5 means mm."""
+"""Upper limit of a cover's lengths on a robot; larger ones are probably in mm."""
 
 
 SMALLEST, LARGEST = 1e-12, 1e12
-"""Limits of nonzero SI values in a file, whose powers are still finite."""
+"""Limits of nonzero SI values in a file, whose powers are finite."""
 
 
 TINIEST, HUGEST = 1e-25, 1e25
-"""Limits of any nonzero SI number, whose products here are still finite."""
+"""Limits of any nonzero SI number, whose products are finite."""
 
 
 class CoverError(ContactFPGAError, ValueError):
-    """An impossible value of a cover; the message names it and the limit."""
+    """An impossible value of a cover."""
 
 
 @dataclasses.dataclass(frozen=True)
 class NoSolution:
-    """The question has no answer, and the reason."""
+    """The reason why a question has no answer."""
 
     reason: str
 
@@ -39,7 +39,7 @@ class NoSolution:
 
 
 def positive(name: str, value: float, unit: str) -> float:
-    """``value`` if it is a usable number above 0; raises :class:`CoverError` otherwise."""
+    """Check that ``value`` is finite and above 0; raises :class:`CoverError`."""
     if not is_finite(value) or value <= 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number above 0 {unit}".rstrip())
     if value < TINIEST:
@@ -48,14 +48,14 @@ def positive(name: str, value: float, unit: str) -> float:
 
 
 def not_negative(name: str, value: float, unit: str) -> float:
-    """``value`` if it is a usable number of at least 0; raises :class:`CoverError` otherwise."""
+    """Check that ``value`` is finite and at least 0; raises :class:`CoverError`."""
     if not is_finite(value) or value < 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number, 0 {unit} or above".replace("  ", " "))
     return _below_hugest(name, value, unit)
 
 
 def finite(name: str, value: float) -> float:
-    """``value`` if it is a usable number; raises :class:`CoverError` otherwise."""
+    """Check that ``value`` is finite; raises :class:`CoverError`."""
     if not is_finite(value):
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number")
     return _below_hugest(name, value, "")
@@ -68,7 +68,7 @@ def _below_hugest(name: str, value: float, unit: str) -> float:
 
 
 def numbers(name: str, values: Floats | float, unit: str) -> Floats:
-    """An array of usable numbers; raises :class:`CoverError` otherwise."""
+    """An array of finite numbers; raises :class:`CoverError`."""
     try:
         found = np.asarray(values, float)
     except OverflowError:  # one of Python's whole numbers

@@ -1,18 +1,16 @@
 """An arm that runs into an obstacle, and the energy balance by which the foam slows it.
 
-One joint, constant motor torque u, optional gravity, the foam a spring F = K_s delta^1.5 (Hertz). With theta - theta0 =
-delta/d, delta(0) = 0 and +v0 at the touch, (3) as corrected is
+One joint has constant motor torque u and optional gravity; the foam is a Hertz spring F = K_s delta^1.5. With theta -
+theta0 = delta/d, delta(0) = 0 and +v0 at the touch (the paper prints -v0 and drops cos theta0), (3) is
 
     J/(2 d^2) (v^2 - v0^2) = u delta/d - M g l [cos theta0 - cos(theta0 + delta/d)] - 2/5 K_s delta^(5/2).
 
-The paper prints -v0 and drops cos theta0.
-
-The motion over time is the reference for :mod:`contactfpga.design.cover.impact`: (2) as corrected,
+The reference for :mod:`contactfpga.design.cover.impact` is (2) as corrected,
 
     J/d^2 d^2 delta/dt^2 = (u - M g l sin(theta0 + delta/d))/d - K_s delta^(3/2),
 
-by Dormand and Prince's method of order 5 with step control. The step in which v becomes negative is repeated with v as
-the independent variable (Henon), which ends at v = 0 exactly. The time course also follows by quadrature.
+by Dormand and Prince's method of order 5. The step in which v becomes negative is repeated with v as the independent
+variable (Henon), which ends at v = 0 exactly.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ from contactfpga.design.cover.answer import CoverError, finite, not_negative, nu
 from contactfpga.design.cover.numerics import Floats, gauss
 
 GRAVITY = 9.81
-"""g in m/s2, the paper's."""
+"""g of the paper in m/s2."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,15 +35,15 @@ class Arm:
     """A link that turns about one joint, and its drive."""
 
     inertia_kgm2: float
-    """J about the joint, in kg m2."""
+    """J about the joint."""
     lever_m: float
-    """d, from the joint to the contact, in m."""
+    """d, from the joint to the contact."""
     torque_nm: float = 0.0
-    """u, the motor's constant torque in Nm; positive presses into the obstacle."""
+    """u, the motor's constant torque; positive presses into the obstacle."""
     weight_nm: float = 0.0
-    """M g l in Nm; 0 leaves gravity out."""
+    """M g l; 0 leaves gravity out."""
     angle_rad: float = 0.0
-    """theta0, the joint's angle at the touch, from hanging down toward the obstacle, in rad."""
+    """theta0, the joint's angle at the touch, from hanging down toward the obstacle."""
 
     def __post_init__(self) -> None:
         positive("inertia_kgm2", self.inertia_kgm2, "kg m2")
@@ -68,9 +66,9 @@ class Arm:
         gravity: bool = False,
         angle_rad: float = 0.0,
     ) -> Arm:
-        """A cylinder of that radius and length whose center of mass is ``com_m`` from the joint.
+        """A cylinder with its center of mass ``com_m`` from the joint.
 
-        J = m/12 (3 R^2 + L^2) + m l^2, a thin tube 6 R^2; by default L is the lever, as printed.
+        J = m/12 (3 R^2 + L^2) + m l^2, for a thin tube 6 R^2; L defaults to the lever, as printed.
         """
         positive("mass_kg", mass_kg, "kg")
         positive("lever_m", lever_m, "m")
@@ -83,22 +81,22 @@ class Arm:
 
     @property
     def mass_kg(self) -> float:
-        """J/d^2, the effective mass at the contact, in kg."""
+        """J/d^2, the effective mass at the contact."""
         return self.inertia_kgm2 / self.lever_m**2
 
     @property
     def free(self) -> bool:
-        """Whether there is neither torque nor gravity, hence a closed form."""
+        """Whether torque and gravity are 0, which allows a closed form."""
         return self.torque_nm == 0 and self.weight_nm == 0
 
     def push_n(self, indentation_m: float) -> float:
-        """Force of motor and gravity at the contact, in N."""
+        """Force of motor and gravity at the contact."""
         finite("indentation_m", indentation_m)
         angle = self.angle_rad + indentation_m / self.lever_m
         return (self.torque_nm - self.weight_nm * math.sin(angle)) / self.lever_m
 
     def work_j(self, indentation_m: Floats | float) -> Floats:
-        """Work of motor and gravity since the touch, in J."""
+        """Work of motor and gravity since the touch."""
         half = numbers("indentation_m", indentation_m, "m") / (2 * self.lever_m)
         lifted = 2 * self.weight_nm * np.sin(self.angle_rad + half) * np.sin(half)
         return np.asarray(2 * self.torque_nm * half - lifted)
@@ -131,7 +129,7 @@ def slowness(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, phi: 
 State = tuple[float, float]
 
 RTOL = 1e-10
-"""Allowed error per step, relative to each of depth, speed and time."""
+"""Allowed error per step, relative to depth, speed and time."""
 
 _A = (
     (),
@@ -155,12 +153,12 @@ class CompressionStep(NamedTuple):
 
 
 class Course(NamedTuple):
-    """The motion from touch to separation; arrays of the same length."""
+    """The motion from touch to separation, as arrays of one length."""
 
     time_s: Floats
     indentation_m: Floats
     speed_m_s: Floats
-    """Positive into the foam."""
+    """Speed, positive into the foam."""
     force_n: Floats
 
 
@@ -171,7 +169,7 @@ def compress(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -
 
 
 def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> list[CompressionStep]:
-    """Every accepted step from the touch to the end of the compression at speed 0."""
+    """Every accepted step from the touch to the end of the compression."""
     positive("stiffness", stiffness, "N/m^1.5")
     if not 1e-13 <= rtol <= 1e-2:
         raise CoverError(f"rtol is {rtol!r}; it must lie between 1e-13 and 0.01")
@@ -216,7 +214,7 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
 
 
 def course(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, count: int = 64) -> Course:
-    """The whole contact in 2 ``count`` + 1 moments by quadrature; ``depth_m``: the end of the compression.
+    """The whole contact in 2 ``count`` + 1 moments by quadrature; compression ends at ``depth_m``.
 
     The model is lossless, so the way out mirrors the way in.
     """
@@ -264,7 +262,6 @@ def _walk(
 
 
 def _one(slope: Slope, x: float, y: State, step: float) -> tuple[State, State]:
-    """One step: its result, and the difference of order 4."""
     slopes: list[State] = []
     at = y
     for row, share in zip(_A, _C):

@@ -1,17 +1,13 @@
 """The force on each switch of a sheet, and the closed ones: faces and caps under foam.
 
-Foam presses the sheet with the normal stress that spreads through it (:mod:`contactfpga.design.cover.medium`). A switch
-takes the part on its face or on its *cap*, a rigid square plate on the switch. Caps are *flush* with their
-surroundings, which carry their own share, or *proud*: then the foam rests on the caps alone, and each takes the part on
-its *tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from tile to tile.
+A switch takes the stress in the foam (:mod:`contactfpga.design.cover.medium`) on its face or on its *cap*, a rigid
+square plate. The surroundings of *flush* caps carry their own share. *Proud* caps carry all foam, and each takes its
+*tile*, one pitch wide. Foam that is *cut* between the caps does not spread stress from tile to tile.
 
-A proud cap yields by the switch's travel and takes the foam along, which loads the neighbors. The foam between is a
-strip as long as the gap plus the foam's thickness, as wide as the pitch across, that shears and bends (Timoshenko). The
-forces Q on the caps are those on rigid caps, T, spread by (1 + L/k) Q = T: k the switch's stiffness, L the strips'
-stiffness as a discrete Laplacian.
-
-Simplifications: the pressure on top is independent of the yield; caps do not tilt; foam that sags between proud caps is
-unsupported. Boundary elements give the error, on the page on the cover.
+A proud cap yields by the switch's travel, and the foam, strips that shear and bend (Timoshenko), loads the neighbors.
+Forces Q on the caps follow from those on rigid caps, T, by (1 + L/k) Q = T: k is the switch's stiffness, L the strips'
+stiffness as a discrete Laplacian. The pressure on top is independent of the yield; caps do not tilt; foam that sags
+between proud caps is unsupported.
 """
 
 from __future__ import annotations
@@ -28,10 +24,10 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.press import Cover, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
-"""Limits of grid steps per pitch; between them, two steps per foam thickness and six per face."""
+"""Limits of grid steps per pitch; between them, two per foam thickness and six per face."""
 
 MOST_PITCHES = 20
-"""Largest computed thickness of the foam in pitches; forces are equal on all switches long before."""
+"""Largest foam thickness in pitches; forces are equal on all switches long before."""
 
 BEYOND = 4.0
 """Computed foam beyond the sheet, in thicknesses."""
@@ -40,9 +36,8 @@ BEYOND = 4.0
 class Cells:
     """The switches of a sheet of ``rows`` by ``columns`` under a cover, the first one at (0, 0) m.
 
-    ``seed`` draws the closing force of each switch if the cover's switch has a ``spread``. Raises CoverError for the
-    model ``patch``, which knows no force, for caps wider than the pitch, and for foam of more than
-    :data:`MOST_PITCHES`.
+    ``seed`` draws closing forces with a ``spread``. Raises CoverError for the model ``patch``, which has no force, for
+    caps wider than the pitch, and for foam of more than :data:`MOST_PITCHES`.
     """
 
     def __init__(self, cover: Cover, rows: int, columns: int, pitch_x_m: float, pitch_y_m: float, seed: int = 0):
@@ -61,7 +56,7 @@ class Cells:
         self._x, self._y = np.arange(columns) * pitch_x_m, np.arange(rows) * pitch_y_m
         self._axes = [_Axis(count, pitch, cover) for count, pitch in ((rows, pitch_y_m), (columns, pitch_x_m))]
         self.thresholds_n = self.drawn(seed)
-        """(rows, columns) closing force of each switch in N, less its preload."""
+        """(rows, columns) closing force of each switch less its preload."""
 
     @property
     def parts(self) -> int:
@@ -69,13 +64,13 @@ class Cells:
         return self._axes[1].parts
 
     def drawn(self, seed: int) -> Floats:
-        """(rows, columns) closing force in N of each switch of the sheet drawn with this seed, less its preload."""
+        """(rows, columns) closing force in N of each switch drawn with this seed, less its preload."""
         switch = self.cover.switch
         drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
         return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
     def forces_n(self, loads: Sequence[Load]) -> Floats:
-        """(rows, columns) force on each switch in N, summed over loads; below 0 where foam is pulled off."""
+        """(rows, columns) force on each switch, summed over loads; below 0 where foam is pulled off."""
         if self.cover.model == "point":
             return self._of_points(loads)
         down, across = self._axes
@@ -84,12 +79,12 @@ class Cells:
         return self._given_way(taken) if self.cover.gives_way else taken
 
     def closed(self, loads: Sequence[Load], before: np.ndarray | None = None) -> np.ndarray:
-        """(rows, columns) bool: the closed switches; ``before``: those closed so far, which open only when the force is
-        below the closing force by the hysteresis."""
+        """(rows, columns) bool: the closed switches. Those closed ``before`` open only below the closing force less
+        hysteresis."""
         return self.closed_by(self.forces_n(loads), before)
 
     def closed_by(self, forces_n: Floats, before: np.ndarray | None = None) -> np.ndarray:
-        """Closed switches, (rows, columns) bool, under (rows, columns) forces in N; ``before``: see :meth:`closed`."""
+        """:meth:`closed` for (rows, columns) forces."""
         thresholds = self.thresholds_n
         if before is not None and self.cover.switch.hysteresis:
             thresholds = np.where(before, thresholds * (1 - self.cover.switch.hysteresis), thresholds)
@@ -97,8 +92,8 @@ class Cells:
         return found
 
     def false_presses(self, acceleration_m_s2: float = 0.0, foam_kg_m3: float = 0.0) -> float:
-        """Expected number of switches that close without a touch: preload and the inertia of cap and foam, when the
-        link accelerates toward the sheet's outside, exceed a normally distributed closing force."""
+        """Expected number of switches that close without a touch, by preload and by the inertia of cap and foam when
+        the link accelerates toward the sheet's outside."""
         finite("acceleration_m_s2", acceleration_m_s2)
         not_negative("foam_kg_m3", foam_kg_m3, "kg/m3")
         cap = self.cover.cap
@@ -111,7 +106,7 @@ class Cells:
         return share * math.prod(self.shape)
 
     def _of_points(self, loads: Sequence[Load]) -> Floats:
-        """The paper's (9): the stress at the middle of each face, times its area."""
+        """The paper's (9): stress at the middle of each face, times its area."""
         forces = np.zeros(self.shape)
         for part, force in (share for load in loads for share in load.shares()):
             away = np.hypot(self._x - part.x_m, self._y[:, None] - part.y_m)
@@ -119,7 +114,6 @@ class Cells:
         return forces
 
     def _pressure(self, loads: Sequence[Load]) -> Floats:
-        """Force in N on each part of the grid."""
         down, across = self._axes
         found = np.zeros((len(down.places_m), len(across.places_m)))
         for part, force in (share for load in loads for share in load.shares()):
@@ -139,7 +133,7 @@ class Cells:
         return found
 
     def _spread(self, pressure: Floats) -> Floats:
-        """The force on each grid part below the foam, periodic far beyond the edge."""
+        """Force on each grid part below the foam, periodic far beyond the edge."""
         if self.cover.cut:
             return pressure
         return np.fft.irfft2(np.fft.rfft2(pressure) * self._transfer, s=pressure.shape)
@@ -165,7 +159,7 @@ class Cells:
 
 
 class _Axis:
-    """One direction of a sheet: the stress grid, and each switch's share of it."""
+    """One direction of a sheet: its stress grid, and each switch's share of it."""
 
     def __init__(self, count: int, pitch_m: float, cover: Cover):
         self.count, self.pitch_m = count, pitch_m
@@ -178,12 +172,10 @@ class _Axis:
         self.taken = self._taken(cover.width_m(pitch_m))
 
     def near(self, middle_m: float, reach_m: float) -> slice:
-        """The grid places within ``reach_m`` of a middle."""
         first, last = ((middle_m + end * reach_m - self.places_m[0]) / self.step_m for end in (-1, 1))
         return slice(max(0, math.floor(first)), max(0, min(len(self.places_m), math.ceil(last) + 1)))
 
     def holds(self, middle_m: float, reach_m: float) -> bool:
-        """Whether all places within ``reach_m`` are on the grid."""
         return bool(self.places_m[0] <= middle_m - reach_m and middle_m + reach_m <= self.places_m[-1])
 
     @functools.cached_property
@@ -193,7 +185,6 @@ class _Axis:
         return np.linalg.eigh(np.diag(joined.sum(axis=0)) - joined)
 
     def _taken(self, width_m: float) -> Floats:
-        """(switches, places): the share of each place on a switch's width."""
         away = self.places_m - np.arange(self.count)[:, None] * self.pitch_m
         upper, lower = (np.clip(away + side * self.step_m / 2, -width_m / 2, width_m / 2) for side in (1, -1))
         return np.asarray((upper - lower) / self.step_m)
@@ -201,5 +192,5 @@ class _Axis:
 
 @functools.lru_cache(maxsize=32)
 def cells_of(cover: Cover, rows: int, columns: int, pitch_x_m: float, pitch_y_m: float, seed: int = 0) -> Cells:
-    """:class:`Cells`, cached for the next call."""
+    """:class:`Cells`, cached."""
     return Cells(cover, rows, columns, pitch_x_m, pitch_y_m, seed)

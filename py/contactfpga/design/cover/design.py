@@ -1,8 +1,6 @@
 """The algorithm of the paper's Fig. 3: material, thickness, force and pitch under limits, and the binding limit.
 
-For each foam, and for the modulus with exactly the required compression time: the impact, the yield check, the
-thickness, then the detected force and the pitch. Every limit is checked with its margin; candidates that fail are part
-of the answer.
+Candidates are each foam and the modulus with exactly the required compression time, also those that break a limit.
 """
 
 from __future__ import annotations
@@ -22,10 +20,9 @@ from contactfpga.design.cover.task import Foam, Task
 from contactfpga.skin.latency import latency_s
 
 FREE = "free modulus"
-"""Name of the candidate whose modulus follows from the time."""
+"""Candidate whose modulus follows from the time."""
 
 STEPS = 6
-"""Latencies for :func:`thinning`, logarithmically spaced."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +38,7 @@ class Check:
 
     @property
     def used(self) -> float:
-        """Used share of the limit: above 1 it is broken."""
+        """Used share of the limit; above 1 it is broken."""
         value, limit = (self.value, self.limit) if self.at_most else (self.limit, self.value)
         return value / limit if limit else math.inf
 
@@ -57,18 +54,18 @@ class FoamDesign:
     foam: Foam
     hit: Impact | None = None
     by_energy_m: dict[str, float] | None = None
-    """Thickness by (8), by each rule; None if the foam's yield strength is unknown."""
+    """Thickness (8) by each rule; None if the foam's yield strength is unknown."""
     thickness_m: float | None = None
     """Chosen thickness of the cover."""
     mass_kg_m2: float | None = None
     """Mass of the cover per area; None if the foam's density is unknown."""
     least: Sense | None = None
-    """Force in N that closes a switch right below."""
+    """Force that closes a switch right below."""
     pitch_m: float | None = None
     sure: Sense | None = None
-    """Force in N that is felt everywhere at that pitch."""
+    """Force that is felt everywhere at this pitch."""
     regions: tuple[RegionLimits, ...] = ()
-    """Speed and reaction time for each of the task's body regions."""
+    """Speed and reaction time for the task's body regions."""
     checks: tuple[Check, ...] = ()
     no_solution: str | None = None
     notes: tuple[str, ...] = ()
@@ -89,16 +86,16 @@ class Thin:
 
     latency_s: float
     modulus_pa: float | None
-    """The free modulus at which compression time over latency is as in the task."""
+    """Free modulus with the task's ratio of compression time to latency."""
     compression_m: float | None
     force_n: float | None
     """Peak force of this modulus."""
     by_energy_m: float | None
-    """Thickness of the chosen foam by (8): in proportion to t0/t_c."""
+    """Thickness (8) of the chosen foam, in proportion to t0/t_c."""
     pressed_m: float | None
-    """Indentation of the chosen foam at that moment."""
+    """Indentation of the chosen foam after ``latency_s``."""
     stopped_m: float | None
-    """Final indentation if the motor brakes from then on with the task's torque: the foam must be thicker."""
+    """Final indentation if the motor then brakes; the foam must be thicker."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,7 +105,7 @@ class Design:
     candidates: tuple[FoamDesign, ...]
     thinning: tuple[Thin, ...]
     sheet_s: float
-    """Worst latency of the task's sheet, without host and motor, in s."""
+    """Worst latency of the task's sheet, without host and motor."""
 
     @property
     def best(self) -> FoamDesign | None:
@@ -118,7 +115,7 @@ class Design:
 
     @property
     def relax(self) -> tuple[str, ...]:
-        """If nothing fits: the necessary relaxations of the nearest candidate."""
+        """Necessary relaxations of the nearest candidate; none if one fits."""
         first = self.candidates[0]
         if first.fits:
             return ()
@@ -138,13 +135,13 @@ def design(task: Task) -> Design:
 
 
 def thinning(task: Task, foam: Foam | None) -> tuple[Thin, ...]:
-    """Thinnest covers as t0 falls from the task's to that of the sheet, host and motor."""
+    """Thinnest covers as t0 falls from the task's to that of sheet, host and motor."""
     lowest = min(task.latency_s, latency_s(task.skin) + task.other_s)
     return tuple(_thin(task, foam, float(t0)) for t0 in np.geomspace(task.latency_s, lowest, STEPS))
 
 
 def _rank(candidate: FoamDesign) -> tuple[bool, bool, float, float]:
-    """Ranking key: fitting candidates by mass, if known, and thickness; others by their excess."""
+    """Ranking key: fitting candidates by mass, if known, and thickness; others by excess."""
     if candidate.fits:
         mass = candidate.mass_kg_m2
         return False, mass is None, mass or 0.0, candidate.thickness_m or 0.0
@@ -214,7 +211,6 @@ def _region_check(task: Task, one: RegionLimits) -> Check:
 
 
 def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> FoamDesign:
-    """The force and the pitch, and their limits."""
     checks = list(sofar.checks)
     least = sheet.detects(0.0, task.model, _tolerance(task))
     notes = [*sofar.notes, *(sofar.hit.notes if sofar.hit else ()), *least.notes]
@@ -241,7 +237,7 @@ def _sensed(task: Task, sofar: FoamDesign, sheet: PaddedSheet, ball: Ball) -> Fo
 
 
 def _by_energy(task: Task, foam: Foam, ball: Ball, hit: Impact, t0: float | None = None) -> dict[str, float]:
-    """Thickness (8) by each rule: as printed with the link's mass, else with the effective mass at the contact."""
+    """Thickness (8) by each rule, with the link's mass as printed, else with the effective mass at the contact."""
     assert foam.yield_pa is not None
     stored = elastic.resilience(foam.yield_pa, foam.modulus_pa)
     share = min(1.0, (task.latency_s if t0 is None else t0) / hit.time_s)
@@ -272,7 +268,6 @@ def _thin(task: Task, foam: Foam | None, t0: float) -> Thin:
 
 
 def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
-    """Indentation this long after the touch, at most delta_c."""
     if seconds >= hit.time_s:
         return hit.compression_m
     course = arm.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)
@@ -281,8 +276,6 @@ def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
 
 
 def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
-    """End of the compression if the torque changes at ``pressed_m``, by the balance of a braking arm with corrected
-    energy."""
     if pressed_m >= hit.compression_m:
         return hit.compression_m
     braking = dataclasses.replace(task.arm, torque_nm=-task.brake_nm)
@@ -291,7 +284,6 @@ def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
 
 
 def _tolerance(task: Task) -> float | None:
-    """Tolerance of the model choice, None for a named model."""
     return task.tolerance if task.model is None else None
 
 
@@ -300,5 +292,5 @@ def _ball(task: Task, foam: Foam) -> Ball:
 
 
 def margin(check: Check) -> str:
-    """The used share of a limit, in words."""
+    """Used share of a limit, in words."""
     return "broken" if not check.holds else f"{100 * min(1.0, check.used):.0f} % used"

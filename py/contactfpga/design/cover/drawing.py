@@ -1,4 +1,4 @@
-"""Pictures of the cover, by matplotlib. The same input gives the same file."""
+"""Pictures of the cover by matplotlib; the same input gives the same file."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ LIMIT: dict[str, Any] = {"color": style.SOFT, "linewidth": 1.0, "linestyle": sty
 FITS = "#cfe3d4"
 
 FIRST_M, MOST_N = 5e-3, 200.0
-"""Thickness of the paper's cover, and the largest force that is drawn."""
+"""Thickness of the paper's cover, and the largest drawn force."""
 
 THIN_M = 1e-3
-"""Thickness and pitch from which the map of designs is computed."""
+"""Least thickness and pitch on the map of designs."""
 
 
 def draw(folder: Path, suffix: str, task: Task = FIRST_DESIGN, data: tuple[Floats, Floats] | None = None) -> list[Path]:
-    """Every picture into ``folder`` as ``png`` or ``svg``; Fig. 9 only with ``data``: forces (N), deformations (m)."""
+    """Write every picture into ``folder`` as ``png`` or ``svg``; Fig. 9 needs ``data``: forces (N), deformations
+    (m)."""
     with matplotlib.rc_context(style.SETTINGS):
         figures = {"cover-force": force(task.switch), "cover-map": design_map(task)}
         if data:
@@ -40,7 +41,7 @@ def draw(folder: Path, suffix: str, task: Task = FIRST_DESIGN, data: tuple[Float
 
 
 def force(switch: Switch) -> Figure:
-    """The two curves of the paper's Fig. 8, over three media: force over offset, 5 mm thick, and over thickness."""
+    """The curves of the paper's Fig. 8 over three media: force over offset, 5 mm thick, and over thickness."""
     figure = style.new(3.5)
     left, right = figure.subplots(1, 2, sharey=True)
     offsets, depths = np.linspace(0, 10e-3, 201), np.linspace(2e-3, 20e-3, 181)
@@ -65,7 +66,7 @@ def force(switch: Switch) -> Figure:
 
 
 def design_map(task: Task) -> Figure:
-    """The force felt everywhere over thickness and pitch, by the half-space and by the bonded layer, and the limits."""
+    """The force felt everywhere over thickness and pitch, by half-space and bonded layer, and the limits."""
     figure = style.new(4.2)
     places = figure.subplots(1, 2, sharey=True)
     thickness = np.linspace(THIN_M, 2 * task.thickness_m, 120)
@@ -103,14 +104,13 @@ def design_map(task: Task) -> Figure:
 
 
 def _top(thickness: Floats, pitch: Floats, inside: np.ndarray) -> tuple[float, float]:
-    """Place of a contour's name: its highest point, or where it leaves the picture."""
     high = np.where(inside.any(axis=0), pitch[len(pitch) - 1 - inside[::-1].argmax(axis=0)], 0.0)
     column = int(np.argmax(np.minimum(high, 0.85 * pitch[-1])))
     return float(thickness[column]), float(high[column])
 
 
 def deformation(force_n: Floats, deformation_m: Floats) -> Figure:
-    """Measured points and their line, like the paper's Fig. 9."""
+    """Measured points and their line, as in the paper's Fig. 9."""
     fitted = line.fit(force_n, deformation_m)
     figure = style.new(4.0)
     place = figure.subplots()
@@ -124,7 +124,7 @@ def deformation(force_n: Floats, deformation_m: Floats) -> Figure:
 
 
 def _closing(switch: Switch, offset_m: Floats, thickness_m: Floats, within: str) -> Floats:
-    """The point force in N that closes a switch; NaN, which is not drawn, if none does."""
+    """Point force in N that closes a switch; NaN if none does."""
     ratio = offset_m / thickness_m
     spread = medium.spread(within, ratio)
     limit = medium.first_zero(within)

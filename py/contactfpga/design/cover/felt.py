@@ -1,7 +1,6 @@
-"""Whether a light finger is felt: the force that closes a first switch, over places anywhere on a sheet.
+"""Whether a light finger, an ellipse with Hertz's pressure, is felt anywhere on a sheet.
 
-Switch forces are proportional to the finger's, so a touch is felt from the least ratio of closing force to force share
-on. The finger is an ellipse with Hertz's pressure of fixed size.
+A touch is felt from the least ratio of closing force to force share on.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ LENGTH_M, WIDTH_M = 12e-3, 10e-3
 
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
-"""Sheets with drawn closing forces, if these have a spread: another sheet is between the least and the most of them
-with a probability of 39/41 (95 %)."""
+"""Drawn sheets, if closing forces have a spread; another sheet lies within their range with 39/41 (95 %)
+probability."""
 
 LEAST_SHARE = 1e-4
-"""Force share below which a switch counts as unpressed: a layer's linear solution has ripples far away."""
+"""Force share that counts as unpressed; a layer's linear solution has ripples far away."""
 
 NEIGHBORS = 2
-"""Computed switches beyond the finger and the reach of the foam: yielding caps pass force on."""
+"""Computed switches beyond finger and foam, as yielding caps pass force on."""
 
 _STEPS = 1 / 1.2207440846057596 ** np.arange(1, 4)
 """Steps of a sequence that fills a cube evenly (Roberts): powers of the root of x^4 = x + 1."""
@@ -38,7 +37,7 @@ _STEPS = 1 / 1.2207440846057596 ** np.arange(1, 4)
 
 @dataclasses.dataclass(frozen=True)
 class Sheet:
-    """The switches of a flat sheet, or of a closed one."""
+    """The switches of a flat or a closed sheet."""
 
     rows: int
     columns: int
@@ -54,14 +53,14 @@ class Sheet:
 
 @dataclasses.dataclass(frozen=True)
 class Force:
-    """A force in N from which touches are felt."""
+    """A force from which touches are felt."""
 
     value_n: float
-    """The median over drawn sheets."""
+    """Median over drawn sheets."""
     low_n: float
-    """The minimum over drawn sheets."""
+    """Minimum over drawn sheets."""
     high_n: float
-    """The maximum over drawn sheets; 95 % of all sheets are between the two."""
+    """Maximum over drawn sheets; 95 % of all sheets lie between."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +68,7 @@ class Felt:
     """Sensitivity of a sheet to light touches."""
 
     places: int
-    """Places of the finger's middle, evenly spread, each with its own angle."""
+    """Places of the finger's middle, evenly spread, each with an angle."""
     sheets: int
     """Sheets with drawn closing forces; 1 without a spread."""
     half: Force | NoSolution
@@ -79,11 +78,11 @@ class Felt:
     worst: Force | NoSolution
     """Force from which a touch at the worst place is felt."""
     worst_m: tuple[float, float]
-    """The worst place, x and y from the first switch."""
+    """x and y of the worst place from the first switch."""
     least_share: float
-    """Force share of the most pressed switch at the worst place."""
+    """Force share of the most pressed switch, at the worst place."""
     median_share: float
-    """Median over all places of the most pressed switch's force share."""
+    """Median force share of the most pressed switch."""
     false_presses: float
     """Expected number of switches that close without a touch."""
 
@@ -100,9 +99,8 @@ def feel(
 ) -> Felt:
     """Sensitivity of a sheet to an elliptic finger, ``length_m`` long and ``width_m`` wide.
 
-    ``seed``: the first of :data:`SHEETS` for drawing closing forces, if they have a spread; acceleration and density:
-    see :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the model ``patch``, which
-    knows no force.
+    ``seed`` is the first of :data:`SHEETS`; acceleration and density are for
+    :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the model ``patch``.
     """
     half = positive("length_m", length_m, "m") / 2, positive("width_m", width_m, "m") / 2
     if not 1 <= places <= MOST_PLACES:
@@ -132,8 +130,7 @@ def feel(
 
 
 def spread_evenly(places: int, sheet: Sheet) -> Floats:
-    """(places, 3) x and y in m, anywhere on the sheet up to half a pitch beyond the outermost switches, and angles in
-    rad."""
+    """(places, 3): x and y in m up to half a pitch beyond the outermost switches, and angles in rad."""
     parts = (0.5 + np.arange(1, places + 1)[:, None] * _STEPS) % 1
     x, y, angle = parts.T
     return np.stack(
@@ -146,7 +143,7 @@ def _cells(cover: Cover, sheet: Sheet, seed: int) -> Cells:
 
 
 def _closing(cover: Cover, sheet: Sheet, first: Cells, seed: int) -> Floats:
-    """(sheets, rows, columns) closing forces in N; inf for a switch that is absent, or closed without a touch."""
+    """(sheets, rows, columns) closing forces; inf for a switch that is absent or closed without a touch."""
     drawn = [first.thresholds_n]
     if cover.switch.spread:
         drawn += [_cells(cover, sheet, seed + number).thresholds_n for number in range(1, SHEETS)]
@@ -168,8 +165,6 @@ def _touches(part: float) -> str:
 
 
 class _Window:
-    """The part of a sheet around a finger; switches beyond take no force."""
-
     def __init__(self, cover: Cover, sheet: Sheet, reach_m: float):
         self.sheet = sheet
         beyond = 0.0 if cover.cut else BEYOND * cover.thickness_m
@@ -180,7 +175,6 @@ class _Window:
         self.cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
 
     def taken(self, finger: Ellipse) -> tuple[Floats, tuple[np.ndarray, np.ndarray]]:
-        """The force share of each switch of the window, and their rows and columns."""
         sheet, (high, wide) = self.sheet, self.cells.shape
         top = self._start(finger.y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
         left = self._start(finger.x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)

@@ -11,7 +11,6 @@ import numpy as np
 from contactfpga.design.cover.answer import CoverError
 
 LEAST = 3
-"""Least number of measured forces."""
 DRAWS = 200_000
 
 
@@ -27,9 +26,8 @@ class FittedForce:
 def fit_force(force_n: float, pairs: Sequence[tuple[float, float]], probability: float = 0.95) -> FittedForce:
     """The switch force that fits predicted to measured closing forces.
 
-    ``force_n``: the switch force behind the predictions; ``pairs``: predicted and measured forces in N of switches
-    whose forces scatter by a factor. All closing forces are proportional to the switch force, so one factor is fitted.
-    Raises :class:`CoverError` for fewer than three pairs, and for forces not above 0.
+    ``force_n`` is the switch force of the predictions; ``pairs`` are predicted and measured forces in N, which scatter
+    by a factor. Raises :class:`CoverError` for fewer than three pairs and for forces not above 0.
     """
     if len(pairs) < LEAST:
         raise CoverError(f"{len(pairs)} closing forces were measured; {LEAST} are needed, each of another switch")

@@ -16,27 +16,24 @@ class Ball:
     """Hertz contact of a ball (or of crossed equal cylinders) with the cover (Johnson 4.2)."""
 
     radius_m: float
-    """Effective radius R* in m: 1/R* is the sum of both bodies' curvatures."""
+    """R*; 1/R* is the sum of both bodies' curvatures."""
     modulus_pa: float
-    """Effective modulus E* in Pa: 1/E* is the sum of (1 - nu^2)/E of both bodies."""
+    """E*; 1/E* is the sum of (1 - nu^2)/E of both bodies."""
 
     def __post_init__(self) -> None:
         positive("radius_m", self.radius_m, "m")
         positive("modulus_pa", self.modulus_pa, "Pa")
 
     def patch_m(self, force_n: float) -> float:
-        """Radius of the patch in m: a = (3 F R* / (4 E*))^(1/3)."""
+        """Radius of the patch: a = (3 F R* / (4 E*))^(1/3)."""
         return math.cbrt(0.75 * positive("force_n", force_n, "N") * self.radius_m / self.modulus_pa)
 
     def indentation_m(self, force_n: float) -> float:
-        """Indentation of the ball in m: delta = a^2 / R*."""
+        """Indentation of the ball: delta = a^2 / R*."""
         return self.patch_m(force_n) ** 2 / self.radius_m
 
     def closing_n(self, switch: Switch, depth_m: float) -> float:
-        """The force in N that closes a switch right below, ``depth_m`` deep in a half-space.
-
-        On the axis sigma = 3 F / (2 pi (a^2 + z^2)), which is unbounded in F.
-        """
+        """Force that closes a switch right below, ``depth_m`` deep in a half-space."""
         positive("depth_m", depth_m, "m")
         low = 2 * math.pi / 3 * switch.closing_pa * depth_m**2  # that of a point force: the stress below it is highest
         high = 2 * low
@@ -50,7 +47,7 @@ class Ball:
 
 
 def on_axis_pa(force_n: float, patch_m: float, depth_m: float) -> float:
-    """Normal stress in Pa right below the middle of a Hertz patch (Johnson (3.45b)): 3 F / (2 pi (a^2 + z^2))."""
+    """Normal stress right below the middle of a Hertz patch (Johnson (3.45b)): 3 F / (2 pi (a^2 + z^2))."""
     not_negative("force_n", force_n, "N")
     not_negative("patch_m", patch_m, "m")
     positive("depth_m", depth_m, "m")
@@ -58,11 +55,10 @@ def on_axis_pa(force_n: float, patch_m: float, depth_m: float) -> float:
 
 
 def stress_pa(force_n: float, patch_m: float, offset_m: np.ndarray | float, depth_m: float) -> np.ndarray:
-    """Normal stress in Pa in a half-space under the pressure p0 sqrt(1 - r^2/a^2) on a disc of radius ``patch_m``.
+    """Normal stress in a half-space under the pressure p0 sqrt(1 - r^2/a^2) on a disc of radius ``patch_m``.
 
-    Huber's closed form: p0 (z/sqrt u)^3 a^2 u / (u^2 + a^2 z^2), 2 u = w + sqrt(w^2 + 4 a^2 z^2),
-    w = r^2 + z^2 - a^2; ``offset_m``: distances r in m from the axis, ``depth_m``: z in m. Independent of the
-    Poisson ratio.
+    Huber's closed form for any Poisson ratio, at ``offset_m`` r and ``depth_m`` z: p0 (z/sqrt u)^3 a^2 u / (u^2 + a^2
+    z^2), 2 u = w + sqrt(w^2 + 4 a^2 z^2), w = r^2 + z^2 - a^2.
     """
     positive("patch_m", patch_m, "m")
     positive("depth_m", depth_m, "m")

@@ -30,9 +30,9 @@ TRIED = 96
 
 
 def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: float, within: str) -> float:
-    """Normal stress in Pa at ``offset_m`` from the axis of a Hertz patch of radius ``patch_m``, under ``thickness_m``.
+    """Normal stress at ``offset_m`` from the axis of a Hertz patch of radius ``patch_m``, under ``thickness_m``.
 
-    ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`. Accurate to 1e-8 of F/h^2 up to 8 thicknesses away
+    ``within`` is in :data:`contactfpga.design.cover.medium.MEDIA`. Accurate to 1e-8 of F/h^2 up to 8 thicknesses away
     and for patches up to :data:`WIDEST` thicknesses.
     """
     if within == "halfspace":
@@ -45,7 +45,7 @@ def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: floa
 
 
 def closing_n(ball: Ball, switch: Switch, offset_m: float, thickness_m: float, within: str) -> float | NoSolution:
-    """The least force in N that closes a switch ``offset_m`` from the ball's axis."""
+    """Least force that closes a switch ``offset_m`` from the ball's axis."""
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")
     # A quarter of the point force that closes a switch below it in a half-space; a layer does not double the stress.
@@ -71,7 +71,7 @@ def closing_n(ball: Ball, switch: Switch, offset_m: float, thickness_m: float, w
 
 
 def reach_m(ball: Ball, switch: Switch, force_n: float, thickness_m: float, within: str) -> float | NoSolution:
-    """Distance in m from the axis up to which a switch closes under ``force_n``."""
+    """Distance from the axis up to which a switch closes under ``force_n``."""
     patch = ball.patch_m(positive("force_n", force_n, "N"))
     if patch > WIDEST * positive("thickness_m", thickness_m, "m"):
         return NoSolution(f"the patch is {1e3 * patch:.4g} mm in radius, the foam {1e3 * thickness_m:.4g} mm thick")
@@ -113,7 +113,6 @@ def _weighted(within: str) -> tuple[Floats, Floats]:
 
 @functools.cache
 def _nodes() -> tuple[Floats, Floats]:
-    """Sixteen nodes on each unit of t."""
     nodes, weights = legendre(16)
     t = np.add.outer(np.arange(medium.HIGHEST_T), (nodes + 1) / 2)
     return t.ravel(), np.tile(weights / 2, len(t))

@@ -1,7 +1,6 @@
-"""An arm runs into an obstacle: depth, duration and peak force of the compression.
+"""An arm that runs into an obstacle: depth, duration and peak force of the compression.
 
-Compression ends where v = 0 in the energy balance (3) of :mod:`contactfpga.design.cover.arm`: :func:`compression_m` is
-(5), :func:`time_s` is (4).
+Compression ends where v = 0 in the energy balance (3) of :mod:`contactfpga.design.cover.arm`.
 """
 
 from __future__ import annotations
@@ -19,10 +18,10 @@ COMPRESSION_TIME: float = 0.4 * math.gamma(0.4) * math.gamma(0.5) / math.gamma(0
 """t_c v0/delta_c without torque and gravity: (2/5) B(2/5, 1/2) = 1.471637592."""
 
 METHODS = ("auto", "closed", "quadrature", "ode")
-"""``auto``: the closed form if there is one, else quadrature."""
+"""``auto`` is the closed form if there is one, else quadrature."""
 
 WIDE_ANGLE = 0.1
-"""delta/d in rad from which theta - theta0 = delta/d is noted as inaccurate."""
+"""delta/d in rad from which theta - theta0 = delta/d is inaccurate."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,15 +29,15 @@ class Impact:
     """The end of a compression."""
 
     compression_m: float
-    """delta_c in m."""
+    """delta_c."""
     time_s: float
-    """t_c, from the touch to the end of the compression, in s."""
+    """t_c, from the touch to the end of the compression."""
     force_n: float
-    """Peak force in N, at that moment."""
+    """Peak force, at the end."""
     stiffness: float
     """K_s in N/m^1.5."""
     energy_j: float
-    """Energy in the foam at that moment, in J."""
+    """Energy in the foam at the end."""
     method: str
     """``closed``, ``quadrature`` or ``ode``."""
     notes: tuple[str, ...] = ()
@@ -56,8 +55,8 @@ def strike(
 ) -> Impact | NoSolution:
     """The compression after a touch at ``speed_m_s`` by a contact of ``stiffness`` K_s in N/m^1.5.
 
-    There is no solution if the foam, ``thickness_m`` thick, is pressed flat, if it yields (at the indentation
-    ``yield_m``), if nothing presses, or if the arm would turn further than its own lever.
+    There is no solution if the foam is pressed flat or yields (at ``yield_m``), if nothing presses, or if the arm would
+    turn further than its lever.
     """
     _checked(speed_m_s, stiffness)
     if method not in METHODS:
@@ -86,11 +85,10 @@ def strike(
 def stiffness_for(
     arm: Arm, speed_m_s: float, seconds: float, *, thickness_m: float | None = None
 ) -> Impact | NoSolution:
-    """The inverse: the stiffness at which the compression needs ``seconds``.
+    """The compression that takes ``seconds``, the inverse of :func:`strike`.
 
-    A deeper compression is longer, so the search is over delta_c, for which (5) gives K_s at once. There is no solution
-    if torque and gravity stop the arm sooner whatever the foam, or if it would have to yield by more than the lever or
-    ``thickness_m``.
+    A deeper compression is longer, so the search is over delta_c, for which (5) gives K_s. There is no solution if
+    torque and gravity stop the arm sooner, or if the foam would yield by more than the lever or ``thickness_m``.
     """
     positive("speed_m_s", speed_m_s, "m/s")
     if positive("seconds", seconds, "s") < SMALLEST:
@@ -117,10 +115,10 @@ def stiffness_for(
 
 
 def compression_m(arm: Arm, speed_m_s: float, stiffness: float) -> float:
-    """delta_c in m, (5): the first indentation at which v is 0.
+    """delta_c, (5): the first indentation at which v is 0.
 
-    Without gravity the balance is concave with one root. With it, each step goes to the root of a concave lower bound,
-    so that no root is skipped.
+    Without gravity the balance is concave. With gravity each step goes to the root of a concave lower bound, so no root
+    is skipped.
     """
     _checked(speed_m_s, stiffness)
     if arm.free:
@@ -162,10 +160,10 @@ def _checked(speed_m_s: float, stiffness: float) -> None:
 
 
 def time_s(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float) -> float | None:
-    """t_c in s, (4), to about 1e-13: with delta = delta_c sin^2(phi) both ends are smooth. None: not finite.
+    """t_c, (4), to about 1e-13; None if not finite.
 
-    In the upper half v^2 is its difference from 0 at delta_c, with cos^2(phi) divided out analytically, so that nothing
-    cancels and an error of delta_c enters linearly, not as its square root.
+    With delta = delta_c sin^2(phi) both ends are smooth. In the upper half cos^2(phi) is divided out of v^2
+    analytically, so an error of delta_c enters linearly.
     """
     not_negative("speed_m_s", speed_m_s, "m/s")
     not_negative("stiffness", stiffness, "N/m^1.5")
@@ -184,7 +182,7 @@ def _impact(arm: Arm, stiffness: float, depth: float, seconds: float, method: st
 def refusal(
     arm: Arm, stiffness: float, depth: float, thickness_m: float | None, yield_m: float | None
 ) -> NoSolution | None:
-    """Why a compression to ``depth`` in m is impossible, as in :func:`strike`; None if possible."""
+    """Why a compression to ``depth`` m is impossible, as in :func:`strike`; None if possible."""
     limit, what = arm.lever_m, "the lever's length"
     if thickness_m is not None:
         limit, what = positive("thickness_m", thickness_m, "m"), "the foam's thickness"
@@ -219,7 +217,6 @@ def _time_to(arm: Arm, speed_m_s: float, depth: float) -> float | None:
 
 
 def _deepest(arm: Arm, speed_m_s: float, thickness_m: float | None) -> tuple[float, str]:
-    """The deepest possible final compression, and the reason why there is none longer."""
     limit = arm.lever_m if thickness_m is None else positive("thickness_m", thickness_m, "m")
     energy = arm.mass_kg * speed_m_s**2 / 2
     grid = np.linspace(0, limit, 257)

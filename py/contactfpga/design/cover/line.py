@@ -18,15 +18,14 @@ class StraightLine(NamedTuple):
     """deformation = offset + force / stiffness, by least squares."""
 
     stiffness_n_m: float
-    """In N/m."""
     offset_m: float
-    """Deformation without force, in m."""
+    """Deformation without force."""
     correlation: float
     """Correlation of force and deformation, -1 to 1."""
 
 
 def read(path: str | Path) -> tuple[Floats, Floats]:
-    """Forces in N and deformations in m from a file with two comma-separated columns, with or without a header."""
+    """Forces in N and deformations in m from a file with two comma-separated columns; a header is optional."""
     rows: list[list[float]] = []
     with open_regular(path) as file:
         lines = file.read().decode(errors="replace").splitlines()

@@ -1,17 +1,15 @@
 """Spread of stress from the cover's face to the switches, by medium.
 
-A point force F on the face gives the normal stress F/h^2 g(rho/h) at the depth h and the distance rho from its line,
-positive in compression. The face around the force is free. With the Hankel transform in the plane, k the wave number
-and t = k h,
+A point force F on the otherwise free face gives the normal stress F/h^2 g(rho/h) at depth h and distance rho, positive
+in compression. With k the wave number in the plane and t = k h,
 
     g(s) = 1/(2 pi) int_0^inf t G(t) J0(t s) dt.
 
 ``halfspace``: the cover continues below the switches (paper (9), Johnson 3.2): G = (1 + t) exp(-t), g = 3/(2 pi) (1 +
 s^2)^(-5/2).
 
-``bonded``: an incompressible cover of thickness h glued to a rigid base, the switches between them. The stream function
-of an incompressible elastic body obeys (D^2 - 1)^2 W = 0 over the depth; without shear on the face and displacement at
-the base: G = (cosh t + t sinh t) / (cosh^2 t + t^2).
+``bonded``: an incompressible cover glued to a rigid base. The stream function obeys (D^2 - 1)^2 W = 0 over the depth,
+without shear on the face or displacement at the base: G = (cosh t + t sinh t) / (cosh^2 t + t^2).
 
 ``frictionless``: a cover that slides on a rigid base, for any Poisson ratio: G = (sinh t + t cosh t) / (sinh t cosh t +
 t).
@@ -28,19 +26,18 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.inputs.values import shown
 
 MEDIA = ("halfspace", "bonded", "frictionless")
-"""Names for :func:`spread` and :func:`transfer`."""
 
 HIGHEST_T = 30.0
 """Wave number times thickness beyond which nothing passes: 2 t^2 exp(-t) is 2e-10 there."""
 
 FARTHEST = 16.0
-"""Distance over thickness beyond which a layer's stress counts as 0; it is below 1e-7 of the axis value."""
+"""Distance over thickness beyond which a layer's stress, below 1e-7 of the axis value, counts as 0."""
 
 STEP = 0.025
 """Distance over thickness between two integrals of a layer's table."""
 
 FINER = 32
-"""Linear pieces per step of the table, with an error below 1e-6 of the stress on the axis."""
+"""Linear pieces per step of the table, to 1e-6 of the stress on the axis."""
 
 
 def transfer(name: str, t: Floats) -> Floats:
@@ -59,7 +56,7 @@ def transfer(name: str, t: Floats) -> Floats:
 
 
 def spread(name: str, s: Floats | float) -> Floats:
-    """g(s) of a medium: normal stress at the switches times h^2/F; ``s``: distance over thickness, dimensionless."""
+    """g(s) of a medium: normal stress at the switches times h^2/F; ``s`` is distance over thickness."""
     s = np.abs(np.asarray(s, float))
     if name == "halfspace":
         square = 1 + s * s
@@ -71,7 +68,7 @@ def spread(name: str, s: Floats | float) -> Floats:
 
 
 def exact_spread(name: str, s: Floats | float) -> Floats:
-    """g(s) by the integral itself, to 1e-9 up to s = :data:`FARTHEST`; far slower than :func:`spread`."""
+    """g(s) by the integral, to 1e-9 up to s = :data:`FARTHEST`; far slower than :func:`spread`."""
     transfer(name, np.zeros(1))
     return _integral(name, np.atleast_1d(np.abs(np.asarray(s, float))))[0].reshape(np.shape(s))
 
@@ -93,10 +90,8 @@ def first_zero(name: str) -> float | None:
 
 @functools.cache
 def _table(name: str) -> tuple[Floats, Floats]:
-    """g every STEP / FINER and its increment to the next; from FARTHEST on both are 0.
-
-    The slow, smooth integral is computed every STEP, and interpolated by the cubic through values and slopes.
-    """
+    """g every STEP / FINER and its increment to the next, by the cubic through values and slopes; from FARTHEST on both
+    are 0."""
     transfer(name, np.zeros(1))
     values, slopes = _integral(name, np.arange(0, FARTHEST + STEP / 2, STEP))
     part = np.arange(FINER) / FINER
@@ -114,11 +109,7 @@ def _nodes() -> tuple[Floats, Floats]:
 
 
 def _integral(name: str, s: Floats) -> tuple[Floats, Floats]:
-    """(g, dg/ds) at each of (n,) distances.
-
-    J0, which numpy lacks, is the mean of cos(x sin a) over the angle; the midpoint rule over a quarter turn converges
-    exponentially.
-    """
+    """(g, dg/ds) at (n,) distances; J0, which numpy lacks, is the mean of cos(x sin a) by the midpoint rule."""
     t, weights = _nodes()
     weighted = weights * t * transfer(name, t) / (2 * np.pi)
     values = np.array([_at(weighted, t, float(one)) for one in s])

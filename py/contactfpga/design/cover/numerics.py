@@ -17,11 +17,8 @@ DEEPEST = 60
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """The root of ``function`` between two places of different sign, to full precision.
-
-    Chandrupatla's method: inverse quadratic interpolation where reliable, else bisection, within the bracket. Raises
-    ValueError if the signs do not differ.
-    """
+    """The root of ``function`` between two places of different sign, to full precision, by Chandrupatla's method.
+    Raises ValueError for equal signs."""
     b, fb = low, function(low)
     a, fa = high, function(high)
     if fa == 0 or fb == 0:
@@ -53,10 +50,8 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def integral(function: Callable[[Floats], Floats], low: float, high: float, tolerance: float = 1e-13) -> float | None:
-    """The integral of ``function``, vectorized over arrays, to relative ``tolerance``; None if it diverges.
-
-    Gauss-Legendre with 16 nodes; intervals whose halves disagree are bisected.
-    """
+    """The integral of a vectorized ``function`` to relative ``tolerance``, by Gauss-Legendre and bisection; None if it
+    diverges."""
     whole = gauss(function, low, high)
     if not math.isfinite(whole):
         return None
@@ -81,7 +76,7 @@ def integral(function: Callable[[Floats], Floats], low: float, high: float, tole
 
 
 def gauss(function: Callable[[Floats], Floats], low: float, high: float, nodes: int = NODES) -> float:
-    """Gauss-Legendre with a fixed number of nodes."""
+    """Gauss-Legendre integral with a fixed number of nodes."""
     x, weights = legendre(nodes)
     half = (high - low) / 2
     return half * float(weights @ function(low + half * (1 + x)))
@@ -89,5 +84,5 @@ def gauss(function: Callable[[Floats], Floats], low: float, high: float, nodes: 
 
 @functools.cache
 def legendre(nodes: int) -> tuple[Floats, Floats]:
-    """Nodes and weights on -1 to 1."""
+    """Gauss-Legendre nodes and weights on -1 to 1."""
     return np.polynomial.legendre.leggauss(nodes)

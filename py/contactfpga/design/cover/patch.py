@@ -1,6 +1,6 @@
 """Contact patches on the cover: convex parts, and their pressure.
 
-Lengths in m, angles in rad from the x axis toward the y axis, all on the sheet laid flat.
+Lengths are in m on the sheet laid flat, angles in rad from the x axis toward the y axis.
 """
 
 from __future__ import annotations
@@ -22,52 +22,52 @@ class Part(Protocol):
 
     @property
     def x_m(self) -> float:
-        """Its middle (barycenter) along the columns in m."""
+        """Middle (barycenter) along the columns."""
 
     @property
     def y_m(self) -> float:
-        """Its middle along the rows in m."""
+        """Middle along the rows."""
 
     @property
     def angle_rad(self) -> float:
-        """Rotation of its own x axis."""
+        """Rotation of the part's own x axis."""
 
     @property
     def half_x_m(self) -> float:
-        """Half its extent along its own x axis, in m."""
+        """Half the extent along the part's own x axis."""
 
     @property
     def half_y_m(self) -> float:
-        """Half its extent along its own y axis, in m."""
+        """Half the extent along the part's own y axis."""
 
     @property
     def area_m2(self) -> float:
-        """Its area in m2."""
+        """Area of the part."""
 
     @property
     def half_box_m(self) -> tuple[float, float]:
-        """Half the width and half the height in m of the box around it."""
+        """Half the width and half the height of the box around the part."""
 
     def reach_m(self, angle_rad: Floats) -> Floats:
-        """Support function: its reach from the middle in these directions, in m."""
+        """Support function: reach from the middle in these directions."""
 
     def contains(self, x_m: Floats, y_m: Floats) -> Floats:
-        """Bool: which points are in it, including the boundary; the two broadcast."""
+        """Bool: which points are in the part or on its boundary; the two broadcast."""
 
     def span(self, y_m: Floats) -> tuple[Floats, Floats]:
-        """x in m where lines of constant y enter and leave it; +inf and -inf if they miss it."""
+        """x where lines of constant y enter and leave the part; +inf and -inf if they miss it."""
 
     def kinks_m(self) -> tuple[float, ...]:
-        """Heights y in m at which the span has a corner, without its ends."""
+        """Heights y at which the span has a corner, without its ends."""
 
     def placed(self, x_m: float, y_m: float, angle_rad: float) -> Self:
         """The part turned about the origin, then moved."""
 
     def density(self, x_m: Floats, y_m: Floats) -> Floats:
-        """Its pressure at these points, which broadcast, for a force of 1 N: in 1/m2, 0 outside."""
+        """Pressure in 1/m2 at these points, which broadcast, for a force of 1 N; 0 outside."""
 
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
-        """Point forces for its pressure: x, y in m and force shares with sum 1.
+        """Point forces for the pressure: x, y in m and force shares with sum 1.
 
         Valid ``fineness_m`` or more below the face, to 5e-4 of the peak stress if no half extent exceeds 12 times that.
         """
@@ -75,7 +75,6 @@ class Part(Protocol):
 
 @functools.lru_cache(maxsize=64)
 def _gauss(count: int) -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights from -1 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return nodes, weights
 
@@ -83,15 +82,10 @@ def _gauss(count: int) -> tuple[Floats, Floats]:
 @dataclasses.dataclass(frozen=True)
 class _Shape:
     half_x_m: float
-    """Half its extent along its own x axis, in m."""
     half_y_m: float
-    """Half its extent along its own y axis, in m."""
     x_m: float = 0.0
-    """Its middle along the columns, in m."""
     y_m: float = 0.0
-    """Its middle along the rows, in m."""
     angle_rad: float = 0.0
-    """Rotation of its own x axis."""
 
     def __post_init__(self) -> None:
         for name in ("half_x_m", "half_y_m"):
@@ -115,7 +109,7 @@ class _Shape:
         return (cosine * x + sine * y) / self.half_x_m, (cosine * y - sine * x) / self.half_y_m
 
     def _sheet(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Points in the sheet's frame; inverse of :meth:`_own`."""
+        """Inverse of :meth:`_own`."""
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
         x, y = u * self.half_x_m, v * self.half_y_m
         return self.x_m + cosine * x - sine * y, self.y_m + sine * x + cosine * y

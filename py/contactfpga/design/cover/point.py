@@ -13,20 +13,20 @@ from contactfpga.design.cover.answer import CoverError, NoSolution, finite, not_
 
 @dataclasses.dataclass(frozen=True)
 class Switch:
-    """A switch and the face under the cover. The defaults are those of the paper's prototype."""
+    """A switch and its face under the cover; the defaults are the paper's prototype."""
 
     force_n: float = 1.0
-    """Closing force in N."""
+    """Closing force."""
     area_m2: float = 12.6e-6
-    """Area of its face in m2."""
+    """Area of the face."""
     travel_m: float = 0.0
-    """Travel until it closes, in m, linear in the force; 0: rigid."""
+    """Travel until the switch closes, linear in the force."""
     spread: float = 0.0
     """Relative standard deviation of the closing force, drawn within three of them."""
     hysteresis: float = 0.0
     """Share by which the opening force is below the closing force."""
     preload_n: float = 0.0
-    """Force in N on it without a touch."""
+    """Force on the switch without a touch."""
 
     def __post_init__(self) -> None:
         positive("force_n", self.force_n, "N")
@@ -40,7 +40,7 @@ class Switch:
 
     @property
     def closing_pa(self) -> float:
-        """Normal stress in Pa at which it closes: force over area (paper, III.D)."""
+        """Normal stress at which the switch closes: force over area (paper, III.D)."""
         return self.force_n / self.area_m2
 
 
@@ -51,10 +51,10 @@ LEAST: float = 2 * math.pi / 3 * 2.5**2.5 / 1.5**1.5
 def stress_pa(
     force_n: float, offset_m: np.ndarray | float, thickness_m: float, within: str = "halfspace"
 ) -> np.ndarray:
-    """Normal stress in Pa at the switches, at horizontal distances ``offset_m`` in m from a point force in N.
+    """Normal stress at the switches, at horizontal distances ``offset_m`` from a point force.
 
     sigma = F/h^2 g(rho/h) (:mod:`contactfpga.design.cover.medium`); over a half-space, (9): 3 F z^3 / (2 pi (rho^2 +
-    z^2)^(5/2)). ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`.
+    z^2)^(5/2)). ``within`` is in :data:`contactfpga.design.cover.medium.MEDIA`.
     """
     finite("force_n", force_n)
     positive("thickness_m", thickness_m, "m")
@@ -63,11 +63,11 @@ def stress_pa(
 
 
 def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:
-    """The point force in N that closes a switch at the horizontal distance ``offset_m``: (9) solved for F; with
-    ``offset_m`` = pitch / sqrt(2) it is (10).
+    """Point force that closes a switch at the horizontal distance ``offset_m``, (9) solved for F; (10) has pitch /
+    sqrt(2).
 
-    In a layer there is none beyond :func:`contactfpga.design.cover.medium.first_zero`: the cover is pulled off the
-    switch there, and where it presses again, it is by less than 0.3 % of the stress on the axis.
+    A layer has none beyond :func:`contactfpga.design.cover.medium.first_zero`, where the cover is pulled off the switch
+    or presses with less than 0.3 % of the stress on the axis.
     """
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")
@@ -82,7 +82,7 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
 
 
 def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:
-    """Distance in m from a point force of ``force`` N up to which a switch closes: inverse of :func:`force_n`.
+    """Distance from a point force up to which a switch closes: inverse of :func:`force_n`.
 
     Over a half-space rho = sqrt((3 z^3 F / (2 pi sigma))^0.4 - z^2).
     """
@@ -104,11 +104,10 @@ def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "hal
 
 
 def best_thickness_m(offset_m: float) -> float:
-    """The thickness in m that minimizes the point force for a switch at this distance, over a half-space: from d/dz of
-    (9), z = sqrt(1.5) rho."""
+    """Thickness with the least point force for a switch at this distance over a half-space: z = sqrt(1.5) rho."""
     return math.sqrt(1.5) * positive("offset_m", offset_m, "m")
 
 
 def least_force_n(switch: Switch, offset_m: float) -> float:
-    """The force in N at :func:`best_thickness_m`: 11.266052 sigma rho^2."""
+    """Force at :func:`best_thickness_m`: 11.266052 sigma rho^2."""
     return LEAST * switch.closing_pa * float(positive("offset_m", offset_m, "m")) ** 2

@@ -20,26 +20,26 @@ from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
 """``patch``: a switch closes under the contact's shape, whatever the force. ``point``: each part's force acts at its
-middle on a half-space, paper (9). ``hertz``: each part's pressure acts on a half-space. ``bonded``, ``frictionless``:
-each part's pressure acts on a layer on a rigid base, glued or sliding."""
+middle on a half-space, paper (9). Each part's pressure acts with ``hertz`` on a half-space, with ``bonded`` or
+``frictionless`` on a layer glued to a rigid base or sliding on it."""
 
 SHEAR = 6 / 5
 """Shear deflection of a strip over that by its mean shear stress (Timoshenko)."""
 
 GIVES = 0.75
-"""Thicknesses of foam by which a strip between two caps is longer than the gap, as the foam on the caps yields, too:
-fitted to boundary elements for caps of 0.6 to 0.9 of the pitch under 2 and 5 mm."""
+"""Foam thicknesses by which a strip between two caps is longer than the gap: fitted to boundary elements for caps of
+0.6 to 0.9 of the pitch under 2 and 5 mm."""
 
 GRID = 16
-"""Sampling points per side of a switch's face, if a share of it must be covered."""
+"""Sampling points per side of a switch's face for :attr:`Cover.share`."""
 
 BLOCK = 1 << 15
-"""Stresses summed at once, few enough for the cache."""
+"""Stresses summed at once; these fit the cache."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Load:
-    """One contact: its parts, and the force in N, shared in proportion to their areas."""
+    """One contact: its parts, and the force, shared by area."""
 
     parts: tuple[Part, ...]
     force_n: float
@@ -58,9 +58,9 @@ class Cap:
     """A rigid square plate on each switch."""
 
     side_m: float
-    """Side in m, at most the pitch."""
+    """Side, at most the pitch."""
     proud: bool = True
-    """Whether it stands above its surroundings, so that the foam rests on caps alone; False: flush."""
+    """Whether the foam rests on caps alone, above their surroundings; False: flush."""
     mass_kg: float = 0.0
     """Mass of one cap."""
 
@@ -78,7 +78,7 @@ class Cover:
     model: str = "patch"
     """One of :data:`MODELS`."""
     thickness_m: float = 5e-3
-    """Thickness of the cover in m; irrelevant for ``patch``."""
+    """Thickness of the cover; irrelevant for ``patch``."""
     switch: Switch = dataclasses.field(default_factory=Switch)
     """The switch; irrelevant for ``patch`` without ``share``."""
     share: float | None = None
@@ -88,7 +88,7 @@ class Cover:
     cut: bool = False
     """Whether the foam is cut between the caps."""
     modulus_pa: float = 3.45e5
-    """Young's modulus of the foam in Pa, for the yield under proud caps."""
+    """Young's modulus of the foam, for the yield under proud caps."""
     poisson: float = 0.3
     """Poisson's ratio of the foam, for the yield under proud caps."""
 
@@ -121,17 +121,17 @@ class Cover:
 
     @property
     def within(self) -> str:
-        """Its name in :data:`contactfpga.design.cover.medium.MEDIA`."""
+        """The model's name in :data:`contactfpga.design.cover.medium.MEDIA`."""
         return self.model if self.model in medium.MEDIA else "halfspace"
 
     @property
     def side_m(self) -> float:
-        """Side in m of the square that takes the foam's stress."""
+        """Side of the square that takes the foam's stress."""
         return self.cap.side_m if self.cap else math.sqrt(self.switch.area_m2)
 
     @property
     def area_m2(self) -> float:
-        """Area of that square."""
+        """Area of the square that takes the foam's stress."""
         return self.side_m**2
 
     @property
@@ -140,11 +140,11 @@ class Cover:
         return bool(self.switch.travel_m and not self.cut)
 
     def width_m(self, pitch_m: float) -> float:
-        """Width in m of the foam on one switch."""
+        """Width of the foam on one switch."""
         return pitch_m if self.cap and self.cap.proud else self.side_m
 
     def strip_pa(self, pitch_m: float) -> float:
-        """Stiffness in Pa of the foam between two proud caps ``pitch_m`` apart: N/m per m of the strip's width.
+        """Stiffness of the foam between two proud caps: N/m per m of the strip's width.
 
         A strip of the length l = gap + :data:`GIVES` h, clamped at both ends: 1/K = 6/5 l/(G h) + l^3 (1 - nu^2)/(E
         h^3).
@@ -155,17 +155,14 @@ class Cover:
         return 1 / (SHEAR * long / shear + long**3 / plate)
 
     def closed(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Bool: which switches at these places, in m, are closed; ``x_m`` and ``y_m`` broadcast."""
+        """Bool: which switches at these places are closed; ``x_m`` and ``y_m`` broadcast."""
         if self.model == "patch":
             return self._covered(loads, x_m, y_m)
         closed: np.ndarray = self.stress_pa(loads, x_m, y_m) >= self.switch.closing_pa
         return closed
 
     def stress_pa(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Normal stress in Pa at these places below the cover, positive in compression, summed over contacts.
-
-        Not for the model ``patch``, which has none.
-        """
+        """Normal stress at these places, summed over contacts. Raises CoverError for the model ``patch``."""
         if self.model == "patch":
             raise CoverError(f"the model 'patch' knows no stress; take one of {', '.join(MODELS[1:])}")
         x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))
@@ -203,7 +200,6 @@ def _under(parts: Sequence[Part], x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _superposed(
     part: Part, force_n: float, thickness_m: float, within: str, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """The part's pressure as point forces spread through the medium."""
     at_x, at_y, shares = part.pressure(thickness_m)
     places_x, places_y = x.ravel(), y.ravel()
     stress = np.empty(places_x.shape)
@@ -226,7 +222,7 @@ def load_cover(path: str | Path) -> Cover | None:
 
 
 def read_cover(values: Any) -> Cover:
-    """The cover of a TOML table, whose keys are the fields of :class:`Cover`, with tables ``switch`` and ``cap``."""
+    """The cover of a TOML table with the fields of :class:`Cover`, and tables ``switch`` and ``cap``."""
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap)):
         if name in given:

@@ -1,18 +1,16 @@
-"""A body region that the arm runs into: speed and reaction time that keep its limits, from a table that the user fills
-in from the standard.
+"""A body region that the arm runs into: speed and reaction time that keep its limits.
 
-The quantities are those of ISO/TS 15066:2016, annex A, and ISO 10218-2:2025: a region's effective mass and spring
-constant, and its largest force and pressure in a transient contact, from which it can recoil, and in a quasi-static
-one, where it is clamped. None of the numbers is ours.
+The user fills in a table of regions; none of the numbers is ours. The quantities are those of ISO/TS 15066:2016, annex
+A, and ISO 10218-2:2025: effective mass and spring constant, and largest force and pressure in a transient contact, from
+which the region can recoil, and in a quasi-static one, where it is clamped.
 
-The foam, F = K_s delta^1.5 (Hertz), is in series with the region's spring, F = k y. Together they are pressed by x(F) =
+The foam, F = K_s delta^1.5 (Hertz), is in series with the region's spring, F = k y. Both are pressed by x(F) =
 (F/K_s)^(2/3) + F/k, and store W(F) = 2/5 F (F/K_s)^(2/3) + F^2/(2 k).
 
-*Transient*, as in the standard: two free masses, mu = 1/(1/m_arm + 1/m_region), no drive: mu v^2/2 = W(F).
+*Transient*: two free masses without drive, mu = 1/(1/m_arm + 1/m_region): mu v^2/2 = W(F).
 
-*Quasi-static*: the region is clamped on its far side, and the arm presses on with u until it reacts, at x_r, and brakes
-with b from then on: m_arm v^2/2 + u x_r - b (x - x_r) = W(F), solved for x_r at the limit's F. The time to x_r
-follows by quadrature.
+*Quasi-static*: the arm presses on with u until it reacts, at x_r, then brakes with b: m_arm v^2/2 + u x_r - b (x - x_r)
+= W(F), solved for x_r at the limit's F.
 
 Pressure is the largest under a Hertz patch, 3/2 of its mean: p^3 = 6 F E*^2/(pi^3 R*^2).
 """
@@ -37,21 +35,21 @@ MAX_REGIONS = 100
 
 @dataclasses.dataclass(frozen=True)
 class Region:
-    """A row of the table."""
+    """A body region of the user's table."""
 
     name: str
     mass_kg: float
     """Effective mass."""
     spring_n_m: float
-    """Effective spring constant, in N/m."""
+    """Effective spring constant."""
     transient_n: float
     """Largest force in a transient contact."""
     transient_pa: float
-    """Largest pressure in a transient contact, in Pa: 100 N/cm2 are 1e6."""
+    """Largest pressure in a transient contact; 100 N/cm2 are 1e6."""
     quasistatic_n: float
     """Largest force on the clamped region."""
     quasistatic_pa: float
-    """Largest pressure on the clamped region, in Pa."""
+    """Largest pressure on the clamped region."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
@@ -87,11 +85,11 @@ class Pressing:
     """An arm under its cover."""
 
     mass_kg: float
-    """Effective mass at the contact: J/d^2."""
+    """Effective mass at the contact, J/d^2."""
     push_n: float
-    """Force that drives it on until it reacts."""
+    """Force that drives the arm on until it reacts."""
     brake_n: float
-    """Force that slows it after the reaction."""
+    """Force that slows the arm after the reaction."""
     ball: Ball
     """R* and E* of the foam on the region."""
     deepest_m: float
@@ -115,20 +113,20 @@ class RegionLimits:
 
     region: Region
     transient_n: float
-    """Largest force in a transient contact: by force, pressure and foam."""
+    """Largest force in a transient contact, by all limits."""
     transient_m_s: float
-    """The speed with this force."""
+    """Speed with the transient force."""
     quasistatic_n: float
-    """Largest force on the clamped region: by force, pressure and foam."""
+    """Largest force on the clamped region, by all limits."""
     reaction_s: float
-    """The longest permissible time from the touch to the reaction, at the requested speed; infinite if the arm stops
-    without one, 0 if even the earliest is too late."""
+    """Longest time from the touch to the reaction at the requested speed; infinite if the arm stops without one, 0 if
+    none is soon enough."""
     clamped_m_s: float | NoSolution
-    """The largest permissible speed for the clamped region with the requested reaction time."""
+    """Largest speed for the clamped region with the requested reaction time."""
 
     @property
     def speed_m_s(self) -> float:
-        """The largest speed that keeps both limits with the requested reaction time; 0: none does."""
+        """Largest speed that keeps both limits with the requested reaction time; 0: none does."""
         return 0.0 if isinstance(self.clamped_m_s, NoSolution) else min(self.transient_m_s, self.clamped_m_s)
 
     @property
@@ -156,7 +154,6 @@ def limits_of(pressing: Pressing, region: Region, speed_m_s: float, reaction_s: 
 
 
 def _speed(pair: _Pair, force_n: float, reaction_s: float) -> float | NoSolution:
-    """The largest speed at which ``reaction_s`` is soon enough: faster needs sooner."""
     fastest = pair.fastest_m_s(force_n)
     if reaction_s == 0:
         return fastest
@@ -175,8 +172,6 @@ def _speed(pair: _Pair, force_n: float, reaction_s: float) -> float | NoSolution
 
 @dataclasses.dataclass(frozen=True)
 class _Pair:
-    """Foam and region in series, under an arm."""
-
     pressing: Pressing
     region: Region
 
@@ -195,7 +190,6 @@ class _Pair:
         return math.sqrt(2 * braked / self.pressing.mass_kg)
 
     def reaction_s(self, force_n: float, speed_m_s: float) -> float:
-        """The longest time to the reaction that never exceeds the force."""
         arm, depth = self.pressing, self.pressed_m(force_n)
         left = self.stored_j(force_n) - arm.mass_kg * speed_m_s**2 / 2
         if left >= arm.push_n * depth:

@@ -1,9 +1,7 @@
 """The smallest force that a sheet under a cover detects, and the pitch it needs, by the simplest adequate model.
 
 A model is a medium (:mod:`contactfpga.design.cover.medium`) and a contact, ``point`` or ``patch`` (a ball's Hertz
-pressure). The paper's (9) and (10) are the half-space under a point force. The reference is the bonded layer under the
-patch: foam glued on a rigid bumper under a round object. For an unknown object it is the bonded layer under a point
-force.
+pressure). The reference is the bonded layer, under the patch of a round object or the point force of an unknown one.
 """
 
 from __future__ import annotations
@@ -41,12 +39,12 @@ LADDER = (
     Model("halfspace", "patch"),
     Model("bonded", "patch"),
 )
-"""Models, simplest first: two closed forms and a table, then a patch; the last is the reference."""
+"""Models, simplest first; the last is the reference."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Sense:
-    """An answer, and its accuracy."""
+    """An answer and its accuracy."""
 
     value: float | NoSolution
     """A force in N or a reach in m."""
@@ -67,9 +65,9 @@ class PaddedSheet:
 
     switch: Switch
     thickness_m: float
-    """Thickness of the foam, in m."""
+    """Thickness of the foam."""
     ball: Ball | None = None
-    """The touching object; None: unknown, a point force is assumed."""
+    """The touching object; None: unknown, a point force."""
 
     def __post_init__(self) -> None:
         positive("thickness_m", self.thickness_m, "m")
@@ -79,7 +77,7 @@ class PaddedSheet:
         return LADDER[-1] if self.ball else Model("bonded", "point")
 
     def force_n(self, model: Model, offset_m: float) -> float | NoSolution:
-        """The least force in N that closes a switch ``offset_m`` from the contact's middle, (9) solved for F."""
+        """Least force that closes a switch ``offset_m`` from the contact's middle, (9) solved for F."""
         if model.contact not in CONTACTS:
             raise CoverError(f"contact is {model.contact!r}; it must be one of {', '.join(CONTACTS)}")
         if model.contact == "point":
@@ -98,7 +96,7 @@ class PaddedSheet:
         return force
 
     def reach_m(self, model: Model, force_n: float) -> float | NoSolution:
-        """Distance in m from the contact's middle up to which a switch closes; inverse of :meth:`force_n`."""
+        """Distance from the contact's middle up to which a switch closes; inverse of :meth:`force_n`."""
         if model.contact == "point":
             return point.reach_m(self.switch, force_n, self.thickness_m, model.within)
         return hertz_layer.reach_m(self._ball(model), self.switch, force_n, self.thickness_m, model.within)
@@ -106,8 +104,8 @@ class PaddedSheet:
     def detects(self, offset_m: float, model: Model | None = None, tolerance: float | None = None) -> Sense:
         """:meth:`force_n` by a named model, or by the simplest within ``tolerance`` of the reference.
 
-        By default the tolerance is :data:`TOLERANCE`, and a named model answers with a note of its error; with
-        ``tolerance`` a named model that is off by more is refused.
+        The default tolerance is :data:`TOLERANCE`. A named model that is off by more is refused only with
+        ``tolerance``, else it answers with a note of its error.
         """
         found = self._judge(lambda one: self.force_n(one, offset_m), model, tolerance)
         force = found.reference if isinstance(found.value, NoSolution) else found.value
@@ -176,19 +174,19 @@ class PaddedSheet:
 
 
 def worst_offset_m(pitch_x_m: float, pitch_y_m: float | None = None) -> float:
-    """The largest distance of a point from a switch: half the diagonal of a cell, p/sqrt(2) if square."""
+    """The largest distance of a point from a switch: half the diagonal of a cell."""
     wide = positive("pitch_x_m", pitch_x_m, "m")
     return math.hypot(wide, wide if pitch_y_m is None else positive("pitch_y_m", pitch_y_m, "m")) / 2
 
 
 def pitch_m(reach_m: float) -> float:
-    """The pitch of a square matrix whose worst place is ``reach_m`` from a switch: sqrt(2) times it (paper, IV.C)."""
+    """Pitch of a square matrix whose worst place is ``reach_m`` from a switch: sqrt(2) times it (paper, IV.C)."""
     return math.sqrt(2) * reach_m
 
 
 @functools.cache
 def best_ratio(within: str = "halfspace") -> float:
-    """Offset over thickness of the least closing force at a given offset: sqrt(2/3) in a half-space. F = sigma
+    """Offset over thickness with the least closing force at a given offset: sqrt(2/3) in a half-space. F = sigma
     rho^2/(s^2 g(s)), s = rho/h."""
     if within == "halfspace":
         return math.sqrt(2 / 3)
@@ -205,5 +203,5 @@ def best_ratio(within: str = "halfspace") -> float:
 
 
 def best_thickness_m(offset_m: float, within: str = "halfspace") -> float:
-    """The thickness in m with the least point force for a switch at ``offset_m``: sqrt(1.5) rho in a half-space."""
+    """Thickness with the least point force for a switch at ``offset_m``: sqrt(1.5) rho in a half-space."""
     return positive("offset_m", offset_m, "m") / best_ratio(within)

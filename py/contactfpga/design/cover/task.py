@@ -1,8 +1,8 @@
 """The task of a cover, from a TOML file: the arm, the impact, the switch, foams and limits.
 
-Each foam's values have their source; missing ones are None, not guessed. Data sheets give the stress at 25 %
-compression rather than a modulus: the modulus here is that stress over 0.25, a secant below the initial slope. A soft
-foam's Poisson ratio falls under compression: 0.5 at 5 %, about 0 at 66 % (doi 10.1016/j.ijengsci.2007.09.002).
+From data sheets with the stress at 25 % compression, the modulus is that stress over 0.25, a secant below the initial
+slope. A soft foam's Poisson ratio falls under compression: 0.5 at 5 %, about 0 at 66 % (doi
+10.1016/j.ijengsci.2007.09.002).
 """
 
 from __future__ import annotations
@@ -30,15 +30,14 @@ class Foam:
 
     name: str
     modulus_pa: float
-    """Young's modulus in Pa."""
+    """Young's modulus."""
     source: str
-    """Source of the values, and their derivation."""
+    """Source and derivation of the values."""
     density_kg_m3: float | None = None
-    """In kg/m3."""
     yield_pa: float | None = None
-    """Yield strength Y in Pa; None excludes (7) and (8)."""
+    """Yield strength Y; None excludes (7) and (8)."""
     strain: float = 1.0
-    """Largest relative compression: the largest for which the source gives a stress, else 1."""
+    """Largest relative compression with a stress in the source, else 1."""
 
     def __post_init__(self) -> None:
         positive("modulus_pa", self.modulus_pa, "Pa")
@@ -109,7 +108,7 @@ FOAMS = (
 
 
 def find(name: str, foams: tuple[Foam, ...] = FOAMS) -> Foam:
-    """The foam of that name."""
+    """The foam of this name; raises CoverError."""
     for foam in foams:
         if foam.name == name:
             return foam
@@ -119,7 +118,7 @@ def find(name: str, foams: tuple[Foam, ...] = FOAMS) -> Foam:
 _NEEDED = object()
 
 LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
-"""Lengths of cover and link; values that look like mm are refused."""
+"""Lengths of cover and link, refused above 1 m."""
 
 _KEYS: dict[str, dict[str, Any]] = {
     "arm": {
@@ -162,51 +161,51 @@ class Task:
 
     arm: Arm
     mass_kg: float
-    """Mass of the link in kg, the striking mass of (8) as printed."""
+    """Mass of the link, the striking mass of (8) as printed."""
     speed_m_s: float
     """Speed of the contact point at the touch."""
     radius_m: float
-    """Effective radius R* in m."""
+    """Effective radius R*."""
     poisson: float
     time_s: float
-    """tau: required duration of the compression, in s."""
+    """tau: required duration of the compression."""
     latency_s: float
-    """t0: from the touch to the reaction, in s."""
+    """t0: from the touch to the reaction."""
     switch: Switch
     pitch_m: float
-    """Largest pitch, in m."""
+    """Largest pitch."""
     force_n: float
-    """The force that must be felt everywhere on the sheet, in N."""
+    """Force that must be felt everywhere on the sheet."""
     thickness_m: float
-    """Largest thickness, in m."""
+    """Largest thickness."""
     pitch_min_m: float | None = None
-    """Smallest pitch, in m."""
+    """Smallest pitch."""
     peak_n: float | None = None
-    """Largest peak force of the impact, in N."""
+    """Largest peak force of the impact."""
     mass_kg_m2: float | None = None
-    """Largest mass of the cover per area, in kg/m2; not checked for a foam of unknown density."""
+    """Largest mass of the cover per area; not checked for unknown density."""
     regions: tuple[Region, ...] = ()
     """Body regions whose limits of force and pressure must be kept."""
     foams: tuple[Foam, ...] = FOAMS
     free: bool = True
-    """Whether the modulus with exactly ``time_s`` is also a candidate."""
+    """Whether the modulus with exactly ``time_s`` is a candidate."""
     plates_m: tuple[float, ...] = ()
-    """Available thicknesses, in m; none: any."""
+    """Available thicknesses; none: any."""
     rule: str = "hertz"
     """One of :data:`contactfpga.design.cover.elastic.THICKNESS_RULES`."""
     strain: float | None = None
     """Relative compression allowed for every foam; None: each foam's own."""
     model: Model | None = None
-    """None: the simplest within ``tolerance``."""
+    """Model of sensitivity; None: the simplest within ``tolerance``."""
     contact: str = "point"
     """``patch``: the sheet must feel the impact's own contact; ``point``: anything."""
     tolerance: float = TOLERANCE
     skin: Skin = dataclasses.field(default_factory=Skin)
     """The sheet whose latency is compared."""
     other_s: float = 0.0
-    """Extra time of host, controller and motor, in s."""
+    """Extra time of host, controller and motor."""
     brake_nm: float = 0.0
-    """Motor torque against the motion after the reaction, in Nm."""
+    """Motor torque against the motion after the reaction."""
 
     def __post_init__(self) -> None:
         for name, unit in (("mass_kg", "kg"), ("speed_m_s", "m/s"), ("radius_m", "m"), ("time_s", "s")):
@@ -347,6 +346,6 @@ FIRST_DESIGN = Task(
     foams=(find("paper"),),
     brake_nm=3.0,
 )
-"""The first design of the paper's Section IV, on the foam that was found."""
+"""The first design of the paper's Section IV."""
 WORST_M = 5e-3 * math.sqrt(2)
-"""The farthest place from a switch on the paper's sheet, in m."""
+"""The farthest place from a switch on the paper's sheet."""

@@ -1,7 +1,6 @@
-"""The cap layer: a printed cap on each switch, as one STL file.
+"""The cap layer of a sheet: a printed cap on each switch, as one STL file.
 
-A cap is a square plate with a square plunger below, which stands on the switch. The caps are separate, printed in
-place; the foam glued to their tops carries them onto the switches together.
+A cap is a square plate with a square plunger on the switch. Foam glued to the plates holds the separate caps together.
 """
 
 from __future__ import annotations
@@ -14,38 +13,35 @@ from contactfpga.design.sheet.parts import SheetError, SwitchPart
 from contactfpga.skin import Skin
 
 PLATE_MM = 1.2
-"""Thickness of a cap's plate."""
 GAP_MM = 0.6
-"""Gap between caps, if the Skin's file states no cap."""
 LEAST_GAP_MM = 0.3
 """Least gap for a printer with lines of 0.4 mm."""
 BELOW_MM = 0.3
-"""Gap between the plate and the body of a fully pressed switch, the allowance for tilt."""
+"""Gap below the plate at a fully pressed switch, for tilt."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Caps:
-    """The cap layer of a sheet, with its clearances in mm."""
+    """The cap layer of a sheet; lengths are in mm."""
 
     centers: np.ndarray
-    """(caps, 2): x and y of each cap seen from above, y down."""
+    """(caps, 2): x and y of each cap, y down."""
     side_mm: float
     plunger_mm: float
-    """Side of the plunger."""
     plunger_height_mm: float
     gap_mm: float
     """The smaller gap between neighbors."""
     below_mm: float = BELOW_MM
 
     def triangles(self) -> np.ndarray:
-        """(triangles, 3 corners, 3) in mm: x, y up, and z, with the plunger's foot at 0. Each cap is one closed body
-        with outward normals."""
+        """(triangles, 3 corners, 3) in mm: x, y up, and z from the plungers' feet; caps are closed bodies with outward
+        normals."""
         one = _cap(self.side_mm / 2, self.plunger_mm / 2, self.plunger_height_mm)
         moved = np.column_stack([self.centers[:, 0], -self.centers[:, 1], np.zeros(len(self.centers))])
         return np.asarray(one[None] + moved[:, None, None]).reshape(-1, 3, 3)
 
     def stl(self) -> bytes:
-        """A binary STL file in millimeters."""
+        """The caps as a binary STL file in millimeters."""
         corners = self.triangles()
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -56,8 +52,8 @@ class Caps:
 
 
 def caps(skin: Skin, switch: SwitchPart, side_mm: float | None = None) -> Caps:
-    """The caps of a Skin. ``side_mm``: from its ``[cover.cap]``; None leaves :data:`GAP_MM` between caps. Raises
-    :class:`SheetError` if caps would touch, or are smaller than their plungers."""
+    """The caps of a Skin, :data:`GAP_MM` apart for a ``side_mm`` of None. Raises :class:`SheetError` if caps would
+    touch or are smaller than their plungers."""
     pitch = min(skin.pitch_x_mm, skin.pitch_y_mm)
     side = pitch - GAP_MM if side_mm is None else side_mm
     gap = pitch - side
@@ -101,7 +97,6 @@ def _ends(square: np.ndarray) -> list[list[np.ndarray]]:
 
 
 def _band(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """Triangles between two squares, facing outward or down."""
     found = []
     for k in range(4):
         a, b, c, d = low[k], low[(k + 1) % 4], high[(k + 1) % 4], high[k]

@@ -1,8 +1,7 @@
-"""Joins pins above a strip of the board with pins below it: each net on a level of its own across the strip.
+"""Channel routing: joins pins above a strip of the board with pins below it.
 
-This is channel routing with the left-edge rule (Hashimoto and Stevens, 1971). Levels run on the top side; from each pin
-a track leads to its level on the back. Pins below are on whole steps of a :class:`Grid`, pins above half a step aside,
-so that no two of these tracks meet and their order is free.
+Each net has a level on the top side by the left-edge rule (Hashimoto and Stevens, 1971); a track on the back leads from
+each pin to its level. Pins above are half a :class:`Grid` step aside, so no two of these tracks meet.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ POWERED = (GND, SUPPLY)
 
 @dataclasses.dataclass(frozen=True)
 class Pin:
-    """A net's end at the channel; ``y`` is the start of its track on the back."""
+    """A net's end at the channel; its track on the back starts at ``y``."""
 
     net: str
     x: float
@@ -38,13 +37,13 @@ class Grid:
     origin: float
 
     def near(self, x: float, below: bool) -> float:
-        """The place nearest to x for a pin below, or above."""
+        """The place nearest to x for a pin below or above the channel."""
         shift = self.origin if below else self.origin + GRID_MM / 2
         return round((x - shift) / GRID_MM) * GRID_MM + shift
 
 
 def levels(pins: Iterable[Pin]) -> dict[str, int]:
-    """The level of each net with two or more pins, 0 at the bottom; nets on one level do not overlap."""
+    """Level of each net with two or more pins, 0 at the bottom."""
     ends: dict[str, tuple[float, float, int]] = {}
     for pin in pins:
         low, high, count = ends.get(pin.net, (math.inf, -math.inf, 0))
@@ -64,7 +63,7 @@ def levels(pins: Iterable[Pin]) -> dict[str, int]:
 
 
 def height(pins: Iterable[Pin]) -> float:
-    """Height of the channel for these pins, in mm."""
+    """Height in mm of the channel for these pins."""
     found = levels(pins)
     return LEVEL_MM * (max((level + (net in POWERED) for net, level in found.items()), default=0) + 2)
 

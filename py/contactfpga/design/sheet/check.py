@@ -1,4 +1,4 @@
-"""KiCad's check of a board's rules. Only this needs KiCad; the files are written without it."""
+"""KiCad's check of a board's rules; nothing else here needs KiCad."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contactfpga.design.sheet.parts import SheetError
 from contactfpga.errors import MissingTool
 
 PYTHON = "/usr/bin/python3"
-"""KiCad's module belongs to the system's Python, not to this one."""
+"""The system's Python, which has KiCad's module."""
 SECONDS = 600
 
 _PROGRAM = """
@@ -24,7 +24,7 @@ sys.exit(0 if pcbnew.WriteDRCReport(board, sys.argv[2], pcbnew.EDA_UNITS_MILLIME
 
 
 def there() -> bool:
-    """Whether KiCad is available here."""
+    """Whether KiCad is available."""
     try:
         return subprocess.run([PYTHON, "-c", "import pcbnew"], capture_output=True, timeout=60).returncode == 0
     except OSError:
@@ -32,8 +32,8 @@ def there() -> bool:
 
 
 def findings(board: Path) -> list[str]:
-    """KiCad's findings for a .kicad_pcb file: broken rules, unconnected pads. Raises :class:`MissingTool` without KiCad
-    and :class:`SheetError` if it cannot read the file."""
+    """KiCad's findings for a .kicad_pcb file. Raises :class:`MissingTool` without KiCad and :class:`SheetError` for an
+    unreadable file."""
     if not there():
         raise MissingTool("--kicad", "KiCad 6 (its module pcbnew)", "apt install --no-install-recommends kicad")
     with tempfile.TemporaryDirectory() as folder:

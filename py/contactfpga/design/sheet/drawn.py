@@ -1,6 +1,6 @@
 """The items of a board, for any file format: parts, tracks, vias, holes, print.
 
-Lengths are in mm seen from the top side, x to the right and y down; cell (row 0, column 0) is at (0, 0).
+Lengths are in mm seen from the top side, y down; cell (row 0, column 0) is at (0, 0).
 """
 
 from __future__ import annotations
@@ -13,33 +13,27 @@ from typing import Literal
 from contactfpga.design.sheet.parts import Pad, Part
 
 Layer = Literal["F", "B"]
-"""Copper layer: top side or back."""
 
 TRACK_MM = 0.2
-"""Width of a track."""
 POWER_MM = 0.5
-"""Width of the long tracks of 3.3 V and ground."""
 CLEARANCE_MM = 0.2
-"""Clearance between copper of two nets."""
 VIA_MM = 0.6
 VIA_DRILL_MM = 0.3
 EDGE_MM = 0.3
 """Clearance between copper and the board's edge."""
 PRINT_MM = 0.12
-"""Width of a printed line."""
 MASK_MM = 0.05
-"""Excess of a solder mask opening over its pad, on each side."""
+"""Growth of a solder mask opening over its pad on each side."""
 
 BOARDS = {"plane": (1.6, 1.53, 4.4), "cylinder": (0.2, 0.1, 3.4)}
-"""By the Skin's surface: thickness of the board and distance of its copper layers in mm, and permittivity. A plane is
-FR-4, a cylinder a polyimide flex."""
+"""Board thickness and distance of copper layers in mm, and permittivity: of FR-4, or of a polyimide flex."""
 
 GND = "GND"
 SUPPLY = "3V3"
 
 
 def rounded(value: float) -> float:
-    """Rounded to a nanometer, the unit of board files; never -0."""
+    """The value rounded to a nanometer, the unit of board files; never -0."""
     return round(value, 6) + 0.0
 
 
@@ -54,10 +48,10 @@ class PlacedPart:
     x: float
     y: float
     turn: int
-    """Rotation in degrees counterclockwise, in quarters, after mirroring for the back."""
+    """Rotation in degrees counterclockwise after mirroring for the back, in quarters."""
     back: bool
     nets: dict[str, str]
-    """Net of each connected pad by number."""
+    """Net of each connected pad, by number."""
 
     def spot(self, x: float, y: float) -> tuple[float, float]:
         """Board position of a point of the part's drawing."""
@@ -85,13 +79,13 @@ class CopperTrack:
 
     @property
     def length(self) -> float:
-        """From end to end in mm."""
+        """Length in mm."""
         return math.hypot(self.x2 - self.x1, self.y2 - self.y1)
 
 
 @dataclasses.dataclass(frozen=True)
 class Via:
-    """A plated hole that joins both sides; covered by the solder mask."""
+    """A plated hole that joins both sides, covered by the solder mask."""
 
     x: float
     y: float
@@ -119,7 +113,7 @@ class Hole:
 
 
 class Drawing:
-    """A board under construction. Its lists are in order of addition, so that the same calls give the same files."""
+    """A board under construction; the same calls give the same files."""
 
     def __init__(self) -> None:
         self.placed: list[PlacedPart] = []
@@ -150,7 +144,7 @@ class Drawing:
         return one
 
     def run(self, net: str, layer: Layer, *points: tuple[float, float], width: float = TRACK_MM) -> None:
-        """Add tracks between successive points, skipping repeated points."""
+        """Add tracks between successive points; repeated points add none."""
         spots = [(rounded(x), rounded(y)) for x, y in points]
         for a, b in itertools.pairwise(spots):
             if a != b:
@@ -165,8 +159,7 @@ class Drawing:
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
     def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
-        """Print a number on the top side, centered at (x, y), in seven-segment strokes; if not upright, it reads
-        upward."""
+        """Print a number on the top side, centered at (x, y); without ``upright`` it reads upward."""
         digits = str(value)
         step, tall = 0.8 * height, height / 2
         corners = {0: (0, -1), 1: (1, -1), 2: (0, 0), 3: (1, 0), 4: (0, 1), 5: (1, 1)}
@@ -180,7 +173,7 @@ class Drawing:
                 self.stroke(x + u1, y + v1, x + u2, y + v2)
 
     def nets(self) -> list[str]:
-        """Names of all nets in alphabetical order."""
+        """Names of all nets, sorted."""
         found = {net for one in self.placed for net in one.nets.values()}
         return sorted(found | {track.net for track in self.tracks} | {via.net for via in self.vias})
 
@@ -193,4 +186,4 @@ _SEGMENTS = {
         strict=True,
     )
 }
-"""Ends of the lit segments of each digit: corners 0 and 1 are at the top, 2 and 3 in the middle, 4 and 5 below."""
+"""Ends of the lit segments of each digit: corners 0 and 1 at the top, 2 and 3 in the middle, 4 and 5 below."""

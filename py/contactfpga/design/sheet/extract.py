@@ -1,17 +1,15 @@
 """The circuit of a layout's lines: resistance from their copper, capacitance from neighbors and crossings.
 
-Each formula is for copper of no thickness on or in one dielectric, so capacitances are good to some ten percent:
+Formulas are for copper of no thickness on or in one dielectric, good to some ten percent:
 
-- a track above another at right angles: eps w1' w2' / h, where w' is the width of the plate that has the capacitance
-  per length of a track of width w over a plane (E. Hammerstad and O. Jensen, Accurate models for microstrip
-  computer-aided design, IEEE MTT-S 1980, pp. 407-409);
-- two tracks beside each other: 2 eps0 e K(k')/K(k), k^2 = s (s + w1 + w2) / ((s + w1)(s + w2)), with K the complete
-  elliptic integral and e the mean of board and air (conformal mapping; B. C. Wadell, Transmission Line Design Handbook,
-  1991, section 3.4);
-- resistance: sheet resistance of copper times length over width, with all branches of a line solved as a network.
+- a track that crosses another at right angles: eps w1' w2' / h, with w' the width of the plate that has a track's
+  capacitance per length over a plane (Hammerstad and Jensen, Accurate models for microstrip computer-aided design,
+  IEEE MTT-S 1980, pp. 407-409);
+- two adjacent tracks: 2 eps0 e K(k')/K(k), k^2 = s (s + w1 + w2) / ((s + w1)(s + w2)), with K the complete elliptic
+  integral and e the mean of board and air (Wadell, Transmission Line Design Handbook, 1991, section 3.4);
+- resistance: that of copper; a line's branches are solved as a network.
 
-Diode charge is excluded: the circuit model has it at each pressed switch. An open switch has its contacts' capacitance
-in series with its diode's.
+The circuit model adds diode charge. An open switch has its contacts' capacitance in series with its diode's.
 """
 
 from __future__ import annotations
@@ -29,9 +27,8 @@ from contactfpga.skin import Skin
 
 EPS0_PF_MM = 8.8541878e-3
 SHEET_OHM = 4.9e-4
-"""Sheet resistance of 35 um copper, 1 oz per square foot, at 20 degrees Celsius: 1.72e-8 ohm m over 35 um."""
+"""Sheet resistance of 35 um copper at 20 degrees Celsius."""
 VIA_SIEMENS = 1e3
-"""Conductance of a via: 1 mohm."""
 PIN_PF = 10.0
 """Capacitance of a pin of an FPGA, a 74HC595 or a 74HC165 with its pads."""
 CABLE_PF_M = 50.0
@@ -43,14 +40,14 @@ class Extracted:
     """Values of a layout's lines; capacitances in pF."""
 
     circuit: Circuit
-    """The layout's circuit with these values, one for all lines."""
+    """The layout's circuit; one value holds for all lines."""
     row_ohm: tuple[float, float]
-    """Lowest and highest resistance of all rows, from the resistor to the far end."""
+    """Lowest and highest resistance of the rows, from resistor to far end."""
     column_ohm: tuple[float, float]
     crossing_pf: tuple[float, float]
     """Lowest and highest capacitance of a row to a column; the circuit has the mean."""
     row_neighbor_pf: float
-    """Capacitance of a row to the next; the circuit has the larger of this and the columns'."""
+    """Capacitance of a row to the next; the circuit has the larger of rows' and columns'."""
     column_neighbor_pf: float
 
 
@@ -84,12 +81,11 @@ def extracted(layout: Layout, cable_m: float = 0.3) -> Extracted:
 
 
 def _said(value: float) -> float:
-    """Round to three digits."""
     return float(f"{value:.3g}")
 
 
 def over_pf(width: float, height: float, eps: float) -> float:
-    """Capacitance per length in pF/mm of a track over a plane, after Hammerstad and Jensen; 0.01 <= w/h <= 100."""
+    """Capacitance per length in pF/mm of a track over a plane (Hammerstad and Jensen); 0.01 <= w/h <= 100."""
     u = width / height
     a = 1 + math.log((u**4 + (u / 52) ** 2) / (u**4 + 0.432)) / 49 + math.log(1 + (u / 18.1) ** 3) / 18.7
     b = 0.564 * ((eps - 0.9) / (eps + 3)) ** 0.053
@@ -99,27 +95,26 @@ def over_pf(width: float, height: float, eps: float) -> float:
 
 
 def across_pf(width: float, other: float, height: float, eps: float) -> float:
-    """Capacitance in pF of two tracks that cross."""
+    """Capacitance in pF of two crossing tracks."""
     plates = [over_pf(one, height, eps) * height / (EPS0_PF_MM * eps) for one in (width, other)]
     return EPS0_PF_MM * eps * plates[0] * plates[1] / height
 
 
 def beside_pf(width: float, other: float, gap: float, eps: float) -> float:
-    """Capacitance per length in pF/mm of two adjacent tracks of these widths and gap."""
+    """Capacitance per length in pF/mm of two adjacent tracks."""
     k = math.sqrt(gap * (gap + width + other) / ((gap + width) * (gap + other)))
     return 2 * EPS0_PF_MM * eps * _mean(1.0, math.sqrt(1 - k * k)) / _mean(1.0, k)
 
 
 def _mean(a: float, b: float) -> float:
-    """The arithmetic-geometric mean M; K(k) is pi / (2 M(1, k')), so K(k')/K(k) is M(1, k') / M(1, k)."""
+    """The arithmetic-geometric mean M; K(k) is pi / (2 M(1, k'))."""
     while abs(a - b) > 1e-12 * a:
         a, b = (a + b) / 2, math.sqrt(a * b)
     return a
 
 
 def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
-    """(rows, columns) pF: a row under a column, twice where it also returns to its start; the open switch; and the
-    row's descent beside the columns at its left and right."""
+    """(rows, columns) in pF: crossings, the open switch, and the row's descent between two columns."""
     skin, switch = layout.skin, layout.switch
     wide = 2 * switch.half_width
     once = across_pf(TRACK_MM, wide, h, eps)
@@ -138,8 +133,7 @@ def _crossings(layout: Layout, h: float, eps: float, e: float) -> np.ndarray:
 
 
 def _past_pf(skin: Skin, switch: SwitchPart, track: float | None, eps: float) -> float:
-    """Capacitance in pF per cell height of a column to ``track`` midway between columns, or to the next column. Beside
-    switches a column has their width."""
+    """Capacitance in pF per cell height of a column to ``track`` midway between columns, or to the next column."""
     found, wide = 0.0, 2 * switch.half_width
     for width, length in ((wide, min(wide, skin.pitch_y_mm)), (TRACK_MM, max(0.0, skin.pitch_y_mm - wide))):
         gap = skin.pitch_x_mm - width if track is None else (skin.pitch_x_mm - width - track) / 2
@@ -152,7 +146,6 @@ def _fanned_mm(drawing: Drawing, net: str) -> float:
 
 
 def _line_ohms(layout: Layout, kind: str) -> list[float]:
-    """Resistance of each line of a kind, from where it leaves the matrix to its most resistive point."""
     return [_ohms(layout.drawing, line.net, line.x) for line in layout.lines if line.kind == kind and line.used]
 
 

@@ -19,11 +19,10 @@ from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
 
 NAME = "sheet"
-"""Base name of the files."""
 
 
 def write(folder: Path, layout: Layout, caps: Caps, skin_file: str) -> list[str]:
-    """Write the files, ``skin_file`` as ``skin.toml``; returns their names. The same sheet gives the same bytes."""
+    """Write the files, ``skin_file`` as ``skin.toml``, and return their names; the same sheet gives the same bytes."""
     drawing, skin = layout.drawing, layout.skin
     title = f"contactfpga sheet {skin.rows}x{skin.columns} {skin.fingerprint.hex()}"
     texts = {
@@ -50,7 +49,7 @@ def _table(rows: Iterable[Iterable[object]]) -> str:
 
 
 def parts_list(layout: Layout) -> str:
-    """Quantity, value, footprint, references and article, a line for each kind of part."""
+    """The parts list as CSV, a line for each kind of part."""
     kinds: dict[tuple[str, str, str], list[str]] = collections.defaultdict(list)
     for one in layout.drawing.placed:
         kinds[one.value, one.part.name, one.part.order].append(one.reference)
@@ -59,8 +58,8 @@ def parts_list(layout: Layout) -> str:
 
 
 def placement_list(layout: Layout) -> str:
-    """Position of each part: x to the right and y up in mm from cell (row 0, column 0), and its rotation
-    counterclockwise, both seen from the top side."""
+    """The placement list as CSV, in mm from cell (row 0, column 0), y up, and rotation counterclockwise from the top
+    side."""
     rows = [
         (
             one.reference,
@@ -77,7 +76,7 @@ def placement_list(layout: Layout) -> str:
 
 
 def connectors_list(layout: Layout) -> str:
-    """Board wire of each connector pin, named as by ``contactfpga build --wiring``."""
+    """The connector list as CSV: the board wire of each pin, named as by ``contactfpga build --wiring``."""
     plugs = [one for one in layout.drawing.placed if one.reference.startswith("J")]
     ends = {line.pin: line.net for line in layout.lines}
     rows = [(one.reference, pin, net, ends.get(net, "")) for one in plugs for pin, net in one.nets.items()]
@@ -94,8 +93,7 @@ def circuit_table(circuit: Circuit) -> str:
 
 
 def completed(text: str, circuit: Circuit) -> str:
-    """A Skin's file with this circuit in place of its own; all else stays as written. Raises :class:`SheetError` for a
-    file in which ``circuit`` is no table with a header."""
+    """A Skin's file with its circuit replaced. Raises :class:`SheetError` if ``circuit`` is no table with a header."""
     kept, inside = [], False
     for line in text.splitlines():
         if re.match(r"\s*\[", line):

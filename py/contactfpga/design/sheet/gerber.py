@@ -1,7 +1,7 @@
-"""Writes a layout for a board house: Gerber layers, drill files, and the netlist for its electrical test.
+"""A layout for a board house: Gerber layers, drill files, and the netlist for its electrical test.
 
-Gerber X2 (Ucamco, The Gerber Layer Format Specification, 2021), Excellon drill files in millimeters, and IPC-D-356A. In
-all of them y points up, and (0, 0) is cell (row 0, column 0).
+The formats are Gerber X2 (Ucamco, 2021), Excellon in millimeters, and IPC-D-356A; y points up, and (0, 0) is cell (row
+0, column 0).
 """
 
 from __future__ import annotations
@@ -49,8 +49,6 @@ def on_layer(pad: Pad, one: PlacedPart, layer: Layer) -> bool:
 
 
 class _Plot:
-    """One Gerber file: its apertures and their drawings."""
-
     def __init__(self, function: str, negative: bool = False):
         self.head = [
             "%TF.GenerationSoftware,contactfpga,sheet*%",
@@ -63,7 +61,6 @@ class _Plot:
         self.drawn: dict[str, list[str]] = {}
 
     def line(self, width: float, x1: float, y1: float, x2: float, y2: float) -> None:
-        """A line with round ends."""
         self.drawn.setdefault(f"C,{width:.6f}", []).extend([_at(x1, y1, 2), _at(x2, y2, 1)])
 
     def flash(self, shape: str, x: float, y: float) -> None:
@@ -71,7 +68,6 @@ class _Plot:
         self.drawn.setdefault(shape, []).append(_at(x, y, 3))
 
     def text(self) -> str:
-        """The whole file."""
         shapes = list(enumerate(self.drawn, 10))
         lines = [*self.head, *(f"%ADD{code}{shape}*%" for code, shape in shapes), "G01*"]
         for code, shape in shapes:
@@ -83,7 +79,6 @@ class _Plot:
         self.flash(f"C,{w:.6f}" if pad.round else f"R,{w:.6f}X{h:.6f}", *one.spot(pad.x, pad.y))
 
     def copper(self, drawing: Drawing, layer: Layer) -> str:
-        """Pads, tracks and vias of a side."""
         for one in drawing.placed:
             for pad in one.part.pads:
                 if on_layer(pad, one, layer):
@@ -96,7 +91,7 @@ class _Plot:
         return self.text()
 
     def pads(self, drawing: Drawing, layer: Layer, grown: float, pasted: bool = False) -> str:
-        """Openings of the mask, each pad enlarged by ``grown``, or of the stencil for pads with paste."""
+        """Openings of the mask, each pad enlarged by ``grown`` mm, or of the stencil."""
         for one in drawing.placed:
             for pad in one.part.pads:
                 if on_layer(pad, one, layer) and (one.part.pasted or not pasted):
@@ -106,7 +101,6 @@ class _Plot:
         return self.text()
 
     def print(self, drawing: Drawing, layer: Layer) -> str:
-        """The print on a side."""
         for stroke in drawing.strokes:
             if stroke.layer == layer:
                 self.line(PRINT_MM, stroke.x1, stroke.y1, stroke.x2, stroke.y2)
@@ -126,7 +120,6 @@ def _at(x: float, y: float, code: int) -> str:
 
 
 def _plated(drawing: Drawing) -> list[tuple[float, float, float]]:
-    """Diameter and place of each plated hole."""
     holes = [(VIA_DRILL_MM, via.x, via.y) for via in drawing.vias]
     for one in drawing.placed:
         holes += [(pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill]
@@ -145,7 +138,7 @@ def _drill(holes: list[tuple[float, float, float]], function: str) -> str:
 
 
 def _ipc(drawing: Drawing) -> Iterator[str]:
-    """IPC-D-356A: a record of 80 columns for each pad and via, in units of 1 um."""
+    """IPC-D-356A records of 80 columns, in units of 1 um."""
     yield "C  contactfpga"
     yield "P  JOB   contactfpga"
     yield "P  UNITS CUST 1"

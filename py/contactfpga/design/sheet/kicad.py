@@ -1,7 +1,7 @@
-"""Writes a layout as a board of KiCad 6, with its project and its netlist.
+"""A layout as a board of KiCad 6, with its project and netlist.
 
-The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb), written here because a sheet needs
-few forms. Each item's UUID is a hash of its content, so the same sheet gives the same files.
+The files are S-expressions (https://dev-docs.kicad.org/en/file-formats/sexpr-pcb). UUIDs are hashes, so the same sheet
+gives the same files.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from contactfpga.design.sheet.drawn import (
 SPACE = uuid.UUID("6f3b7d5e-8f0c-5b0e-9b2a-2f6f6a2d7c11")
 """Namespace of the items' UUIDs."""
 PAGE_MM = 30.0
-"""Offset of the board from the page's corner."""
 
 _LAYERS = (
     (0, "F.Cu", "signal"),
@@ -169,7 +168,7 @@ def board(drawing: Drawing, title: str, thickness_mm: float = 1.6) -> str:
 
 
 def project(name: str) -> str:
-    """The text of the .kicad_pro file, which has the board's design rules."""
+    """The text of the .kicad_pro file, with the board's design rules."""
     rules = {
         "min_clearance": CLEARANCE_MM,
         "min_copper_edge_clearance": EDGE_MM,

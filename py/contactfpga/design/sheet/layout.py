@@ -1,9 +1,8 @@
-"""The layout of a sheet: the matrix of a Skin on two copper layers, with its strip and its outline.
+"""The layout of a sheet: the matrix of a Skin on two copper layers, with its strip and outline.
 
-Columns run along y on the top side, through the switches. Rows run along x on the back, under the diodes. All lines
-leave at the edge above row 0, so that a sheet around a closed cylinder needs nothing at its seam: a row descends
-between two columns on the top side, runs on the back to its first switch, then past all of them. So the far end of each
-row is at the last column, and that of each column at the last row; there the guard lines are.
+Columns run along y on the top side through the switches; rows run along x on the back under the diodes. All lines leave
+above row 0, so a sheet around a closed cylinder needs nothing at its seam: a row descends between two columns on the
+top side.
 """
 
 from __future__ import annotations
@@ -20,25 +19,21 @@ from contactfpga.design.sheet.strip import PLACE_MM, Line, port
 from contactfpga.skin import Skin
 
 FITTED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5_600.0)
-"""Resistors if the Skin's file states no circuit (docs/maker.md)."""
+"""Resistors for a Skin's file without a circuit (docs/maker.md)."""
 
 MARGIN_MM = 7.0
-"""Board beyond the parts, with the mounting holes."""
+"""Board beyond the parts, for the mounting holes."""
 HOLE_MM = 3.2
-"""Hole for M3."""
 
 _DIODE_AT = -0.2, 0.5
 """Middle of a cell's diode; its pads are 1.1 mm to the left and right."""
 _ROW_Y = 2.0
 _FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
-"""Offset of the track that brings a row to its first switch, far enough for a via on it."""
+"""Offset of the track that brings a row to its first switch, with room for a via."""
 _ROW_START = -2.0
 _CELL_HEIGHT = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - DIODE_VIA[1] + VIA_MM / 2
-"""Height of a cell's parts on the back."""
 _GUARD_ROW_Y = 4.2
-"""Distance from the last row to the guard row."""
 _GUARD_DIODE_X = -0.35
-"""Distance from the guard column to its diodes."""
 _GUARD_EDGE = 0.7
 """Distance from the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
 
@@ -49,7 +44,7 @@ class Layout:
 
     skin: Skin
     circuit: Circuit
-    """Values of its resistors."""
+    """Values of the sheet's resistors."""
     switch: SwitchPart
     drawing: Drawing
     lines: tuple[Line, ...]
@@ -57,11 +52,8 @@ class Layout:
 
 
 def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
-    """Lay out the sheet of a Skin.
-
-    ``part`` names the switch; ``margin_mm`` is the board beyond its parts. Raises :class:`SheetError` for cells finer
-    than their parts, and for lines without a place around a closed cylinder.
-    """
+    """Lay out the sheet of a Skin with the switch ``part``. Raises :class:`SheetError` for cells finer than their parts
+    and for lines without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
     matrix = _Matrix(skin, switch)
@@ -76,7 +68,7 @@ def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", marg
 
 
 def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
-    """The finest pitch in mm, along x and y, at which the cells of a Skin hold their parts."""
+    """The finest pitch in mm, along x and y, at which a Skin's cells hold their parts."""
     wide = switch.part.width + CLEARANCE_MM
     high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, _CELL_HEIGHT)
     if skin.columns > 1:
@@ -99,8 +91,6 @@ def _check(skin: Skin, switch: SwitchPart) -> None:
 
 
 class _Matrix:
-    """The cells and lines of a Skin, and where its rows descend."""
-
     def __init__(self, skin: Skin, switch: SwitchPart):
         self.skin, self.switch = skin, switch
         self.px, self.py = skin.pitch_x_mm, skin.pitch_y_mm
@@ -111,19 +101,16 @@ class _Matrix:
         self.risers = self._risers()
 
     def row_y(self, row: int) -> float:
-        """Middle of a row's cells; the guard row is the last."""
+        """y of a row's cells; the guard row is the last."""
         return row * self.py if row < self.skin.rows else (self.skin.rows - 1) * self.py + _GUARD_ROW_Y
 
     def row_net(self, row: int) -> str:
-        """Name of a row's net."""
         return f"ROW{row}" if row < self.skin.rows else "ROW_GUARD"
 
     def column_net(self, column: int) -> str:
-        """Name of a column's net."""
         return f"COL{column}" if column < self.skin.columns else "COL_GUARD"
 
     def _risers(self) -> list[float]:
-        """x of each descending row, from left to right: between columns, on a plane also left of them."""
         skin, gaps = self.skin, self.skin.columns - 1
         width = self.px - 2 * self.switch.half_width - VIA_MM - 2 * CLEARANCE_MM
         most = min(math.floor(self.px / PLACE_MM + 1e-9) - 1, math.floor(width / PLACE_MM + 1e-9) + 1) if gaps else 0
@@ -140,7 +127,6 @@ class _Matrix:
         return [-beside - k * PLACE_MM for k in reversed(range(spill))] + between[: skin.row_lines]
 
     def lines(self) -> list[Line]:
-        """All lines where they leave the matrix, from left to right."""
         skin = self.skin
         rows, columns = wiring.row_lines(skin), wiring.column_lines(skin)
         found = []
@@ -155,19 +141,17 @@ class _Matrix:
         return sorted(found, key=lambda line: line.x)
 
     def _ends(self, row: int) -> list[float]:
-        """x of the items on a row, from its start on."""
         found = [column for column in range(self.skin.columns) if (row, column) not in self.masked]
         ends = [column * self.px + _DIODE_AT[0] + 1.1 for column in found]
         return [*ends, self.guard_x + _GUARD_DIODE_X] if self.skin.guard and row < self.skin.rows else ends
 
     def _last(self, column: int) -> int:
-        """The last row with an item on a column, including the guard row; -1 for none."""
+        """The last row with an item on a column, the guard row included; -1 for none."""
         if self.skin.guard:
             return self.skin.rows
         return max((row for row in range(self.skin.rows) if (row, column) not in self.masked), default=-1)
 
     def draw(self, drawing: Drawing, base: float) -> None:
-        """Draw all cells, and the lines up to ``base``."""
         for column in range(self.skin.columns):
             if self._last(column) >= 0:
                 x = column * self.px
@@ -200,7 +184,6 @@ class _Matrix:
         self._to_row(drawing, x, y, node, self.row_net(row))
 
     def _to_row(self, drawing: Drawing, x: float, y: float, node: str, row: str) -> None:
-        """Draw from the via of a cell through its diode to its row."""
         via = x + DIODE_VIA[0], y + DIODE_VIA[1]
         right = x + _DIODE_AT[0] + 1.1
         drawing.via(node, *via)
@@ -213,20 +196,17 @@ class _Matrix:
         drawing.run(row, "B", (right, middle[1]), (right, y + _ROW_Y))
 
     def _diode(self, drawing: Drawing, middle: tuple[float, float], node: str, row: str, turn: int) -> None:
-        """Draw a diode, with ``turn`` its cathode toward the row."""
         low = self.skin.diodes == "col2row"
         nets = {"1": row, "2": node} if low else {"1": node, "2": row}
         drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360)
 
     def _guard_cell(self, drawing: Drawing, column: int) -> None:
-        """Draw a column's end, with its diode to the guard row."""
         x, y, net = column * self.px, self.row_y(self.skin.rows), self.column_net(column)
         end = (self.skin.rows - 1) * self.py + self.switch.reach
         drawing.run(net, "F", (x, end), (x, y + DIODE_VIA[1]))
         self._to_row(drawing, x, y, net, self.row_net(self.skin.rows))
 
     def _guard_column(self, drawing: Drawing, base: float) -> None:
-        """Draw the guard column, with a diode to each row's end."""
         x, net = self.guard_x, self.column_net(self.skin.columns)
         drawing.run(net, "F", (x, base), *((x, self.row_y(row)) for row in range(self.skin.rows)))
         for row in range(self.skin.rows):
@@ -272,7 +252,6 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
 
 
 def _numbers(drawing: Drawing, skin: Skin, switch: SwitchPart) -> None:
-    """Print the numbers of rows and columns beside the first cells."""
     beside = (switch.half_width + skin.pitch_x_mm / 2) / 2
     for column in range(skin.columns):
         drawing.number(column, column * skin.pitch_x_mm + 1.0, -skin.pitch_y_mm / 2 - 0.2)

@@ -1,6 +1,6 @@
 """The parts of a sheet and their copper: pads, body, and article.
 
-Lengths are in mm. A part is seen on its own side of the board, x to the right and y down.
+A part is seen on its own side of the board, in mm, x to the right and y down.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from contactfpga.inputs.values import shown
 
 
 class SheetError(ContactFPGAError, ValueError):
-    """An unmakable sheet; the message names the value and the limit."""
+    """A sheet that cannot be made."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pad:
-    """A pad of a part. If ``round``, ``width`` is its diameter; a ``drill`` above 0 is the diameter of a plated
-    hole."""
+    """A pad of a part; ``width`` is the diameter of a ``round`` pad, ``drill`` the diameter of a plated hole or 0."""
 
     number: str
     x: float
@@ -36,25 +35,23 @@ class Part:
     """A part on the sheet."""
 
     name: str
-    """Name of its footprint, such as ``R_0603``."""
+    """Footprint, such as ``R_0603``."""
     order: str
-    """The article to order, for the parts list."""
     pads: tuple[Pad, ...]
     width: float
     """Width of the area without other parts."""
     height: float
     pasted: bool = True
-    """Whether its pads get solder paste; not for holes and the contacts of a dome."""
+    """Whether the pads get solder paste; not for holes and a dome's contacts."""
     marks: tuple[tuple[float, float, float, float], ...] = ()
-    """Printed lines (x, y, x, y) that mark the first pin, or a cathode."""
+    """Printed lines (x, y, x, y) that mark the first pin or a cathode."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SwitchPart:
     """A switch of the matrix, with the top-side copper between its pads.
 
-    The column enters at (0, -reach) and leaves at (0, reach). Pads numbered 1 belong to the column, pads numbered 2 to
-    the diode, whose via is at :data:`DIODE_VIA`.
+    The column enters at (0, -reach) and leaves at (0, reach); it has pads 1. Pads 2 belong to the diode.
     """
 
     part: Part
@@ -62,27 +59,25 @@ class SwitchPart:
     """Closing force."""
     travel_mm: float
     height_mm: float
-    """Height of the free switch above the board."""
     closed_by: float
-    """Side or diameter of its plunger."""
+    """Side or diameter of the plunger."""
     column: tuple[tuple[float, float, float, float], ...]
-    """Tracks (x, y, x, y) from one end of the column to the other, with common ends."""
+    """Tracks (x, y, x, y) from one end of the column to the other."""
     diode: tuple[tuple[float, float, float, float], ...]
     """Tracks from pads numbered 2 to the via of the diode."""
     tail: int
     """Number of final column tracks that only lead to the next cell."""
     reach: float
     half_width: float
-    """Extent of the cell's copper to the left and right of its middle."""
+    """Extent of the cell's copper to either side of its middle."""
     open_pf: float
-    """Capacitance of its open contacts."""
 
 
 DIODE_VIA = 0.0, -0.6
 """Position in a cell of the via from the diode's track to the back."""
 
 _LEG = 1.66
-"""Legs of a dome with 5 mm span are on a circle of 2.35 mm radius."""
+"""A dome of 5 mm span has its legs on a circle of 2.35 mm radius."""
 _SIDES = [(-_LEG, -_LEG), (0.0, -_LEG), (_LEG, -_LEG), (_LEG, _LEG), (0.0, _LEG), (-_LEG, _LEG), (-_LEG, -_LEG)]
 
 DOME = SwitchPart(
@@ -138,7 +133,7 @@ SWITCHES = {"dome": DOME, "tact": TACT}
 
 
 def find_switch(name: str) -> SwitchPart:
-    """The switch of this name. Raises :class:`SheetError` for an unregistered name."""
+    """The switch of this name. Raises :class:`SheetError` for an unknown name."""
     if name not in SWITCHES:
         raise SheetError(f"part is {shown(name)}; it must be one of {', '.join(SWITCHES)}")
     return SWITCHES[name]
@@ -171,12 +166,10 @@ HC595 = _soic16("74HC595, SOIC-16")
 HC165 = _soic16("74HC165, SOIC-16")
 
 HEADER_PINS = 10, 14, 16, 20, 26, 34, 40
-"""Pin counts of available shrouded headers."""
 
 
 def header(pins: int) -> Part:
-    """A shrouded header of two rows, 2.54 mm apart, for a ribbon cable: odd pins below, even pins above, from the
-    left."""
+    """A shrouded header of two rows, 2.54 mm apart; odd pins are below, even pins above, from the left."""
     first = -(pins // 2 - 1) * 1.27
     places = [(first + k // 2 * 2.54, 1.27 - k % 2 * 2.54) for k in range(pins)]
     pads = (Pad(str(k + 1), x, y, 1.7, 1.7, round=True, drill=1.0) for k, (x, y) in enumerate(places))

@@ -14,7 +14,7 @@ _BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#20262e", "#ffffff", "#6b7a8f"
 
 
 def svg(drawing: Drawing, title: str) -> str:
-    """The text of the file; a user unit is a millimeter."""
+    """The text of an SVG file; a user unit is a millimeter."""
     return picture_style.for_dark_pages("\n".join([*_lines(drawing, title), ""]))
 
 
@@ -58,7 +58,6 @@ def _copper(drawing: Drawing, layer: Layer, color: str) -> Iterator[str]:
 
 
 def _holes(drawing: Drawing) -> Iterator[tuple[float, float, float]]:
-    """Diameter and place of each hole."""
     yield from ((VIA_DRILL_MM, via.x, via.y) for via in drawing.vias)
     for one in drawing.placed:
         yield from ((pad.drill, *one.spot(pad.x, pad.y)) for pad in one.part.pads if pad.drill)
@@ -75,7 +74,6 @@ def _dots(dots: Iterable[tuple[float, float, float]], color: str) -> Iterator[st
 
 
 def _path(lines: Sequence[CopperTrack | Stroke]) -> str:
-    """A path that joins consecutive lines."""
     words, last = [], None
     for line in lines:
         if (line.x1, line.y1) != last:
@@ -95,7 +93,6 @@ def _body(x: float, y: float, turn: int, width: float, height: float) -> str:
 
 
 def _legend(left: float, y: float, size: float) -> Iterator[str]:
-    """A swatch and a word for each color, in letters of this size."""
     words = [*COPPER.values(), (_BODY, "parts"), (_PRINT, "printed")]
     for number, (color, said) in enumerate(words):
         x = left + number * 9 * size

@@ -1,7 +1,7 @@
-"""The strip that leads a sheet's lines to the board: series resistors and pulls, shift registers, connectors.
+"""The strip that leads a sheet's lines to the board: series resistors, pulls, shift registers, connectors.
 
-From the matrix up: a place of :data:`PLACE_MM` for each line with its two resistors, a channel of tracks, with shift
-registers these and a second channel, and the connectors. All parts are on the back.
+From the matrix up: a place for each line, a channel of tracks, any shift registers with a second channel, and the
+connectors. All parts are on the back.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _PAD = RESISTOR.pads[0].height / 2
 LINES_A_GROUND = 4
 """Number of neighboring cable wires that share a ground."""
 ENABLE_OHM = 10_000
-"""Resistor that disables the outputs of the 74HC595 while the FPGA is configured (docs/boards.md)."""
+"""Resistor that disables the 74HC595 while the FPGA is configured (docs/boards.md)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,14 +34,14 @@ class Line:
 
     net: str
     pin: str
-    """Net beyond its series resistor, named as the gateware's port."""
+    """Net beyond the series resistor, named as the gateware's port."""
     x: float
     kind: str
     """``row`` or ``column``."""
     pull: str
     """``up``, ``down`` or empty."""
     used: bool = True
-    """Whether it has copper, hence items, in the matrix."""
+    """Whether the line has copper, hence items, in the matrix."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +56,6 @@ class _Unit:
     nets: dict[str, str]
 
     def place(self, drawing: Drawing, y: float) -> list[Pin]:
-        """Add it to the drawing; returns its pins."""
         one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn)
         return [
             Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets
@@ -64,7 +63,7 @@ class _Unit:
 
 
 def port(name: str, bit: int, bits: int) -> str:
-    """Name of a wire as in the wiring table: with its bit if the port has several."""
+    """Name of a wire as in the wiring table, with its bit if the port has several."""
     return name if bits == 1 else f"{name}[{bit}]"
 
 
@@ -90,7 +89,6 @@ def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], 
 
 
 def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Grid) -> Iterator[Pin]:
-    """Draw a line's resistors, and their tracks up to the channel."""
     x, middle = line.x, base - 1.9
     if line.used:
         drawing.via(line.net, x, base)
@@ -108,14 +106,13 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
 
 
 def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
-    """A pin of the channel, moved onto the grid, where no two share a place."""
+    """A pin of the channel, moved onto the grid."""
     step = grid.near(x, below=True)
     drawing.run(net, "B", (x, y), (x, y - 0.9), (step, y - 0.9))
     return Pin(net, step, y - 0.9)
 
 
 def _tried(units: Sequence[_Unit]) -> list[Pin]:
-    """Pins of units of unknown height."""
     scratch = Drawing()
     return [pin for unit in units for pin in (_plug if unit.letter == "J" else _placed)(scratch, unit, 0.0)]
 
@@ -135,8 +132,7 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
 
 
 def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    """One or more connectors for rows and columns. ``below``: two channels, so parts above the upper are on the lower
-    one's grid."""
+    """Connectors for rows and columns; ``below`` puts them on the grid of pins below."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -156,7 +152,6 @@ def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Uni
 
 
 def _with_grounds(ports: Sequence[str]) -> list[str]:
-    """Nets of a connector's pins: the ports in order, the last on the last pin, and grounds between them."""
     nets = [*ports[:1]]
     for index, name in enumerate(ports[1:], 1):
         nets += [GND] * (index % LINES_A_GROUND == 0) + [name]
@@ -171,7 +166,6 @@ CHIP_STEPS = 15
 
 
 def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
-    """The shift registers with capacitors and enable resistor; none for a Skin without."""
     nets = list(_chip_nets(skin))
     if not nets:
         return []
@@ -188,7 +182,7 @@ def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
 
 
 def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
-    """Each shift register with the net of each of its pins (docs/boards.md)."""
+    """Each shift register with the net of each pin (docs/boards.md)."""
     numbers: dict[str, int] = {}
     chips: dict[tuple[str, int, int], dict[str, str]] = {}
     for output in wiring.outputs(skin):
@@ -216,8 +210,8 @@ def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
 def _registers(
     drawing: Drawing, chips: Sequence[_Unit], plugs: Sequence[_Unit], below: list[Pin], bottom: float
 ) -> tuple[list[Pin], float, list[float]]:
-    """Draw the lower channel, the chips, and passing tracks. Returns the upper channel's bottom pins and beginning, and
-    the drawing's ends."""
+    """Draw the lower channel, the chips and passing tracks. Returns the upper channel's bottom pins and bottom, and the
+    x range of the passing tracks."""
     tried = _tried(chips)
     lower = [pin for pin in tried if pin.y > 0]
     upper = [pin for pin in tried if pin.y < 0]
@@ -236,7 +230,6 @@ def _registers(
 
 
 def _slots(passing: set[str], pins: Sequence[Pin], chips: Sequence[_Unit]) -> dict[str, float]:
-    """Where each net passes the chips: the free place nearest to its pins below."""
     firsts = [unit.x - 3.5 * GRID_MM for unit in chips if unit.letter == "U"]
     free = [first + step * GRID_MM for first in firsts for step in SLOTS]
     beyond = itertools.count(round((max(firsts) - firsts[0]) / GRID_MM) + CHIP_STEPS + 1)

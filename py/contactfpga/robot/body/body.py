@@ -1,5 +1,4 @@
-"""A robot with a sheet on each of several links, by `robot.toml`; open, it has a thread per link, and snapshots of
-all."""
+"""A robot with a sheet on each of several links, by `robot.toml`; an open body has a thread per link."""
 
 from __future__ import annotations
 
@@ -38,13 +37,13 @@ class Body:
 
     links: dict[str, Plan]
     kinematics: Kinematics | None = None
-    """Kinematics of the links; None without a URDF, and then there is no base frame."""
+    """Kinematics of the links; None without a URDF, which leaves no base frame."""
     urdf: Path | None = None
     """The URDF file of the kinematics."""
 
     @classmethod
     def load(cls, path: str | Path, trust: bool = False) -> Body:
-        """Read `robot.toml`, whose paths are relative to its folder. ``trust`` as for :meth:`contactfpga.Skin.load`.
+        """Read `robot.toml`, whose paths are relative to its folder; ``trust`` as for :meth:`contactfpga.Skin.load`.
         Raises :class:`BodyError`, OSError."""
         path = Path(path)
         values = tomlfile.load(path, BodyError)
@@ -56,7 +55,7 @@ class Body:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], folder: Path) -> Body:
-        """A body from the values of such a file; paths are relative to ``folder``. Raises :class:`BodyError`,
+        """A body from the values of a `robot.toml`; paths are relative to ``folder``. Raises :class:`BodyError`,
         OSError."""
         for key in values:
             if key not in KEYS:
@@ -71,11 +70,11 @@ class Body:
         return cls(_by_name([plan.read(one, folder) for one in tables], kinematics), kinematics, urdf)
 
     def open(self, joints: Joints | None = None, *, timeout: float = 1.0, period_s: float = 0.002) -> OpenBody:
-        """Open every link's board, each in its own thread, and return when each was tried once. A board that does not
-        answer is retried.
+        """Open every link's board, each in its own thread, and return when each was tried once; boards that do not
+        answer are retried.
 
         Args:
-         joints: a function from a time on the host's clock to the joint angles, for instance a :class:`JointHistory`;
+         joints: a function from a time on the host's clock to the joint angles, such as a :class:`JointHistory`;
              without it there are only contacts in the links' frames.
          timeout: seconds for a board's hello.
          period_s: shortest interval of reading a link's newest frame.
@@ -107,8 +106,7 @@ def _by_name(plans: list[Plan], kinematics: Kinematics | None) -> dict[str, Plan
 class OpenBody:
     """Every link's board, read until it is closed: a context manager that iterates snapshots.
 
-    Made by :meth:`Body.open`. No link's failure raises: it is in the link's state, the others go on, and the link is
-    reopened as soon as possible.
+    A link's failure does not raise: it is in the link's state, and the link is reopened as soon as possible.
     """
 
     def __init__(
@@ -141,7 +139,7 @@ class OpenBody:
 
     @staticmethod
     def clock() -> float:
-        """Seconds on the body's clock, ``time.monotonic``; virtual boards' frames are put on it, too."""
+        """Seconds on the body's clock, ``time.monotonic``, also for virtual boards' frames."""
         return time.monotonic()
 
     def _read(self, reader: LinkReader) -> None:
@@ -169,8 +167,7 @@ class OpenBody:
         return self._snapshot()
 
     def read(self, timeout: float = 1.0) -> Snapshot:
-        """All links, each with a frame scanned after this call; a link without one within ``timeout`` seconds is
-        returned as it is then, as its state and age show."""
+        """All links, each with a frame scanned after this call, or in its state after ``timeout`` seconds."""
         timeout = checked(timeout)
         self._changes.check_open()
         asked = {name: reader.ask() for name, reader in self._readers.items()}
@@ -185,8 +182,8 @@ class OpenBody:
         return self.latest()
 
     def next(self, timeout: float = 1.0) -> Snapshot:
-        """The newest snapshot in which a link has a newer frame or another state than in the last one returned here.
-        Raises :class:`ReadTimeout` if nothing changes for ``timeout`` seconds, for instance when every link is lost."""
+        """The newest snapshot in which a link has a newer frame or another state than in the last one returned. Raises
+        :class:`ReadTimeout` if nothing changes for ``timeout`` seconds."""
         timeout = checked(timeout)
         with self._changes.condition:
             if not self._changes.wait_for(lambda: self._changes.count > self._given, timeout):
@@ -195,8 +192,7 @@ class OpenBody:
         return self.latest()
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> SnapshotBatch:
-        """All snapshots of the next ``max_s`` seconds, with their frames as arrays, after waiting up to ``timeout``
-        seconds for the first."""
+        """All snapshots of the next ``max_s`` seconds, after waiting up to ``timeout`` seconds for the first."""
         max_s = checked_span(max_s)
         with self.subscribe() as queue:
             found = [queue.next(timeout)]
@@ -218,7 +214,7 @@ class OpenBody:
             yield self._newest()
 
     async def __aiter__(self) -> AsyncIterator[Snapshot]:
-        """The newest snapshot in ``async for``, forever, at every change or once per second."""
+        """The newest snapshot in ``async for``, as in :meth:`__iter__`."""
         while True:
             yield await asyncio.to_thread(self._newest)
 
@@ -266,7 +262,7 @@ class SnapshotQueue:
         self._changes = changes
         self._waiting: collections.deque[Snapshot] = collections.deque(maxlen=maxsize)
         self.dropped = 0
-        """Snapshots dropped because they were not read in time."""
+        """Snapshots that were not read in time."""
 
     def put(self, snapshot: Snapshot) -> None:
         """Add a snapshot; the caller holds the condition of the body's changes."""
@@ -280,7 +276,6 @@ class SnapshotQueue:
             return self._waiting.popleft()
 
     def _wait(self, timeout: float) -> None:
-        """Wait for a snapshot."""
         with self._changes.condition:
             self._changes.wait_for(lambda: self._waiting, timeout)
             self._changes.check_open()
@@ -308,18 +303,17 @@ class SnapshotQueue:
 
 
 class _Changes:
-    """Changes of an open body, for waiting threads; after its end nothing waits."""
+    """Changes of an open body, for waiting threads."""
 
     def __init__(self) -> None:
         self.condition = threading.Condition()
         self.closed = threading.Event()  # beside the condition: no change of a link wakes the other links' threads
         self.count = 0
-        """Changes so far."""
         self._queues: list[SnapshotQueue] = []
         self._inherited = False
 
     def announce(self, snapshot: Callable[[], Snapshot]) -> None:
-        """Count a change; the snapshot is made only if there is a queue for it."""
+        """Count a change; the snapshot is made only for a queue."""
         with self.condition:
             self.count += 1
             taken = snapshot() if self._queues else None
@@ -329,19 +323,16 @@ class _Changes:
             self.condition.notify_all()
 
     def wait_for(self, happened: Callable[[], object], timeout: float | None = None) -> bool:
-        """Wait until this has happened or the body is closed; False after ``timeout`` seconds."""
         with self.condition:
             return bool(self.condition.wait_for(lambda: self.closed.is_set() or happened(), timeout))
 
     def check_open(self) -> None:
-        """Raises :class:`BoardClosed`."""
         if self._inherited:
             raise BoardClosed(f"this body {forks.ELSEWHERE}")
         if self.closed.is_set():
             raise BoardClosed("this body was closed; open it again")
 
     def subscribe(self, maxsize: int) -> SnapshotQueue:
-        """Add a queue. Raises :class:`BoardClosed`."""
         self.check_open()
         queue = SnapshotQueue(self, maxsize)
         with self.condition:
@@ -349,19 +340,16 @@ class _Changes:
         return queue
 
     def unsubscribe(self, queue: SnapshotQueue) -> None:
-        """Remove a queue."""
         with self.condition:
             if queue in self._queues:
                 self._queues.remove(queue)
 
     def close(self) -> None:
-        """End the body."""
         with self.condition:
             self.closed.set()
             self.condition.notify_all()
 
     def forked(self) -> None:
-        """Close it in a child process, with fresh locks."""
         self.condition, self.closed = threading.Condition(), threading.Event()
         self.closed.set()
         self._inherited = True

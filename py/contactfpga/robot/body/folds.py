@@ -1,7 +1,6 @@
 """Cells that the folding cover presses at a joint: learned with nobody near, per joint angle, then marked.
 
-By cells, not zones: a finger beside a crease makes one zone with it, whose area and barycenter differ little from the
-crease's.
+Folds are by cells, as a finger beside a crease makes one zone with it.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ STEP_RAD = 0.05
 """Resolution of angles."""
 MAX_BYTES = 20_000_000
 MAX_STEPS = 10_000
-"""Most steps of an angle, each with a sheet of cells; a full turn needs 126."""
+"""Most steps of an angle; a full turn needs 126."""
 
 Cells = NDArray[np.bool_]
 
@@ -40,17 +39,17 @@ class Folds:
     lines: tuple[int, int]
     """Rows and columns."""
     frames: dict[int, int]
-    """Frames seen, by the number of the step."""
+    """Frames seen, by step number."""
     cells: dict[int, Cells]
-    """(rows, columns) cells pressed in any of them, by the number of the step."""
+    """(rows, columns) cells pressed in any of these frames, by step number."""
 
     def step_of(self, angle_rad: float) -> int:
-        """The number of an angle's step."""
+        """Number of an angle's step."""
         return math.floor(angle_rad / self.step_rad)
 
     def share(self, angle_rad: float, zone: Cells) -> float | None:
-        """The share of a zone's cells that the fold presses at this angle. None: nothing was learned at this angle, or
-        the zone has no cells."""
+        """Share of a zone's cells that the fold presses at this angle; None if nothing was learned there, or without
+        cells."""
         # The steps beside it count nothing: with them twice as many fingers that touch a crease pass for it.
         step = self.step_of(angle_rad)
         if not self.frames.get(step) or not zone.any():
@@ -78,7 +77,7 @@ class Folds:
 
 
 def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = STEP_RAD) -> Folds:
-    """Folds from angles in rad and their frames, taken with nobody near. Raises :class:`BodyError` for frames without
+    """Folds from angles in rad and frames, taken with nobody near. Raises :class:`BodyError` for frames without
     cells."""
     if not is_finite(step_rad) or not 1e-4 <= step_rad <= 1:
         raise BodyError(f"step_rad is {shown(step_rad)}; it must be a number from 0.0001 to 1")

@@ -11,13 +11,13 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.robot.body.state import BodyError, NoJoints
 
 Joints = Callable[[float], Mapping[str, float]]
-"""From a time on the host's clock, in s, to the angles in rad, in m for prismatic joints."""
+"""From a time on the host's clock in s to angles in rad, or m for prismatic joints."""
 
 
 class JointHistory:
     """The robot's joint angles of the last seconds, interpolated. Thread-safe.
 
-    Call ``history.add(time.monotonic(), {"elbow": 0.3})`` for every report of the robot; pass it as
+    Call ``history.add(time.monotonic(), {"elbow": 0.3})`` for every report of the robot; pass it to
     ``body.open(history)``.
     """
 

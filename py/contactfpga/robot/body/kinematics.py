@@ -52,7 +52,7 @@ class Pose:
 
 
 def rotation_about(axis: Vector | Floats, angle_rad: float) -> Floats:
-    """(3, 3): the rotation about a unit vector, by Rodrigues."""
+    """(3, 3) rotation about a unit vector, by Rodrigues."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], float)
     return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1 - math.cos(angle_rad)) * (cross @ cross))
@@ -67,7 +67,7 @@ class Joint:
 
     name: str
     kind: str
-    """Kind of joint: one of :data:`MOVING`, or ``fixed``."""
+    """One of :data:`MOVING`, or ``fixed``."""
     parent: str
     child: str
     origin: Pose
@@ -75,7 +75,7 @@ class Joint:
     axis: Floats
     """(3,): unit vector in the child's frame; 0 if fixed."""
     mimic: tuple[str, float, float] | None = None
-    """The joint that it follows, with factor and offset."""
+    """Joint that this one follows, with factor and offset."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,7 +105,6 @@ class Kinematics:
             self._chains[joint.child] = [*self._chains[joint.parent], joint]
 
     def _master(self, joint: Joint) -> tuple[str, float, float]:
-        """The joint that moves this one, with factor and offset."""
         factor, offset, seen = 1.0, 0.0, {joint.name}
         while joint.mimic is not None:
             name, times, plus = joint.mimic
@@ -117,7 +116,6 @@ class Kinematics:
         return joint.name, factor, offset
 
     def _from_root(self) -> list[Joint]:
-        """All joints, each after its parent's."""
         hanging: dict[str, list[Joint]] = {}
         for joint in self.robot.joints.values():
             hanging.setdefault(joint.parent, []).append(joint)
@@ -143,15 +141,15 @@ class Kinematics:
         return found
 
     def poses(self, angles: Mapping[str, float]) -> dict[str, Pose]:
-        """The poses of all links, as fast as one of the farthest."""
+        """Poses of all links, as fast as that of the farthest."""
         found = {self.robot.root: Pose.of()}
         for joint in self._order:
             found[joint.child] = found[joint.parent] @ joint.origin @ self._moved(joint, angles)
         return found
 
     def jacobian(self, link: str, point_m: Floats, angles: Mapping[str, float]) -> Floats:
-        """(6, n): motion in the base frame of a point of the link, given in the base frame, with each of
-        :attr:`joint_names`: three rows of its velocity, three of the link's angular velocity."""
+        """(6, n): velocity, then the link's angular velocity, of a point of the link with each of :attr:`joint_names`,
+        all in the base frame."""
         found = np.zeros((6, len(self.joint_names)))
         columns = {name: number for number, name in enumerate(self.joint_names)}
         pose = Pose.of()

@@ -16,13 +16,12 @@ from contactfpga.robot.body.state import BodyError
 ROBOT = "robot"
 """Name of the texts in a recording."""
 TOML = "toml"
-"""Name of the robot's table; other texts are named by the place of their file's name in it."""
+"""Name of the robot's table among the texts."""
 FILES = ("skin", "units", "folds", "surface")
-"""Keys of a link's files."""
 
 
 def pack(path: str | Path) -> dict[str, str]:
-    """The texts, by name, of a file that :meth:`Body.load` has read. Raises OSError."""
+    """Texts by name, of a file that :meth:`Body.load` has read. Raises OSError."""
     path = Path(path)
     text = path.read_text(encoding="utf-8")
     found = {TOML: text}
@@ -33,8 +32,8 @@ def pack(path: str | Path) -> dict[str, str]:
 
 
 def unpack(texts: Mapping[str, str], folder: Path) -> Body:
-    """The body from its texts, with files in this folder, which must stay while the robot's meshes are needed. Raises
-    :class:`BodyError` if a text is missing, or not from :func:`pack`."""
+    """The body from its texts, with files in this folder, which must stay while meshes are needed. Raises
+    :class:`BodyError` for texts that are not from :func:`pack`."""
     try:
         values = tomlfile.parse(texts[TOML].encode(), "robot.toml", BodyError)
         for number, (table, key, name) in enumerate(_files(values)):
@@ -49,7 +48,6 @@ def unpack(texts: Mapping[str, str], folder: Path) -> Body:
 
 
 def _files(values: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str, str]]:
-    """Each table and key that names a file, and the name of its text."""
     if "urdf" in values:
         yield values, "urdf", "urdf"
     for number, link in enumerate(values.get("links", ())):

@@ -50,20 +50,19 @@ class Plan:
     pose: Pose
     """Pose of the surface's frame in the link's."""
     mirrored: bool
-    """Whether columns run the other way: x counts from the last one."""
+    """Whether x counts from the last column."""
     surface: PlaneSurface | CylinderSurface | Cone | Mesh
     units: LoadCells | None
     friction: float
     late_s: float
-    """Age in s from which the newest frame no longer counts as current."""
+    """Age from which the newest frame is not current."""
     silent_s: float
-    """Time without a frame, in s, from which the link is silent."""
+    """Time without a frame from which the link is silent."""
     folds: Folds | None = None
-    """Cells that the folding cover presses."""
     pressed: Pressed | None = None
     """Places under the Skin's cover; None if it knows no force."""
     trust: bool = False
-    """Whether the Skin files of its port may name modules, as those of :meth:`contactfpga.robot.body.Body.load`."""
+    """Whether Skin files of the port may name modules."""
 
     @property
     def laid(self) -> Surface:
@@ -72,13 +71,13 @@ class Plan:
         return MirroredSurface(self.surface, width_mm) if self.mirrored else self.surface
 
     def place(self, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
-        """Point in m and outward normal, in the link's frame, of a place on its sheet."""
+        """Point in m and outward normal, in the link's frame, of a place on the sheet."""
         point_mm, normal = self.laid.place(x_mm, y_mm)
         return vector(self.pose.apply(1e-3 * np.array(point_mm))), vector(self.pose.turn(np.array(normal)))
 
     @property
     def virtual(self) -> bool:
-        """Whether its board runs in simulated time."""
+        """Whether the board runs in simulated time."""
         return self.port is not None and self.port.startswith("sim:")
 
     @property
@@ -98,7 +97,7 @@ class Plan:
 
 
 def read(values: Any, folder: Path) -> Plan:
-    """Read one table of links; paths are relative to ``folder``. Raises :class:`BodyError`, OSError."""
+    """One table of links; paths are relative to ``folder``. Raises :class:`BodyError`, OSError."""
     if not isinstance(values, dict):
         raise BodyError(f"a link is {shown(values)}; it must be a table, [[links]]")
     name = text(values, "name")
@@ -154,7 +153,7 @@ def _pressed(skin: Skin, path: Path) -> Pressed | None:
 
 
 def _port(values: dict[str, Any], skin_path: Path) -> str | None:
-    """The address of the port; a virtual board without a Skin gets the link's."""
+    """Address of the port; a virtual board without a Skin gets the link's."""
     if "port" not in values:
         return None
     port = text(values, "port")
@@ -189,8 +188,7 @@ def _surface(values: Any, skin: Skin, folder: Path) -> PlaneSurface | CylinderSu
 
 
 def text(values: Mapping[str, Any], key: str, usual: str | None = None) -> str:
-    """The text of this key, or ``usual``; raises :class:`BodyError` if it is not a text, or missing without a
-    default."""
+    """The text of this key, or ``usual``. Raises :class:`BodyError` if it is missing or no text."""
     found = values.get(key, usual)
     if found is None:
         raise BodyError(f"{key} is missing")

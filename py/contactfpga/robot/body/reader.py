@@ -1,4 +1,4 @@
-"""One link's board, opened, read, and reopened after a loss; and the knowledge of the link."""
+"""One link's board: opened, read, and reopened after a loss."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _lock(port: str | None) -> contextlib.AbstractContextManager[None]:
 
 
 class _PortLock:
-    """A lock for searches, which open every free port: meanwhile no other link can open its own, nor search."""
+    """A lock for searches, which open every free port: meanwhile no other link opens its own."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -45,7 +45,7 @@ class _PortLock:
 
     @contextlib.contextmanager
     def shared(self) -> Iterator[None]:
-        """Hold the lock for a link with a port. A waiting search goes first, lest it wait forever."""
+        """Hold the lock for a link with a port; a waiting search goes first."""
         with self._changed:
             self._changed.wait_for(lambda: not self._alone and not self._waiting)
             self._shared += 1
@@ -58,7 +58,6 @@ class _PortLock:
 
     @contextlib.contextmanager
     def exclusive(self) -> Iterator[None]:
-        """Hold the lock for a search."""
         with self._changed:
             self._waiting += 1
             self._changed.wait_for(lambda: not self._alone and not self._shared)
@@ -82,7 +81,7 @@ LAG_S = 0.02
 
 
 class SharedClock:
-    """Distributes simulated time to boards: at the rate of real time, and in step. Thread-safe."""
+    """Gives boards simulated time at the rate of real time, and in step. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float]):
         self._clock = clock
@@ -92,7 +91,7 @@ class SharedClock:
         self._now_s: dict[str, float] = {}  # on the common clock, of each board
 
     def join(self, link: str, board_s: float) -> None:
-        """Add a board with this reading of its own clock; it starts at the others' time."""
+        """Add a board whose own clock reads ``board_s``; it starts at the others' time."""
         with self._lock:
             now_s = min(self._now_s.values(), default=self._clock() - self._began_s)
             self._joined_s[link], self._now_s[link] = now_s - board_s, now_s
@@ -124,22 +123,20 @@ class LinkMemory:
     """State of a link between events."""
 
     opened: bool = False
-    """Whether a board is open."""
     open_s: float = -math.inf
-    """Time of opening."""
     zones: Zones | None = None
     tracks: Tracks = NO_TRACKS
     frame_s: float = -math.inf
-    """Scan time of the newest frame ever, on the body's clock."""
+    """Scan time of the newest frame ever on the body's clock."""
     came_s: float = -math.inf
-    """Scan time of the newest frame ever, on that board's own clock."""
+    """Scan time of the newest frame ever on its board's clock."""
     down: str = "lost"
-    """Status while no board is open."""
+    """Status without a board."""
     reason: str = "it was not tried yet"
-    """Reason why none is open."""
+    """Reason for this status."""
 
     def state(self, plan: Plan, now: float, board_s: float | None) -> LinkState:
-        """The state at a moment; ``board_s``: the moment on a virtual board's clock, None for others."""
+        """State at a moment; ``board_s`` is the moment on a virtual board's clock, None for others."""
         age_s = None if self.frame_s == -math.inf else now - self.frame_s
         if not self.opened:
             return LinkState(None, age_s, self.down, self.reason)
@@ -156,7 +153,7 @@ class LinkMemory:
 
 
 Observation = tuple[LinkMemory, float | None]
-"""The knowledge, and a virtual board's clock at that time."""
+"""Memory of a link, and a virtual board's clock at that time."""
 
 
 class States(Mapping[str, LinkState]):
@@ -177,7 +174,6 @@ class States(Mapping[str, LinkState]):
 
 
 RETRY_S = 0.5
-"""Delay before another attempt to open a board."""
 WAIT_S = 0.1
 """Longest wait for a board at a time."""
 
@@ -196,7 +192,7 @@ class OpenBoard(Protocol):
 
     @property
     def name(self) -> str:
-        """Name in the Skin that it was built from; "" if unnamed."""
+        """Name in its Skin; "" if unnamed."""
 
     @property
     def stats(self) -> Stats:
@@ -207,7 +203,7 @@ class OpenBoard(Protocol):
 
 
 class LinkReader:
-    """The knowledge of one link. One thread calls :meth:`step`, any thread :meth:`state`."""
+    """Reads one link. One thread calls :meth:`step`, any thread :meth:`state`."""
 
     def __init__(
         self,
@@ -220,9 +216,9 @@ class LinkReader:
         self.plan = plan
         self._shared_clock = shared_clock if plan.virtual else None
         self.tried = False
-        """Whether opening was attempted, with or without success."""
+        """Whether opening was attempted."""
         self.answered = 0
-        """The last call of :meth:`ask` since which a frame was scanned."""
+        """The last :meth:`ask` since which a frame was scanned."""
         self._opened, self._clock = opened, clock
         self._lock = threading.Lock()
         self._asked = 0
@@ -239,7 +235,7 @@ class LinkReader:
             return self._asked
 
     def step(self) -> float:
-        """Do what is due, for little more than :data:`WAIT_S`; returns the seconds until something is due."""
+        """Do what is due, for little more than :data:`WAIT_S`; returns the seconds until the next call."""
         if self._board is None:
             wait_s = self._retry_at - self._clock()
             if wait_s > 0:
@@ -268,7 +264,6 @@ class LinkReader:
         return 0.0
 
     def _let_pass(self, seconds: float) -> None:
-        """Let simulated time pass, and read all its frames."""
         assert self._board is not None
         until_s = self._board.clock() + seconds
         while (left_s := until_s - self._board.clock()) > 0 and self._asked == self.answered:
@@ -330,11 +325,11 @@ class LinkReader:
             self._retry_at = self._clock() + RETRY_S
 
     def close(self) -> None:
-        """Release the port; the thread that calls :meth:`step` has ended."""
+        """Release the port, after the thread that calls :meth:`step` has ended."""
         self._drop("lost", BoardClosed("the body was closed"))
 
     def observe(self) -> Observation:
-        """The current knowledge, from which :class:`States` are made."""
+        """The current memory, for :class:`States`."""
         if self._shared_clock is None:
             return self._known, None
         with self._lock:  # a board that is open stays so meanwhile

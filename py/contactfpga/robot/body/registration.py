@@ -22,11 +22,11 @@ from contactfpga.zones.zone import Zones
 
 KEYS = ("point_m", "normal", "pressed_mm")
 CLEARER = 2.0
-"""Required ratio of residuals between the two mounting hypotheses."""
+"""Least ratio of residuals between the two ways of mounting."""
 LARGEST_RAD = 0.35
 """Largest accepted standard deviation of the angles."""
 HELD_S = 0.3
-"""Time for which a point must be pressed, with one constant zone."""
+"""Time for which a point must be pressed with one constant zone."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Press:
     point_m: tuple[float, float, float]
     """Point in the link's frame."""
     normal: tuple[float, float, float] | None = None
-    """Outward unit normal; None: unknown."""
+    """Outward unit normal; None if unknown."""
     pressed_mm: tuple[float, float] | None = None
-    """x and y of the zone; None: not pressed yet."""
+    """x and y of the zone; None before the press."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Registration:
     other_mm: float
     """RMS residual of the other way of mounting."""
     sigma_mm: float
-    """Standard deviation of the sheet's middle, by the cells' size and the number of points."""
+    """Standard deviation of the sheet's middle."""
     sigma_rad: float
     """Standard deviation of the least certain angle."""
     turned_rad: float
@@ -65,7 +65,7 @@ class Registration:
         return math.sqrt(sum(one * one for one in self.residuals_mm) / len(self.residuals_mm))
 
     def to_toml(self) -> str:
-        """Lines for the link's table."""
+        """Lines for the link's table in `robot.toml`."""
         point, rpy = (
             "[" + ", ".join(f"{value + 0.0:.6g}" for value in values) + "]"
             for values in (self.pose.point_m.tolist(), self.pose.rpy_rad)
@@ -74,7 +74,7 @@ class Registration:
 
 
 def register(plan: Plan, presses: Sequence[Press]) -> Registration:
-    """The best-fitting pose and way of mounting. Raises :class:`BodyError` if the points are ambiguous."""
+    """The best-fitting pose and way of mounting. Raises :class:`BodyError` for ambiguous points."""
     if len(presses) < 3:
         raise BodyError(f"{len(presses)} points were pressed; a pose takes at least 3")
     fits = {mirrored: _fit(plan, presses, mirrored) for mirrored in (False, True)}
@@ -101,7 +101,7 @@ def register(plan: Plan, presses: Sequence[Press]) -> Registration:
 
 
 def _fit(plan: Plan, presses: Sequence[Press], mirrored: bool) -> tuple[Pose, Floats, float]:
-    """Pose, residuals in mm with those of normals as lengths, and the lever in mm of the least certain angle."""
+    """Pose, residuals in mm, and lever in mm of the least certain angle."""
     surface = dataclasses.replace(plan, mirrored=mirrored).laid
     places = [_placed(surface, press) for press in presses]
     ours = np.array([place[0] for place in places]) / 1000
@@ -164,7 +164,7 @@ def _numbers(values: dict[str, Any], key: str, count: int, where: str) -> Any:
 
 
 def held(frames: Iterable[Zones], skin_pitch_mm: float) -> tuple[float, float]:
-    """The place in mm of a single zone that stayed for :data:`HELD_S`; consumes the frames until then."""
+    """Place in mm of a single zone that stayed for :data:`HELD_S`."""
     kept: list[tuple[int, float, float]] = []
     around_mm: float | None = None
     for zones in frames:

@@ -1,4 +1,4 @@
-"""All links of a body at one moment, and their contacts: place, age, with units force; as arrays, and counted."""
+"""All links of a body at one moment, and their contacts: place, age, and with units force."""
 
 from __future__ import annotations
 
@@ -33,43 +33,39 @@ class LinkContact:
     link: str
     """Name of the link in `robot.toml`."""
     frame: str
-    """The frame of point, normal and force: ``base``, or the link's."""
+    """Frame of point, normal and force: ``base``, or the link's."""
     time_us: int
-    """Device time of its frame."""
+    """Device time of the frame."""
     host_time_s: float
-    """Time of its frame on the body's clock."""
+    """Time of the frame on the body's clock."""
     time_sigma_s: float | None
     """Standard deviation of ``host_time_s``; None if unknown."""
     point_m: Vector | None
-    """Place of the contact. None for a zone that goes all the way round a closed sheet, or has no cells, which happens
-    only in a frame flagged ``mismatch``."""
+    """Place of the contact; None for a zone all the way round a closed sheet, or in a frame flagged ``mismatch``."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
-    """(3, 3) covariance of the point, from the size of a cell along the surface, and in the base frame also from the
-    joints' motion within ``time_sigma_s``. None as ``point_m``, and if the angles around the frame's time are
-    unknown."""
+    """(3, 3) covariance of the point, from the size of a cell and in the base frame also from the joints' motion within
+    ``time_sigma_s``. None as ``point_m``, and for unknown angles around the frame's time."""
     zone: Zone
     flags: frozenset[str]
-    """Flags of its frame."""
+    """Flags of the frame."""
     force_n: Vector | None = None
     """Force on the link; None without units, or before their readings arrive."""
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
     track: int | None = None
-    """Id that stays with the contact, unique on this link; None for a zone without a place, or in frames that were not
-    tracked."""
+    """Id that stays with the contact, unique on this link; None without a place or tracking."""
     fold: float | None = None
-    """Share of its cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody touches.
-    None if nothing was learned here, or the angle is unknown."""
+    """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody
+    touches. None if unknown."""
 
     _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
 
     @property
     def interval_n(self) -> tuple[float, float | None] | None:
-        """Least and largest push, which contain it in at least 95 of 100 cases; the second is None if unbounded. None
-        as ``force_n``. With three contacts or more it may raise :class:`~contactfpga.MissingExtra` without
-        ``haptics``."""
+        """Least and largest push, which contain the push in at least 95 of 100 cases; the second is None if unbounded.
+        None as ``force_n``. Raises :class:`~contactfpga.MissingExtra` if three contacts or more need ``haptics``."""
         return None if self._felt is None else self._felt.interval_n
 
     def moved(self, pose: Pose, frame: str) -> LinkContact:
@@ -92,7 +88,7 @@ class LinkContact:
         return dataclasses.replace(self, covariance_m2=self.covariance_m2 + np.outer(way, way))
 
     def to_dict(self) -> dict[str, object]:
-        """All fields in plain Python values, ready for JSON."""
+        """All fields as plain Python values, ready for JSON."""
         names = [field.name for field in dataclasses.fields(self) if field.name != "_felt"]
         values = {name: getattr(self, name) for name in (*names, "interval_n")}
         spread = None if self.covariance_m2 is None else self.covariance_m2.tolist()
@@ -101,7 +97,7 @@ class LinkContact:
 
 
 def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[LinkContact]:
-    """The contacts in the link's frame, one per zone; with the joints' angles, including their fold shares."""
+    """The contacts in the link's frame, one per zone; with joint angles, also their fold shares."""
     zones = state.zones
     assert zones is not None
     assert state.frame_s is not None
@@ -122,7 +118,6 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
 
 
 def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContact]:
-    """The contacts with forces, if readings and places are known."""
     forces = forces_of(plan, zones) if found else None
     if forces is None:
         return found
@@ -133,7 +128,7 @@ def _felt(plan: Plan, zones: Zones, found: list[LinkContact]) -> list[LinkContac
 
 
 def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics.Contacts | None:
-    """The forces at the zones of a frame, in the link's frame; None without readings, or if a zone has no place."""
+    """Forces at the zones of a frame; None without readings, or if a zone has no place."""
     if plan.units is None or zones.units is None:
         return None
     touches = []
@@ -152,7 +147,6 @@ def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics
 
 
 def _sharper(pressed: Pressed, zone: Zone, found: haptics.Contact) -> haptics.Touch:
-    """The touch with a place refined by the zone's size and the push."""
     sigma_m = pressed.sigma_m(zone.area_cells, found.normal_n or 0.0)
     return found.touch if sigma_m is None else dataclasses.replace(found.touch, point_sigma_m=sigma_m)
 
@@ -200,7 +194,7 @@ class Snapshot:
 
     @functools.cached_property
     def links(self) -> dict[str, LinkState]:
-        """The state of each link by name."""
+        """State of each link by name."""
         return dict(self._links)
 
     def _look_up(self, name: str, joints: Joints) -> None:
@@ -223,8 +217,8 @@ class Snapshot:
         """The contacts on all links, or on these.
 
         Raises :class:`NoLinkData` if one of them is not ok, because no data is never no contact;
-        ``links=snapshot.answering`` takes only the others. In the base frame it raises :class:`NoJoints` if the angles
-        at a frame's time are unknown.
+        ``links=snapshot.answering`` takes only the others. In the base frame it raises :class:`NoJoints` for unknown
+        angles.
 
         Args:
             frame: ``base``, or ``link`` for each in the frame of its own link.
@@ -258,8 +252,8 @@ class Snapshot:
         return [one.less_certain(other, pose) for one in moved]
 
     def jacobian(self, one: LinkContact) -> Floats:
-        """(6, n): motion of the contact's point, as part of its link, with each of :attr:`joint_names`, in the base
-        frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
+        """(6, n): velocity, then angular velocity, of the contact's point with each of :attr:`joint_names`, in the base
+        frame. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
         if one.point_m is None:
             raise BodyError(f"a contact on link {shown(one.link)} has no place, so nothing says how it moves")
@@ -288,7 +282,6 @@ class Snapshot:
         return found
 
     def _repr_html_(self) -> str:
-        """Every link's sheet in a notebook, with its state."""
         rows = [[name, str(state)] for name, state in self.links.items()]
         drawn = [(name, state.zones.svg(LINK_PX)) for name, state in self.links.items() if state.zones is not None]
         return notebook.table(["link", "state"], rows, f"At {self.host_time_s:.3f} s") + notebook.beside(drawn)
@@ -311,7 +304,7 @@ def _angles(joints: Joints, host_time_s: float) -> Angles:
 
 @dataclasses.dataclass
 class BodyStats(Stats):
-    """Counters of all links together since opening. They continue over a board's return."""
+    """Counters of all links together since opening; they continue over a board's return."""
 
     links: dict[str, Stats] = dataclasses.field(default_factory=dict)
     """Counters of each link."""
@@ -331,7 +324,7 @@ class SnapshotBatch(Sequence["Snapshot"]):
     def __init__(self, snapshots: Iterable[Snapshot]):
         self._snapshots = tuple(snapshots)
         self.links: dict[str, Batch] = {}
-        """Every frame of each link once, in order, as :class:`~contactfpga.Batch`; links without frames are omitted."""
+        """Every frame of each link once, in order, as :class:`~contactfpga.Batch`; links without frames are absent."""
         for name in self._snapshots[0].links:
             frames = _frames(name, self._snapshots)
             if frames:

@@ -1,4 +1,4 @@
-"""The state of a link: its newest frame, and whether it is current; and the errors of a body."""
+"""The state of a link: its newest frame, and whether it is current; and a body's errors."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from contactfpga.zones.zone import Zones
 
 
 class BodyError(ContactFPGAError, ValueError):
-    """An impossible robot, link, joint or place; the message names the value and the limit."""
+    """An impossible robot, link, joint or place."""
 
 
 class NoJoints(ContactFPGAError):
-    """The joint angles at a frame's time are unknown, so its contacts have no place in the base frame."""
+    """Unknown joint angles at a frame's time, so that its contacts have no place in the base frame."""
 
 
 class NoLinkData(NoData):
@@ -35,19 +35,18 @@ class LinkState:
     """The knowledge of a link at one moment."""
 
     zones: Zones | None
-    """Its newest frame; None unless it is ok or late, because older frames are not current."""
+    """The link's newest frame; None unless the link is ok or late."""
     age_s: float | None
-    """Time since its newest frame ever was scanned, on the body's clock; None without one."""
+    """Time since the link's newest frame ever was scanned; None without one."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
-    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
-    there."""
+    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version."""
     reason: str = ""
-    """Reason why it is not ok."""
+    """Reason why the link is not ok."""
     frame_s: float | None = None
     """Scan time of the frame, on the body's clock."""
     tracks: Tracks | None = None
-    """Its contacts over the frames read, as :class:`~contactfpga.Tracker` follows them."""
+    """Contacts over the frames read, as :class:`~contactfpga.Tracker` follows them."""
 
     def __str__(self) -> str:
         age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"

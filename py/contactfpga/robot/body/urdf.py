@@ -22,13 +22,12 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 20_000_000
 MAX_LINKS = 1000
-"""Most links, and most joints."""
 PACKAGE = "package://"
 
 
 def located(urdf: str, folder: Path) -> Path:
-    """The file named in a robot's table: a path, relative to ``folder``, or ``package://NAME/PATH`` in an installed
-    Python package. Raises :class:`BodyError`."""
+    """The file named in a robot's table: a path relative to ``folder``, or ``package://NAME/PATH`` in an installed
+    package. Raises :class:`BodyError`."""
     if not urdf.startswith(PACKAGE):
         return folder / urdf
     name, _, inside = urdf.removeprefix(PACKAGE).partition("/")
@@ -130,7 +129,7 @@ def _text(element: ElementTree.Element, key: str, where: str) -> str:
 
 
 def vector(element: ElementTree.Element | None, key: str, where: str, usual: str = "0 0 0") -> Vector:
-    """Three numbers, by default ``usual``; ``where``: their owner. Raises :class:`BodyError`."""
+    """Three numbers, by default ``usual``, that belong to ``where``. Raises :class:`BodyError`."""
     text = usual if element is None else element.get(key, usual)
     parts = text.split()
     if len(parts) != 3:

@@ -1,7 +1,6 @@
 """Forces at the zones with their uncertainty, from pressure units under the bumper.
 
-SI units, in the link's frame. A wrench is exerted by contacts on the link; normals point outward; pushes are at least
-0.
+Units are SI, in the link's frame. Contacts exert a wrench on the link; normals point outward; pushes are at least 0.
 """
 
 from contactfpga.robot.haptics.calibrate import Calibration, Drift, DriftWatch, calibrate

@@ -1,4 +1,4 @@
-"""Answers for many frames at once, as arrays. Needs numpy alone."""
+"""Answers for many frames at once, as arrays."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from contactfpga.surfaces.shapes import Floats
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:
-    """Centers of pressure (m, 3) in m, in the link's frame, of (m, 6) wrenches in N and Nm; NaN for a wrench that does
-    not push."""
+    """(m, 3) centers of pressure of (m, 6) wrenches in N and Nm; NaN without push."""
     fx, fy, fz, mx, my, mz = np.asarray(wrenches, float).T
     with np.errstate(invalid="ignore", divide="ignore"):
         if isinstance(surface, Plane):
@@ -32,7 +31,7 @@ def _on_cylinder(surface: Cylinder, fx: Floats, fy: Floats, fz: Floats, mx: Floa
 
 
 def one(wrenches: Floats, points: Floats, noise: Noise | None = None) -> Floats:
-    """Forces (m, 3) in N of one contact for each of (m, 6) wrenches, at known points (m, 3) in m."""
+    """(m, 3) forces of one contact for each of (m, 6) wrenches, at known (m, 3) points."""
     wrenches, points = np.asarray(wrenches, float), np.asarray(points, float)
     if noise is None:
         return wrenches[:, :3].copy()
@@ -44,9 +43,11 @@ def one(wrenches: Floats, points: Floats, noise: Noise | None = None) -> Floats:
 def two(
     wrenches: Floats, points: Floats, normals: Floats, friction: float, noise: Noise | None = None
 ) -> tuple[Floats, Floats]:
-    """Forces (m, 2, 3) and intervals of the pushes (m, 2, 2) at two known points (m, 2, 3) with outward unit normals
-    (m, 2, 3). Unbounded pushes are infinite. NaN if friction allows no forces; :func:`contacts` gives details. The
-    intervals exclude the units' noise."""
+    """(m, 2, 3) forces and (m, 2, 2) intervals of the pushes at two known points.
+
+    ``points`` and outward unit ``normals`` are (m, 2, 3). Unbounded pushes are infinite; NaN stands where friction
+    allows no forces. Intervals exclude the units' noise.
+    """
     wrenches, points, normals = (np.asarray(each, float) for each in (wrenches, points, normals))
     away = points[:, 0] - points[:, 1]
     along = away / np.linalg.norm(away, axis=1)[:, None]
@@ -98,7 +99,7 @@ def _least_norm(wrenches: Floats, points: Floats, along: Floats, noise: Noise | 
 
 
 def _allowed(starts: Floats, sides: Floats, push: Floats, more: Floats, friction: float) -> tuple[Floats, Floats]:
-    """(m, 2) each: the squeezes that friction allows at each contact; NaN if none."""
+    """(m, 2) least and largest squeezes that friction allows; NaN if none."""
     wide = 1 + friction**2
     square = 1 - wide * more**2
     square = np.where(np.abs(square) < 1e-12, 1e-12, square)

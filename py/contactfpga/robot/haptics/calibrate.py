@@ -1,5 +1,4 @@
-"""Calibration by known loads: the matrix from readings to wrench, and undetermined directions; and the drift of the
-units' zeros, watched while nothing touches."""
+"""Calibration of units by known loads, and the drift of their zeros while nothing touches."""
 
 from __future__ import annotations
 
@@ -16,11 +15,11 @@ SEEN = 1e-6
 """Share of the largest load below which a direction counts as not loaded."""
 
 NOISE = 5.0
-"""Required variation, in multiples of its noise, of a combination of readings to count as loaded."""
+"""Variation of a combination of readings that counts as loaded, in multiples of its noise."""
 
 
 PER_UNIT = 10
-"""Loads per unit from which their noise covariance is estimated."""
+"""Loads per unit from which the noise covariance is estimated."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Calibration:
     """Result of known loads."""
 
     cells: LoadCells
-    """The units with the fitted matrix and zeros, and with :data:`PER_UNIT` loads a unit the noise covariance."""
+    """Units with the fitted matrix and zeros, and from :data:`PER_UNIT` loads a unit on with the noise covariance."""
     rank: int
     """Independent loads; 6 are complete."""
     missing: tuple[str, ...]
@@ -40,7 +39,7 @@ class Calibration:
 
 
 def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
-    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions orthogonal to all; moments are divided by ``length_m``."""
+    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions orthogonal to all; ``length_m`` divides moments."""
     scaled = np.atleast_2d(loads) / np.array([1, 1, 1, length_m, length_m, length_m])
     _, values, right = np.linalg.svd(scaled)
     rank = int((values > SEEN * values[0]).sum())
@@ -50,7 +49,7 @@ def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
 def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     """The matrix and zeros with which (m, n) readings best give (m, 6) loads, by least squares.
 
-    In undetermined directions the matrix is that of places and axes. Raises :class:`HapticsError` for too few loads.
+    Undetermined directions are those of places and axes. Raises :class:`HapticsError` for too few loads.
     """
     read, known = np.atleast_2d(array("readings", readings)), np.atleast_2d(array("loads", loads))
     count = len(cells.units)
@@ -76,7 +75,7 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
 
 
 def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
-    """(n, n): covariance of the readings left unexplained by loads and zeros."""
+    """(n, n): covariance of readings beyond loads and zeros."""
     explains = np.column_stack([loads, np.ones(len(loads))])
     found, _, rank, _ = np.linalg.lstsq(explains, deviations, rcond=SEEN)
     rest = (deviations - explains @ found) * np.array([unit.gain_n for unit in cells.units])
@@ -84,7 +83,7 @@ def _noise_n2(cells: LoadCells, deviations: Floats, loads: Floats) -> Floats:
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
-    """(6, n): the smallest change of the matrix beyond noise that explains the rest."""
+    """(6, n): smallest change of the matrix beyond noise that explains the rest."""
     sigma = np.array([unit.sigma_n / abs(unit.gain_n) for unit in cells.units])
     left, values, right = np.linalg.svd(deviations / sigma, full_matrices=False)
     moved = values > NOISE * np.sqrt(len(deviations))
@@ -120,7 +119,7 @@ class Drift:
     deviations_n: Floats
     """(n,): averaged deviation of each unit from its zero."""
     drifted: tuple[int, ...]
-    """Indexes of the units beyond the limit, whose zeros must be read again."""
+    """Indexes of units beyond the limit, whose zeros must be read again."""
     since_s: float
     """Averaging time without touch."""
 
@@ -129,9 +128,8 @@ class DriftWatch:
     """Averages readings while no zone is pressed: a push that the sheet misses is short, a drift stays.
 
     Args:
-     cells: the units.
      limit_n: deviation that counts as drift; None: four times its noise.
-     over_s: time constant of the average, in s; nothing is reported before it has passed without a touch.
+     over_s: time constant of the average, and time without a touch before any report.
     """
 
     def __init__(self, cells: LoadCells, limit_n: float | None = None, over_s: float = 10.0):
@@ -148,7 +146,7 @@ class DriftWatch:
         self._last_s: float | None = None
 
     def update(self, time_s: float, readings: Sequence[float] | Floats, zones: int) -> Drift:
-        """Add one reading per unit, with the number of pressed zones; returns the current drift."""
+        """Add one reading per unit, with the number of pressed zones; returns the drift."""
         within("time_s", (time_s,), "s")
         last, self._last_s = self._last_s, time_s
         if zones or last is None or time_s <= last:

@@ -1,11 +1,12 @@
-"""The range of each push under the units' noise: all pushes of forces within friction's cones whose wrench fits the
-measured one nearly as well as the best.
+"""The range of each push under the units' noise.
 
-For one push the misfit (in squares of noise, with uncertain places) may exceed its minimum by 3.84, the 95 % quantile
-of chi-square with one degree of freedom (profile likelihood: Meeker and Escobar, The American Statistician 49, 1995).
-If the wrench alone determines a push, and its ends are within the cones, that is the push plus or minus 1.96 standard
-deviations. Else the ends of one or two contacts are found by Newton's method with a logarithmic barrier for each cone
-and for the misfit (Boyd and Vandenberghe, Convex Optimization, 11.3), those of more by Clarabel
+It covers all forces within friction's cones whose misfit, in squares of noise with uncertain places, exceeds its
+minimum by at most 3.84, the 95 % quantile of chi-square with one degree of freedom (profile likelihood: Meeker and
+Escobar, The American Statistician 49, 1995).
+
+A push that the wrench alone determines, with both ends within the cones, has 1.96 standard deviations to either side.
+Else Newton's method finds the ends of one or two contacts with a logarithmic barrier for each cone and for the misfit
+(Boyd and Vandenberghe, Convex Optimization, 11.3), and Clarabel those of more
 (:mod:`contactfpga.robot.haptics.system`).
 """
 
@@ -20,34 +21,32 @@ from contactfpga.robot.haptics.contact import Interval
 from contactfpga.surfaces.shapes import Floats
 
 CHI2_1 = 3.841458820694124
-"""95 % quantile of chi-square with one degree of freedom."""
 
 LARGEST = 1e4
 """Largest push searched, in multiples of the measured force."""
 
 UNBOUNDED = 500.0
-"""Push, in multiples of the measured force, beyond which it counts as unbounded."""
+"""Push, in multiples of the measured force, that counts as unbounded."""
 
 GAP = 1e-4
-"""Accuracy of an interval's end as a share of the measured force; the stated end is moved outward by it."""
+"""Accuracy of an interval's end as a share of the measured force."""
 
 LEAST = 1e-4
 """Accuracy of the least misfit, in squares of noise."""
 
 STEEPER = 30.0
-"""Factor between successive barriers."""
 
 CENTERED = 1e-3
-"""Required gain of a step, as a share of the barrier's value, for another step."""
+"""Gain of a step, as a share of the barrier's value, that calls for another."""
 
 STEPS = 80
-"""Most Newton steps per barrier, and halvings of a step; about five are needed."""
+"""Most Newton steps per barrier, and halvings of a step."""
 
 ROUNDING = 1e-13
-"""Regularization of a matrix with unit diagonal against rounding."""
+"""Regularization of a matrix with unit diagonal."""
 
 KNOWN = 1e-9
-"""Share below which a singular value, or the null space's effect on a push, is 0."""
+"""Share below which a singular value, or an effect of the null space, is 0."""
 
 
 class Fit:
@@ -55,7 +54,7 @@ class Fit:
 
     Args:
         firsts: indexes of the pushes; with friction, both forces along the surface follow.
-        frictions: of each contact; 0: it has no such forces.
+        frictions: of each contact; 0: a push alone.
         size_n: approximate size of the pushes.
     """
 
@@ -69,8 +68,8 @@ class Fit:
         self.square = self.matrix.T @ self.matrix
         """(n, n): half the second derivative of the misfit."""
         self._cones = np.zeros((len(self.firsts), matrix.shape[1]))
-        """Factors of the squares of x, with a sum above 0 inside a cone: its push squared, less the rest squared over
-        friction squared."""
+        """Factors of the squares of x: push squared, less the rest squared over friction squared, is above 0 inside a
+        cone."""
         for cone, first, friction in zip(self._cones, self.firsts, frictions):
             cone[first] = 1.0
             if friction:
@@ -84,7 +83,7 @@ class Fit:
 
     def intervals(self, ends_of: Ends | None = None) -> list[Interval]:
         """Least and largest of each push; None if unbounded. ``ends_of`` finds those that the wrench alone does not
-        determine; default :func:`ends_of_few`."""
+        determine."""
         found = {first: self._alone(first) for first in self.firsts}
         rest = [first for first, both in found.items() if both is None]
         ends = {first: both for first, both in found.items() if both is not None}
@@ -95,7 +94,6 @@ class Fit:
         return [(max(0.0, low), None if high > most else max(0.0, high)) for low, high in scaled]
 
     def _alone(self, first: int) -> tuple[float, float] | None:
-        """The interval if the wrench determines it and both ends are in the cones; else None."""
         if float(np.abs(self._null[first]).max(initial=0.0)) > KNOWN:
             return None
         row = self._root[first]
@@ -107,14 +105,13 @@ class Fit:
         return float(self._best[first]) - half, float(self._best[first]) + half
 
     def _straightened(self, x: Floats) -> Floats:
-        """The forces with the same wrench and the smallest parts along the surface."""
+        """Forces with the same wrench and the smallest parts along the surface."""
         sides = (self._cones < 0).any(axis=0)
         if not sides.any() or not self._null.shape[1]:
             return x
         return np.asarray(x - self._null @ np.linalg.lstsq(self._null[sides], x[sides], rcond=None)[0])
 
     def _inside(self, x: Floats) -> NDArray[np.bool_]:
-        """Whether each (m, n) row is in all cones."""
         pushes = x[:, self.firsts]
         within = (pushes > 0) & (pushes < LARGEST) & (x * x @ self._cones.T > 0)
         return np.asarray(within.all(axis=1))
@@ -125,7 +122,7 @@ class Fit:
         return np.asarray((rest * rest).sum(axis=1))
 
     def half_slope(self, x: Floats) -> Floats:
-        """(m, n): half the derivative of the misfit, whose derivative is the (n, n) ``square``."""
+        """(m, n): half the derivative of the misfit."""
         return np.asarray((x @ self.matrix.T - self.wanted) @ self.matrix)
 
     @property
@@ -161,7 +158,7 @@ class Fit:
 
 
 def ends_of_few(fit: Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float]]:
-    """The least and largest of each of these pushes, all at once."""
+    """The least and largest of each of these pushes."""
     start = np.zeros((1, fit.matrix.shape[1]))
     start[:, fit.firsts] = 1.0
     inner = _descended(_Goal(fit, None, None), start, LEAST)
@@ -177,13 +174,12 @@ def ends_of_few(fit: Fit, firsts: Sequence[int]) -> dict[int, tuple[float, float
 
 
 class _Goal:
-    """Objective inside the barrier: half the misfit, or each row of ``goals`` at a misfit below ``most``."""
+    """Half the misfit, or each row of ``goals`` at a misfit below ``most``, with barriers."""
 
     def __init__(self, fit: Fit, goals: Floats | None, most: float | None):
         self.fit, self._goals, self._most = fit, goals, most
 
     def value(self, x: Floats, weight: float) -> Floats:
-        """(m,) values with barriers."""
         misfit, walls = self.fit.misfit(x), self.fit.barrier(x)
         if self._goals is None or self._most is None:
             return np.asarray(weight * misfit / 2 + walls)
@@ -209,7 +205,6 @@ class _Goal:
 
 
 def _descended(goal: _Goal, x: Floats, gap: float) -> Floats:
-    """(m, n) rows from an inner point to the minimum of the goal."""
     weight = 1.0
     while True:
         x = _centered(goal, x, weight)
@@ -235,8 +230,8 @@ def _centered(goal: _Goal, x: Floats, weight: float) -> Floats:
 
 
 def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> Fit | None:
-    """Pushes by their columns in ``matrix``, for any forces along the surface with columns ``sides``; None if those
-    alone exert every wrench."""
+    """A fit of the pushes' columns in ``matrix``, for any forces along the surface with columns ``sides``; None if
+    those alone exert every wrench."""
     if sides.shape[1]:
         left, values, _ = np.linalg.svd(sides)
         rest = left[:, int((values > KNOWN * values[0]).sum()) :].T
@@ -246,4 +241,4 @@ def of_pushes(matrix: Floats, wanted: Floats, sides: Floats, size_n: float) -> F
 
 
 Ends = Callable[[Fit, Sequence[int]], dict[int, tuple[float, float]]]
-"""The least and largest of these pushes, over the size of the fit."""
+"""The least and largest of these pushes, in units of the fit."""

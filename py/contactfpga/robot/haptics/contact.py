@@ -88,13 +88,13 @@ class Contact:
         self.force_n = force_n
         """Force on the link; None if no unit measures it."""
         self.normal_n = normal_n
-        """Push, at least 0: a contact never pulls. None as ``force_n``."""
+        """Push, at least 0; None as ``force_n``."""
         self.frame = frame
         """Name of the frame of point, normal and force."""
         self.link = context.link
         """Name of the touched link."""
         self.time_us = context.time_us
-        """Device time of its frame in us since power-up; None without a frame."""
+        """Device time of the frame since power-up; None without a frame."""
         self.track = context.tracks[number] if number < len(context.tracks) else None
         """Id that stays from frame to frame (:class:`~contactfpga.tracking.tracker.Tracker`); None: not tracked."""
         self._intervals = intervals
@@ -102,7 +102,7 @@ class Contact:
 
     @property
     def point_m(self) -> Vector:
-        """Point in m in the link's frame."""
+        """Point in the link's frame."""
         return self.touch.point_m
 
     @property
@@ -112,24 +112,23 @@ class Contact:
 
     @property
     def covariance_m2(self) -> Floats:
-        """Covariance (3, 3) of the point in m2, along the surface only."""
+        """(3, 3) covariance of the point, along the surface only."""
         normal = np.array(self.touch.normal)
         return np.asarray(self.touch.point_sigma_m**2 * (np.eye(3) - np.outer(normal, normal)))
 
     @property
     def interval_n(self) -> Interval | None:
-        """Least and largest push in N; the second is None if unbounded. None as ``force_n``.
+        """Least and largest push; the second is None if unbounded. None as ``force_n``.
 
         With the units' noise it contains the push in at least 95 of 100 cases
-        (:mod:`contactfpga.robot.haptics.confidence`), considering noise, uncertain places and the freedom of friction.
-        Without noise (:attr:`Wrench.noise` None) it is the range of all forces that friction allows and that exert
-        exactly this wrench. With three contacts or more either may need Clarabel: raises
-        :class:`~contactfpga.MissingExtra` without it.
+        (:mod:`contactfpga.robot.haptics.confidence`); without (:attr:`Wrench.noise` None) it is the range of all forces
+        that friction allows and that exert exactly this wrench. Raises :class:`~contactfpga.MissingExtra` without
+        Clarabel, which three contacts or more may need.
         """
         return None if self._intervals is None else self._intervals()[self._number]
 
     def to_dict(self) -> dict[str, object]:
-        """All fields in plain Python values, ready for JSON."""
+        """All fields as plain Python values, ready for JSON."""
         interval, force = self.interval_n, self.force_n
         return {
             "link": self.link,
@@ -159,15 +158,15 @@ class Solution:
     intervals: Callable[[], list[Interval]]
     rank: int
     null_space: list[list[float]]
-    """Changes of the forces that leave the wrench unchanged; x, y and z of each contact in turn, or one push each with
-    known directions."""
+    """Changes of the forces that leave the wrench unchanged: x, y and z of each contact, or one push each with known
+    directions."""
     chi2: float | None
     freedom: int
     """Degrees of freedom of ``chi2``: components of the wrench not used up by the forces."""
     touches: Sequence[Touch]
     wrench: Wrench
     covariance: Callable[[], Floats | None]
-    """(3k, 3k) covariance of the forces, without the null space."""
+    """(3k, 3k) covariance of the forces without the null space."""
     beyond_friction: bool = False
 
     @property
@@ -194,7 +193,7 @@ class Contacts(Sequence[Contact]):
     ):
         self.wrench = wrench
         self.center = center
-        """Without a zone: the contact that the wrench alone shows, or None."""
+        """Without a zone, the contact that the wrench alone shows, or None."""
         self._solution = solution
         self.model = solution.model
         """The chosen contact model: :data:`PURE_FORCE`, :data:`PURE_FORCE_WITH_KNOWN_DIRECTION` or
@@ -228,7 +227,7 @@ class Contacts(Sequence[Contact]):
 
     @functools.cached_property
     def covariance_n2(self) -> Floats | None:
-        """(3k, 3k) covariance of all forces in turn, without the :attr:`null_space`; None without noise."""
+        """(3k, 3k) covariance of all forces without the :attr:`null_space`; None without noise."""
         return self._solution.covariance()
 
     @property
@@ -246,8 +245,8 @@ class Contacts(Sequence[Contact]):
 
     @property
     def unfelt(self) -> list[Contact]:
-        """Contacts that only the sheet sees: they may push without force (:attr:`Contact.interval_n`), such as two
-        fingers that squeeze the link."""
+        """Contacts that may push without force (:attr:`Contact.interval_n`), as two fingers that squeeze the link
+        do."""
         return [one for one, (least, _) in zip(self._contacts, self._kept_intervals) if least <= 1e-9]
 
     @overload
@@ -263,7 +262,6 @@ class Contacts(Sequence[Contact]):
         return len(self._contacts)
 
     def _repr_html_(self) -> str:
-        """A table in a notebook; an ambiguous push has its interval."""
         head = ["contact", "x, mm", "y, mm", "z, mm", "push, N", "between, N"]
         rows = [
             [_name(number, one), *(f"{1e3 * each:.2f}" for each in one.point_m), *_push(one)]
@@ -291,16 +289,14 @@ def _push(contact: Contact) -> list[str]:
 
 
 EARLIER_US = 20_000
-"""Device time by which a place must precede the next contact's zone, as that contact presses the units before it closes
-a switch."""
+"""Device time by which a place must precede the next contact's zone, which presses the units before it closes a
+switch."""
 
 Key = tuple[int, tuple[float, float, float] | None]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class _Alone:
-    """A frame with a single zone."""
-
     time_us: int
     center_m: tuple[float, float, float]
     sigma_m: float
@@ -310,9 +306,9 @@ class AloneWatch:
     """Reads every frame with its readings, and remembers the place of a contact that was alone, for
     :func:`~contactfpga.robot.haptics.felt`.
 
-    With two contacts the units do not show where each is along the line through both, and the barycenter of one to
-    three cells is off by a quarter of the pitch: the largest error of the forces. A single contact's center of pressure
-    is known to less than a millimeter. It remains its place while more contacts come and its zone keeps its cells.
+    With two contacts the units do not show where each is along the line through both, and a barycenter of one to three
+    cells is off by a quarter of the pitch. A single contact's center of pressure is known to less than a millimeter; it
+    remains its place while its zone keeps its cells.
     """
 
     def __init__(self, cells: LoadCells):
@@ -321,12 +317,11 @@ class AloneWatch:
             raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
         self._cells, self._surface = cells, cells.surface
         self._key: Key | None = None
-        """Key of the single zone."""
         self._recent: deque[_Alone] = deque()
         self._kept: dict[Key, _Alone] = {}
 
     def take(self, zones: Zones, motion: Motion | None = None) -> None:
-        """Add the next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`); ``motion`` as for
+        """Add the next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`); ``motion`` is for
         :meth:`LoadCells.wrench <contactfpga.robot.haptics.LoadCells.wrench>`."""
         if len(zones) == 1:
             self._kept = {}
@@ -354,8 +349,7 @@ class AloneWatch:
             self._recent.popleft()
 
     def sharpened(self, zones: Zones, touches: Sequence[Touch]) -> list[Touch]:
-        """The touches of a frame's zones with places, in order, each at its single-contact place if that is better
-        known and on its zone."""
+        """The touches of a frame's zones with places, each at its single-contact place if that is better known."""
         placed = [zone for zone in zones if zone.point_mm is not None]
         return [self._sharper(zone, touch, zones.sheet.pitch_x_mm) for zone, touch in zip(placed, touches, strict=True)]
 
@@ -369,5 +363,4 @@ class AloneWatch:
 
 
 def _key(zone: Zone) -> Key:
-    """A key that changes with the zone's cells."""
     return zone.area_cells, zone.point_mm

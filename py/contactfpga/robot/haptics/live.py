@@ -1,5 +1,4 @@
-"""Frames with the force at each of their zones, once the frame's readings are known, and with the switches that one
-contact has closed."""
+"""Frames with the force at each of their zones, and the switches that one contact has closed."""
 
 from __future__ import annotations
 
@@ -35,10 +34,11 @@ def felt(
     tracks: Tracks | None = None,
     alone: AloneWatch | None = None,
 ) -> Contacts | None:
-    """The force at each zone of a frame, from the units' readings at its moment; None if these are not known (yet), or
-    if a zone winds around the sheet (:attr:`Zone.winding <contactfpga.Zone.winding>`), whose push has no known place.
+    """The force at each zone of a frame, from the units' readings at its moment.
 
-    Raises :class:`HapticsError` if the cells have no surface, or differ in number from the board's units.
+    None if the readings are not known (yet), or if a zone winds around the sheet (:attr:`Zone.winding
+    <contactfpga.Zone.winding>`). Raises :class:`HapticsError` if the cells have no surface, or differ in number from
+    the board's units.
     """
     if cells.surface is None:
         raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
@@ -57,8 +57,8 @@ class FrameSource(Protocol):
 class WithReadings:
     """The frames of a board in order, each once its ``units`` are known: ``for zones in WithReadings(board)``.
 
-    Each frame is delayed by a sweep or two. A frame whose readings were lost comes without them ``wait_us`` of device
-    time later.
+    Each frame is delayed by a sweep or two; one whose readings were lost comes without them after ``wait_us`` of device
+    time.
     """
 
     def __init__(self, source: FrameSource, wait_us: int = WAIT_US):
@@ -100,9 +100,8 @@ class ClosingWatch:
     """Reads every frame with its readings, and knows the cells and closings of a single contact, for
     :meth:`~contactfpga.robot.haptics.Locator.locate`.
 
-    A switch closed between the scans of its row in two frames; the push at that moment is halfway between theirs. From
-    exact sums it finds one switch that opened or closed, and two or three that closed if one choice with these sums is
-    the most compact; else :attr:`complete` is False until the contact ends. With ``report = "cells"`` it finds all.
+    Exact sums show one switch that opened or closed, and two or three that closed if one choice is the most compact;
+    else :attr:`complete` is False until the contact ends. ``report = "cells"`` shows all.
     """
 
     def __init__(self, cells: LoadCells):
@@ -113,10 +112,10 @@ class ClosingWatch:
         self._before: Zones | None = None
         self._pushes: dict[Cell, float] = {}
         self.push_n: float | None = None
-        """Push at the last frame; None: no readings, or no push."""
+        """Push at the last frame; None without readings or push."""
         self._push_before: float | None = None
         self.complete = False
-        """Whether all of the contact's cells are known; also False before the first frame without a contact."""
+        """Whether all of the contact's cells are known; False before the first frame without a contact."""
 
     @property
     def cells(self) -> list[Cell]:
@@ -125,7 +124,7 @@ class ClosingWatch:
 
     @property
     def closings(self) -> list[Closing]:
-        """The closed switches, each with the push in N at its closing."""
+        """The closed switches, each with the push at its closing."""
         return [Closing(*cell, push) for cell, push in sorted(self._pushes.items())]
 
     def take(self, zones: Zones) -> None:
@@ -158,7 +157,6 @@ class ClosingWatch:
         self.complete = len(self._pushes) == after.pressed
 
     def _changed(self, before: Zones, after: Zones) -> tuple[list[Cell], list[Cell]]:
-        """Cells that closed and cells that opened, from exact sums."""
         count = after.pressed - before.pressed
         if count == 0:
             return [], []
@@ -193,7 +191,6 @@ class ClosingWatch:
         return sorted(inside - self._pushes.keys())
 
     def _at(self, before: Zones, after: Zones, row: int) -> float | None:
-        """The push in N when the row was scanned, interpolated between frames."""
         if self.push_n is None:
             return None
         if self._push_before is None:
@@ -204,10 +201,8 @@ class ClosingWatch:
 
 
 def _around(sheet: Sheet) -> int | None:
-    """Columns around a closed sheet; None for others."""
     return sheet.columns if sheet.closed else None
 
 
 def _spread(cells: list[Cell], around: int | None) -> float:
-    """Spread of cells in pitches: the sum of all squared distances."""
     return sum((r - row) ** 2 + across(c - column, around) ** 2 for r, c in cells for row, column in cells)

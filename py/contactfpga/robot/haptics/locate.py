@@ -1,6 +1,6 @@
 """Contact places finer than the pitch, from center of pressure, barycenter, cells and closings, with their uncertainty.
 
-All places are on the sheet laid flat, in m: column 0 at x = 0, row 0 at y = 0.
+Places are in m on the sheet laid flat: column 0 at x = 0, row 0 at y = 0.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from contactfpga.surfaces.shapes import Floats
 from contactfpga.zones.zone import Zones
 
 STEPS, PATCH_STEPS = 512, 240
-"""Table entries of a point, and of a patch, which needs longer; linear in between."""
+"""Table entries for a point and for a patch, which takes longer."""
 
 LARGEST_N = 1e4
 
 
 class Reach:
-    """The force that closes a switch at a distance, and the inverse, as tables (:mod:`contactfpga.design.cover`
-    computes them), within 0.01 % of the force.
+    """Tables of the force that closes a switch at a distance (:mod:`contactfpga.design.cover`), and of the inverse,
+    within 0.01 % of the force.
 
     Args:
         cover: foam, switch and, for a patch, the touching body.
@@ -61,13 +61,13 @@ class Reach:
         self._roots = forces**0.4
 
     def closing_n(self, distance_m: Floats) -> Floats:
-        """Force in N that closes a switch at each distance; 1e9 if none does."""
+        """Force that closes a switch at each distance; 1e9 if none does."""
         distance_m = numbers("distance_m", distance_m, "m")
         roots = np.interp(distance_m * distance_m, self._squares, self._roots)
         return np.where(distance_m > self._distances[-1], 1e9, roots * roots * np.sqrt(roots))
 
     def reach_m(self, force_n: float) -> float:
-        """Distance in m up to which the force closes switches; 0 if not even the one below it."""
+        """Distance up to which the force closes switches; 0 if it closes none."""
         number("force_n", force_n, unit="N")
         return math.sqrt(np.interp(max(0.0, force_n) ** 0.4, self._roots, self._squares, left=0.0))
 
@@ -77,7 +77,6 @@ def _force(found: float | NoSolution) -> float:
 
 
 ROUNDING = 1e-4
-"""Relative error of the table of forces."""
 
 
 CERTAIN = 10.0
@@ -86,7 +85,7 @@ CERTAIN = 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Closing:
-    """A switch that closed, and the push at that instant: the contact is on the circle of that push's reach."""
+    """A switch that closed, and the push at that instant, whose reach is the contact's distance."""
 
     row: int
     column: int
@@ -106,7 +105,6 @@ class Observations:
     center: Place | None
     pitches_m: tuple[float, float]
     lines: tuple[int, int]
-    """Rows and columns of the sheet."""
     reach: Reach
     spread: float
     force_sigma_n: float
@@ -134,8 +132,7 @@ class Observations:
         return chance, misfit
 
     def _needed(self, cell: tuple[int, int], x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
-        """The force in N that closes the switch from each place, and its standard deviation, including that within a
-        grid step."""
+        """Force that closes the switch from each place, and its standard deviation."""
         row, column = cell
         distance = np.hypot(x - column * self.pitches_m[0], y - row * self.pitches_m[1])
         needed = self.reach.closing_n(distance)
@@ -145,7 +142,6 @@ class Observations:
         return needed, np.maximum(sigma, ROUNDING * needed)
 
     def _open(self) -> list[tuple[int, int]]:
-        """Unpressed switches around the pressed ones."""
         far = self.reach.reach_m(self.force_n * (1 + 3 * self.spread) + 3 * self.force_sigma_n)
         wide, high = (math.ceil(far / pitch) for pitch in self.pitches_m)
         rows, columns = zip(*self.cells)
@@ -171,10 +167,10 @@ def _one_side(standing: Floats, chance: Floats, misfit: Floats) -> None:
 
 
 HELPS_FROM = 0.8
-"""Reach over pitch above which the set of consistent places is better than the barycenter."""
+"""Reach over pitch from which the set of consistent places is better than the barycenter."""
 
 DISAGREES = 25.0
-"""Misfit, in squares of noise, of contradictory evidence; chance exceeds it less than once in ten thousand."""
+"""Misfit of contradictory evidence, in squares of noise; chance exceeds it less than once in ten thousand."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -189,7 +185,7 @@ class Place:
     method: str
     """`center of pressure`, `barycenter`, `set` or `closings`; `+ center of pressure` if combined."""
     agrees: bool = True
-    """False if no place explains all observations under the assumed contact; then the coarser method answers."""
+    """False if no place explains all observations; then the coarser method answers."""
 
 
 class Locator:
@@ -199,7 +195,7 @@ class Locator:
      sheet: lines and pitches; ``skin.sheet`` and ``board.hello`` have one.
      reach: the assumed contact.
      spread: relative standard deviation of the switches' thresholds.
-     force_sigma_n: standard deviation of the forces that are given.
+     force_sigma_n: standard deviation of the given forces.
     """
 
     def __init__(self, sheet: sheets.Sheet, reach: Reach, spread: float = 0.0, force_sigma_n: float = 0.0):
@@ -221,8 +217,8 @@ class Locator:
         self._sigma = force_sigma_n
 
     def center(self, center: Center, origin_m: tuple[float, float] = (0.0, 0.0)) -> Place:
-        """The place by the center of pressure alone; ``origin_m``: position of column 0 and row 0 on the surface laid
-        flat. Raises :class:`HapticsError` for a wrench without noise."""
+        """The place by the center of pressure alone; ``origin_m`` is column 0 and row 0 on the surface laid flat.
+        Raises :class:`HapticsError` for a wrench without noise."""
         if center.covariance_m2 is None:
             raise HapticsError("the wrench has no covariance; a place needs one to say how sure it is")
         x, spread = center.sheet_m[0], center.covariance_m2
@@ -234,7 +230,6 @@ class Locator:
         return Place(x, center.sheet_m[1] - origin_m[1], posterior.radius_95(spread), spread, "center of pressure")
 
     def _inside(self, center: Center) -> tuple[float, Floats]:
-        """Arc length under the foam and covariance there, on the turn nearest to the sheet."""
         assert self._sheet.radius_mm is not None
         assert center.covariance_m2 is not None
         share = 1e-3 * self._sheet.radius_mm / math.hypot(center.point_m[0], center.point_m[1])
@@ -245,7 +240,7 @@ class Locator:
         return x + around * round((middle - x) / around), scale @ center.covariance_m2 @ scale
 
     def barycenter(self, x_m: float, y_m: float, force_n: float | None = None) -> Place:
-        """The place by a zone's barycenter. Without force it has the largest uncertainty."""
+        """The place by a zone's barycenter; it is least certain without force."""
         # What 95 % stay below hangs on the reach alone; it need not be exact to more than 2 % of the pitch.
         if force_n is None:
             radius = posterior.worst_95(self._pitch_x, self._pitch_y)
@@ -264,7 +259,7 @@ class Locator:
         closings: Sequence[Closing] = (),
         center: Place | None = None,
     ) -> Place:
-        """The place of one contact from all observations; needs some 10 ms.
+        """The place of one contact from all observations, in some 10 ms.
 
         Args:
             cells: (row, column) of each pressed switch of its zone; the others around it are open.
@@ -288,7 +283,6 @@ class Locator:
         return self._around_sheet(found, cut)
 
     def _around_sheet(self, place: Place, columns: int) -> Place:
-        """The place moved around the sheet by this many columns."""
         return dataclasses.replace(
             place, x_m=(place.x_m + columns * self._pitch_x) % (self._sheet.columns * self._pitch_x)
         )
@@ -310,7 +304,6 @@ class Locator:
         return _place(found, bool(closings), center is not None)
 
     def _box(self, cells: Sequence[tuple[int, int]], force_n: float, center: Place | None) -> Box:
-        """A box around all places that can press these cells, with margins for uncertainty."""
         far = 1.2 * self._reach.reach_m(1.5 * force_n + 5 * self._sigma) + max(self._pitch_x, self._pitch_y)
         rows, columns = zip(*cells)
         left, right = self._pitch_x * max(columns) - far, self._pitch_x * min(columns) + far
@@ -330,7 +323,6 @@ def _place(found: Posterior, closings: bool, center: bool) -> Place:
 
 
 def _cut(taken: set[int], columns: int) -> int:
-    """The column in the middle of the widest gap between these."""
     wide, left = max((min((other - one - 1) % columns for other in taken), one) for one in taken)
     if not wide:
         raise HapticsError("the cells lie all the way round the closed sheet, so the contact has no x")
@@ -338,10 +330,8 @@ def _cut(taken: set[int], columns: int) -> int:
 
 
 def closed(before: Zones, after: Zones) -> tuple[int, int] | None:
-    """(row, column) of the one switch that closed between two frames, or None if other changes happened.
-
-    It follows from exact sums: a new cell adds its own area, column and row. Needs ``report = "moments"``.
-    """
+    """(row, column) of the one switch that closed between two frames, by exact sums; None after other changes. Needs
+    ``report = "moments"``."""
     if before.frame.barycenters is not None or after.frame.barycenters is not None:
         raise HapticsError('the board sends barycenters; only `report = "moments"` or "cells" has the exact sums')
     more, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))

@@ -1,8 +1,7 @@
 """Uncertainty of a place.
 
-A contact's place, given the observations, is a probability on a grid that is refined where it is not 0. Barycenter
-errors without other knowledge, and the gain of the set of consistent places, follow from all places of a cell, at which
-a contact closes the switches within its reach.
+A contact's place is a probability on a grid that is refined where it is not 0. Errors of barycenters and of sets of
+consistent places follow from all places of a cell.
 """
 
 from __future__ import annotations
@@ -18,14 +17,13 @@ from numpy.typing import NDArray
 from contactfpga.surfaces.shapes import Floats
 
 SIDE = 36
-"""Points of the grid along each axis."""
 
 LEVELS = 12
 NEGLIGIBLE = 12.0
-"""Distance of the logarithm of probability below its maximum that counts as 0."""
+"""Drop of the logarithm of probability that counts as 0."""
 
 Likelihood = Callable[[Floats, Floats, float], tuple[Floats, Floats]]
-"""From points x, y and their grid distance: logarithm of probability, and misfit of the point in squares of noise."""
+"""From points x, y and their grid distance: logarithm of probability, and misfit in squares of noise."""
 
 Box = tuple[float, float, float, float]
 """Least x, largest x, least y, largest y in m."""
@@ -45,7 +43,7 @@ class Posterior:
 
 
 def of(evidence: Likelihood, box: Box) -> Posterior:
-    """Mean and spread of the place, from the evidence on grids over the box, at most 12."""
+    """Mean and spread of the place, from the evidence on at most 12 grids."""
     for level in range(LEVELS):
         x, y, steps = _grid(box)
         chance, misfit = evidence(x, y, max(steps))
@@ -77,7 +75,6 @@ def _grid(box: Box) -> tuple[Floats, Floats, tuple[float, float]]:
 
 
 def _around(x: Floats, y: Floats, steps: tuple[float, float], box: Box) -> Box:
-    """The box of the likely points and a step around it, within the old one."""
     return (
         max(box[0], float(x.min()) - 1.5 * steps[0]),
         min(box[1], float(x.max()) + 1.5 * steps[0]),
@@ -91,7 +88,7 @@ def _area(box: Box) -> float:
 
 
 def radius_95(covariance: Floats) -> float:
-    """The radius in m within which 95 % of a normal distribution lie."""
+    """Radius within which 95 % of a normal distribution lie."""
     second, first = (math.sqrt(max(0.0, value)) for value in np.linalg.eigvalsh(covariance))
     if first == 0:
         return 0.0
@@ -107,7 +104,6 @@ def radius_95(covariance: Floats) -> float:
 
 
 FINENESS = 256
-"""Places along each side of a cell."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,7 +114,7 @@ class Static:
     barycenter_95: float
     """95 % quantile of the errors."""
     set_rms: float
-    """RMS error of the middle of the set of places that close exactly the same switches."""
+    """RMS error of the middle of the set of places that close the same switches."""
     missed: float
     """Share of contacts that close no switch."""
 
@@ -146,7 +142,7 @@ def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: i
 
 
 def _of_sets(closed: NDArray[np.bool_], all_x: Floats, all_y: Floats, x: Floats, y: Floats) -> Floats:
-    """Distance of each place from the middle of those with its pattern, relative to the pattern's first switch."""
+    """Distance of each place from the middle of those with its pattern."""
     first = closed.argmax(axis=0)
     x, y = x - all_x[first], y - all_y[first]
     # Rows of cells are as long everywhere, so a shifted pattern is the same bits from its first one on.
@@ -167,7 +163,7 @@ def _rms(errors: Floats) -> float:
 
 @functools.lru_cache(maxsize=64)
 def worst_95(pitch_x: float, pitch_y: float) -> float:
-    """A bound, in the unit of the pitches, on the 95 % quantile of barycenter errors at every reach."""
+    """A bound on the 95 % quantile of barycenter errors at every reach, in the unit of the pitches."""
     pitch = max(pitch_x, pitch_y)
     found = [static(pitch * share, pitch_x, pitch_y, 64).barycenter_95 for share in (0.5, 0.6, 0.7, 0.71, 0.8, 1.0)]
     return float(np.nanmax(found))

@@ -1,7 +1,6 @@
 """Distance of a zone's barycenter from the pressing body under a known cover, by the number of cells and the push.
 
-The same push closes one switch in the middle of a cell, and several between cells. So a zone's size restricts the place
-within a cell, depending on the push's reach under this cover.
+The same push closes one switch in the middle of a cell, and several between cells.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ RADII_M = (0.005, 0.01, 0.02)
 """R* of pressing balls, equally often: a pencil's end, a fingertip, a thumb."""
 
 SIDE = 6
-"""Places along each side of a quarter cell; the others are symmetric."""
+"""Places along each side of a quarter cell."""
 
 LINES = 9
 """Rows and columns of the computed sheet, pressed in its middle."""
@@ -26,7 +25,7 @@ STEP = 1.25
 
 
 class Pressed:
-    """Barycenters under one cover. Raises :class:`~contactfpga.cover.CoverError` for a cover that knows no force, or
+    """Barycenters under one cover. Raises :class:`~contactfpga.cover.CoverError` for a cover that knows no force or
     does not fit the pitch."""
 
     def __init__(self, cover: Cover, pitch_x_m: float, pitch_y_m: float):
@@ -38,8 +37,8 @@ class Pressed:
         self._tables: dict[int, dict[int, float]] = {}
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:
-        """Standard deviation of each coordinate of the place, over all places where a ball with about this push closes
-        this many switches; None if there is none."""
+        """Standard deviation of each coordinate, over all places where a ball with about this push closes this many
+        switches; None if there is none."""
         if not force_n > 0:
             return None
         step = round(math.log(force_n) / math.log(STEP))
@@ -48,7 +47,6 @@ class Pressed:
         return self._tables[step].get(cells)
 
     def _table(self, force_n: float) -> dict[int, float]:
-        """Standard deviation by the number of closed switches."""
         squares: dict[int, list[float]] = {}
         for ball in self._balls:
             radius = ball.patch_m(force_n)

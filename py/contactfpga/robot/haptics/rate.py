@@ -1,6 +1,6 @@
-"""Arrangements of units under a bumper, rated for a link by the contacts it must find; and a picture.
+"""Arrangements of units under a bumper, rated for a link by the contacts they must find; and a picture.
 
-Not by the matrix's condition number, which depends on the origin and on the unit of length.
+The matrix's condition number is no rating, as it depends on the origin and on the unit of length.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ def hexapod(radius_m: float, tilt: float, z_m: float = 0.0) -> LoadCells:
 
 
 def two_rings(radius_m: float, tilt: float, low_m: float, high_m: float) -> LoadCells:
-    """Six units like :func:`hexapod`, those tilted to one side on a ring at ``low_m``, the others at ``high_m``."""
+    """The units of :func:`hexapod`, those tilted to one side on a ring at ``low_m``, the others at ``high_m``."""
     return LoadCells([_unit(radius_m, 60 * i, high_m if i % 2 else low_m, tilt, (-1) ** i) for i in range(6)])
 
 
 def tripod(radius_m: float, z_m: float = 0.0) -> LoadCells:
-    """Three units along z at 90, 210 and 330 degrees: the force on a plane, and its place, but no friction."""
+    """Three units along z at 90, 210 and 330 degrees, which see force and place on a plane but no friction."""
     return LoadCells([_unit(radius_m, 90 + 120 * i, z_m, math.pi / 2, 1) for i in range(3)])
 
 
@@ -61,7 +61,7 @@ TILTS = tuple(range(30, 80, 5))
 
 
 def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[UnitLayout]:
-    """Arrangements on rings of this radius in m, in a cylinder touched from z = ``low_m`` to ``high_m``."""
+    """Arrangements on rings of this radius, in a cylinder touched from z = ``low_m`` to ``high_m``."""
     middle, quarter = (low_m + high_m) / 2, (high_m - low_m) / 4
     found = []
     for degrees in TILTS:
@@ -79,7 +79,7 @@ def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[UnitLayout
 
 
 def on_plane(radius_m: float, height_m: float) -> list[UnitLayout]:
-    """Arrangements on a ring of this radius in m, under a flat bumper whose outside is at z = ``height_m``."""
+    """Arrangements on a ring of this radius, under a flat bumper whose outside is at z = ``height_m``."""
     tilts = [UnitLayout(f"hexapod, {degrees} degrees", hexapod(radius_m, math.radians(degrees))) for degrees in TILTS]
     return [UnitLayout("3 on a plane", tripod(radius_m)), *tilts]
 
@@ -98,9 +98,9 @@ class Requirements:
 
     surface: Surface
     size_m: tuple[float, float]
-    """Touched part: z range of a cylinder; width and depth of a plane about z's axis."""
+    """Touched part: z range of a cylinder; width and depth of a plane about z."""
     force_n: float = 30.0
-    """Largest push, with friction, anywhere; the units are chosen to bear it."""
+    """Largest push, with friction, anywhere; units are chosen to bear it."""
     friction: float = 0.5
     noise: float = 0.001
     """Standard deviation of a unit, as a share of its required load."""
@@ -109,7 +109,7 @@ class Requirements:
     mass_kg: float = 0.0
     """Mass of the bumper."""
     acceleration_sigma_m_s2: float = 0.1
-    """Uncertainty of gravity and motion when the bumper's weight is subtracted, in any pose."""
+    """Uncertainty of gravity and motion when the bumper's weight is subtracted."""
 
     def __post_init__(self) -> None:
         positive("force_n", self.force_n, "N")
@@ -127,7 +127,7 @@ class Requirements:
             positive("depth", second, "m")
 
     def places(self) -> list[tuple[Vector, Vector]]:
-        """Points in m, and unit normals, of the tried contacts."""
+        """Points and unit normals of the tried contacts."""
         first, second = self.size_m
         if isinstance(self.surface, Cylinder):
             round_m = 2 * math.pi * self.surface.radius_m
@@ -174,8 +174,7 @@ class Rating:
     seen_n: float
     """Smallest detectable force in any direction that friction allows."""
     seen: Floats
-    """(places, directions): smallest detectable force by place and direction: straight, then with friction all
-    around."""
+    """(places, directions): smallest detectable force, straight, then with friction all around."""
     errors_m: Floats
     """``place_m`` by place."""
 
@@ -210,7 +209,6 @@ def rate(needs: Requirements, layout: UnitLayout) -> Rating | None:
 
 
 def _weight(needs: Requirements, sees_friction: bool) -> Floats:
-    """(6, 6): covariance of the bumper's weight."""
     carried = np.concatenate([np.eye(3), skew(needs.middle_m)])
     spread = (needs.mass_kg * needs.acceleration_sigma_m_s2) ** 2 * carried @ carried.T
     if not sees_friction:  # guides take what units along z do not
@@ -250,8 +248,7 @@ def _force_n(noise: Noise, places: list[tuple[Vector, Vector]], sees_friction: b
 
 
 def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
-    """Draw the best arrangement, its smallest detectable force everywhere, and all others beside it, by matplotlib. The
-    same input gives the same file."""
+    """Draw the best arrangement, its smallest detectable force, and all others. The same input gives the same file."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):
@@ -271,7 +268,6 @@ def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
 
 
 def _draw_units(place: Axes, needs: Requirements, rating: Rating) -> None:
-    """Draw the units and their axes."""
     length = 0.35 * max(float(np.ptp([unit.point_m for unit in rating.layout.cells.units], axis=0).max()), 0.02)
     points = np.array([point for point, _ in needs.places()])
     place.plot(*(1e3 * points.T), ".", ms=2, color=style.PRESSED)
@@ -300,7 +296,6 @@ def _draw_map(figure: Figure, place: Axes, needs: Requirements, values: Floats, 
 
 
 def _draw_seen(figure: Figure, place: Axes, needs: Requirements, seen: Floats) -> None:
-    """Draw detectable forces by place, around a cylinder by direction."""
     first, second = needs.size_m
     if not isinstance(needs.surface, Cylinder) or seen.shape[1] == 1:
         _draw_map(figure, place, needs, seen.max(axis=1), "the best: smallest force seen, N")

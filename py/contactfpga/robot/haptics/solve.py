@@ -1,9 +1,8 @@
 """From a wrench and touched places to contacts, by the simplest sufficient model.
 
-One contact has a closed form, two the exact interval of each push: the range of squeezes within friction's cones. Both
-are plain Python, faster than numpy for a few numbers. Both correct the wrench to the nearest that contacts at these
-places can exert: a force has no moment about its point, two have none about their line. The correction over its
-variance is chi-square.
+One contact has a closed form, two the range of squeezes within friction's cones. Both are plain Python, faster than
+numpy for a few numbers, and correct the wrench to the nearest that contacts at these places can exert: a force has no
+moment about its point, two have none about their line.
 """
 
 from __future__ import annotations
@@ -51,12 +50,12 @@ def contacts(
     tracks: Tracks | None = None,
     alone: AloneWatch | None = None,
 ) -> Contacts:
-    """The force at each zone, or at each place in a list of :class:`Touch`.
+    """The force at each zone, or at each place in a list of :class:`Touch`; no contact ever pulls.
 
-    One contact: a closed form. Two: also the exact interval of each push. More: pushes along the normals if sufficient,
-    else forces in pyramids within friction's cones, by non-negative least squares (extra `haptics`); with ``cones``, in
-    the cones themselves, by Clarabel. If units do not see all six components of the wrench, or friction is 0: pushes
-    along the normals. Without a zone: the center of pressure on ``surface``. No contact ever pulls.
+    One contact has a closed form, two also the exact interval of each push. More have pushes along the normals if these
+    suffice, else forces in pyramids within friction's cones, by non-negative least squares (extra `haptics`); with
+    ``cones``, in the cones themselves, by Clarabel. If units do not see all six components of the wrench, or friction
+    is 0, there are only pushes along the normals. Without a zone there is the center of pressure on ``surface``.
 
     Args:
         surface: the bumper's outside, for the zones' places.
@@ -107,8 +106,8 @@ def _nothing(wrench: Wrench) -> Solution:
 def touched(
     zones: Zones, surface: Surface | None, friction: float = 0.5, sheet_m: tuple[float, float] = (0.0, 0.0)
 ) -> list[Touch]:
-    """The zones as places on the bumper's outside. A barycenter's error is that of chance within a cell, a pitch over
-    the root of 12; :class:`~contactfpga.robot.haptics.Locator` is more precise."""
+    """The zones as places on the bumper's outside, with a barycenter's error of a pitch over the root of 12;
+    :class:`~contactfpga.robot.haptics.Locator` is more precise."""
     if surface is None:
         raise HapticsError("surface is missing; contacts() needs the bumper's outside to place zones on it")
     pitch_mm = math.hypot(zones.sheet.pitch_x_mm, zones.sheet.pitch_y_mm) / math.sqrt(2)
@@ -130,13 +129,11 @@ def touched(
 
 
 ROUNDING = 1e-9
-"""Share of a force that counts as rounding."""
 
 NONE: Vector = (0.0, 0.0, 0.0)
 
 
 def _one(wrench: Wrench, touch: Touch) -> Solution:
-    """The force at one contact by generalized least squares, without friction."""
     force, chi2 = _at_point(wrench, touch)
     push = -dot(touch.normal, force)
     sideways = math.sqrt(max(0.0, dot(force, force) - push * push))
@@ -147,10 +144,8 @@ def _one(wrench: Wrench, touch: Touch) -> Solution:
 
 
 def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
-    """The forces at two contacts: determined up to a squeeze along their line, bounded by friction.
-
-    It takes the smallest forces along the surface, else the smallest squeeze.
-    """
+    """Forces at two contacts, determined up to a squeeze along their line, which friction bounds; the smallest forces
+    along the surface count, else the smallest squeeze."""
     first, second = touches
     (ax, ay, az), (bx, by, bz) = first.point_m, second.point_m
     away = (ax - bx, ay - by, az - bz)
@@ -170,7 +165,7 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
 
 
 def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
-    """The force, and chi-square of the moment about the point, ideally 0."""
+    """Force, and chi-square of the moment about the point, ideally 0."""
     force, point = wrench.force_n, touch.point_m
     if wrench.noise is None:
         return force, None
@@ -242,7 +237,7 @@ def _widen(spread: list[list[float]], sigma: float, force: Vector) -> None:
 
 
 def _best_alone(wrench: Wrench, touches: Sequence[Touch], along: Vector) -> Solution:
-    """If two contacts would have to pull: the one that alone fits the wrench better."""
+    """The contact that alone fits the wrench better, if two would have to pull."""
     alone = [_one(wrench, touch) for touch in touches]
     scores = [_misfit(each, touch) for each, touch in zip(alone, touches)]
     best = 0 if scores[0] <= scores[1] else 1
@@ -254,7 +249,6 @@ def _best_alone(wrench: Wrench, touches: Sequence[Touch], along: Vector) -> Solu
 
 
 def _misfit(found: Solution, touch: Touch) -> tuple[bool, float]:
-    """Sort key of single contacts: those that push, then the best fit."""
     rest = found.residual
     about = np.array(rest[3:]) - np.cross(touch.point_m, rest[:3])
     return found.forces_n[0] == NONE, found.chi2 if found.chi2 is not None else float(about @ about)
@@ -269,7 +263,6 @@ def _solution(
     chi2: float | None,
     beyond: bool,
 ) -> Solution:
-    """A solution; ``chi2`` None is computed from the residual."""
     half = math.sqrt(0.5)
     null = [] if along is None else [[half * one for one in along] + [-half * one for one in along]]
     rank = 3 if along is None else 5
@@ -332,12 +325,10 @@ class _Line:
         self.push, self.more = -dot(self.normal, self.start), -dot(self.normal, self.along)
 
     def force(self, squeeze: float) -> Vector:
-        """Force at this squeeze."""
         (x, y, z), (ax, ay, az) = self.start, self.along
         return x + squeeze * ax, y + squeeze * ay, z + squeeze * az
 
     def pushes(self, allowed: Range) -> Interval:
-        """Least and largest push."""
         push, more = self.push, self.more
         if abs(more) <= ROUNDING:
             push = max(0.0, push)
@@ -375,7 +366,6 @@ class _Line:
 
 
 def _below(slope: float, level: float) -> Range | None:
-    """Range of t with slope t + level <= 0."""
     if abs(slope) <= ROUNDING:
         return (-math.inf, math.inf) if level <= ROUNDING else None
     end = -level / slope
@@ -383,7 +373,7 @@ def _below(slope: float, level: float) -> Range | None:
 
 
 def both(first: Range | None, second: Range | None) -> Range | None:
-    """The common part of two ranges; a gap of rounding counts as a common point."""
+    """Common part of two ranges; a gap of rounding counts as a common point."""
     if first is None or second is None:
         return None
     low, high = max(first[0], second[0]), min(first[1], second[1])

@@ -1,7 +1,6 @@
-"""The linear system of one frame: forces at known places, and their wrench, weighted by its noise; solved for any
-number of contacts by non-negative least squares (scipy, from three on) or in friction's cones (Clarabel).
+"""The linear system of one frame: forces at known places, and their wrench, weighted by its noise.
 
-Both solvers are loaded on demand.
+Its solvers, non-negative least squares (scipy) and cones (Clarabel), are loaded on demand.
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ SAME_M = 1e-9
 class System:
     """A wrench, its points, and the weight of its components.
 
-    Without noise a newton counts as much as a newton times the contacts' mean distance, about their barycenter: then
-    the answer does not depend on the frame or the unit of length.
+    Without noise a newton counts as much as a newton times the contacts' mean distance from their barycenter, so the
+    answer does not depend on frame or unit.
     """
 
     def __init__(self, wrench: Wrench, touches: Sequence[Touch]):
@@ -58,7 +57,7 @@ class System:
         return np.sqrt(self.weight) if self.noise is None else self.noise.root
 
     def matrix(self) -> Floats:
-        """The matrix (6, 3k) from k forces in N to the wrench in N and Nm."""
+        """(6, 3k) matrix from k forces to the wrench."""
         rows: list[list[float]] = [[], [], [], [], [], []]
         for x, y, z in self.points:
             rows[0] += (1.0, 0.0, 0.0)
@@ -70,7 +69,7 @@ class System:
         return np.array(rows)
 
     def pushes(self) -> Floats:
-        """The matrix (6, k) from k pushes in N along the normals to the wrench in N and Nm."""
+        """(6, k) matrix from k pushes along the normals to the wrench."""
         columns = []
         for (x, y, z), touch in zip(self.points, self.touches):
             nx, ny, nz = touch.normal
@@ -93,7 +92,7 @@ class System:
         return moved
 
     def places_widen(self, forces: Floats) -> bool:
-        """Add the effect of uncertain places on the moments to the noise; False if places are certain."""
+        """Add the effect of uncertain places on moments to the noise; False if places are certain."""
         if self.noise is None or not any(touch.point_sigma_m for touch in self.touches):
             return False
         more = np.zeros((3, 3))
@@ -120,7 +119,7 @@ class System:
 
 
 def distinct(touches: Sequence[Touch]) -> None:
-    """Raises :class:`HapticsError` if two touches are at one place: their forces are indistinguishable."""
+    """Raise :class:`HapticsError` for two touches at one place, whose forces are indistinguishable."""
     for last, one in enumerate(touches):
         for first in range(last):
             if math.dist(one.point_m, touches[first].point_m) < SAME_M:
@@ -131,7 +130,7 @@ EDGES = 12
 """Edges of the inscribed pyramid for friction's cone."""
 
 SMALL = 1e-6
-"""Share of the wrench that pushes alone may leave unexplained without known noise."""
+"""Share of the wrench that pushes alone may leave unexplained without noise."""
 
 
 def along_normals(system: System) -> Solution:
@@ -154,7 +153,7 @@ def by_least_squares(system: System) -> Solution:
 
 
 def _beyond(system: System, forces: Sequence[Vector]) -> bool:
-    """Whether these forces, the best within friction's cones, fit the wrench worse than unrestricted ones."""
+    """Whether these forces, the best within friction's cones, fit worse than unrestricted ones."""
     matrix = system.root @ system.matrix()
     rest = system.root @ system.wrench - matrix @ np.ravel(forces)
     more = matrix @ np.linalg.lstsq(matrix, rest, rcond=confidence.KNOWN)[0]
@@ -185,7 +184,6 @@ def _along_normals(system: System) -> list[Vector]:
 
 
 def _few(matrix: Floats, system: System) -> list[float]:
-    """The best one or two nonnegative amounts."""
     weighted = matrix.T @ system.weight
     gram, wanted = (weighted @ matrix).tolist(), (weighted @ system.wrench).tolist()
     alone = [max(0.0, want / gram[at][at]) if gram[at][at] > 0 else 0.0 for at, want in enumerate(wanted)]
@@ -268,7 +266,6 @@ def _solution(
 
 
 def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:
-    """Rank, and the null space as columns."""
     _, values, right = np.linalg.svd(system.centered(matrix))
     rank = int((values > 1e-9 * values[0]).sum())
     return rank, right[rank:].T
@@ -279,7 +276,7 @@ def _rank(system: System, matrix: Floats) -> int:
 
 
 DETERMINED = 1e-9
-"""Share of a push within which the null space may change it if it counts as known."""
+"""Effect of the null space up to which a push counts as known, as a share of it."""
 
 SMALLEST = 1e-7
 """Weight of the forces' own size against the wrench."""
@@ -299,12 +296,12 @@ def _frame(normal: Vector) -> Floats:
 
 
 def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, beyond: bool) -> list[Interval]:
-    """The least and largest push in N of each contact, containing those of ``forces``: with noise at 95 %
+    """The least and largest push of each contact, containing those of ``forces``: with noise at 95 %
     (:mod:`contactfpga.robot.haptics.confidence`), without it over all forces that exert exactly the same wrench.
 
     Args:
         frictionless: all forces are along the normals.
-        beyond: ``forces`` do not exert the wrench. With noise friction then bounds nothing.
+        beyond: ``forces`` do not exert the wrench; with noise friction then bounds nothing.
     """
     if system.noise is None:
         return _exact(system, forces, frictionless)
@@ -321,7 +318,6 @@ def intervals_of(system: System, forces: Sequence[Vector], frictionless: bool, b
 
 
 def _fitted(fit: confidence.Fit) -> list[Interval]:
-    """Intervals of a fit, by numpy for up to two contacts."""
     return fit.intervals() if fit.contacts <= 2 else fit.intervals(_ends_of_many)
 
 
@@ -344,7 +340,7 @@ def _frictions(touches: Sequence[Touch], frictionless: bool) -> list[float]:
 
 
 def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
-    """Least and largest push in N of each contact over all forces in the cones with the wrench of ``forces``. None:
+    """Least and largest push of each contact over all forces in the cones with the wrench of ``forces``; None:
     unbounded."""
     basis, firsts = _basis(system.touches, frictionless)
     _, values, right = np.linalg.svd(system.centered(system.matrix() @ basis))
@@ -367,7 +363,7 @@ def _exact(system: System, forces: Sequence[Vector], frictionless: bool) -> list
 
 
 def _nearest(system: System) -> Floats:
-    """The smallest forces (3k,) in N in the cones that exert the nearest wrench."""
+    """(3k,): smallest forces in the cones that exert the nearest wrench."""
     basis, firsts = _basis(system.touches, False)
     matrix = system.root @ system.matrix() @ basis
     square = matrix.T @ matrix
@@ -394,12 +390,9 @@ def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[i
 
 
 class _Solver:
-    """start + y in all cones, with fixed y = 0. The problem is so sparse that 64 contacts need no longer each than
-    three; with the null space of ``fixed`` they need 50 times as long.
+    """start + y in all cones, with fixed y = 0; ``near`` is a matrix, its wanted product with y, and the tolerance.
 
-    Args:
-        frictions: of each contact; 0: a push alone.
-        near: a matrix, its wanted product with y, and the tolerance.
+    The problem is so sparse that 64 contacts need no longer each than three.
     """
 
     def __init__(
@@ -431,7 +424,6 @@ class _Solver:
         self._start = np.concatenate(starts)
 
     def least(self, at: int, factor: float) -> float | None:
-        """The minimum of ``factor`` times this component of y; None if unbounded."""
         count = self._sides.shape[1]
         slope = np.zeros(count)
         slope[at] = factor
@@ -444,7 +436,6 @@ class _Solver:
         return float(solution.obj_val)
 
     def solve(self, square: Floats, slope: Floats) -> Floats:
-        """The y that minimizes y square y / 2 + slope y."""
         solution = self._run(self._sparse.csc_matrix(np.triu(square)), slope)
         if "Solved" not in str(solution.status):
             raise HapticsError(f"no forces within friction's cones were found ({solution.status})")

@@ -30,21 +30,21 @@ from contactfpga.surfaces.shapes import Floats, Vector
 
 @dataclasses.dataclass(frozen=True)
 class Unit:
-    """A unit, which pushes the bumper along its axis, and measures the force."""
+    """A unit, which pushes the bumper along its axis and measures the force."""
 
     point_m: Vector
     axis: Vector
-    """Unit vector of its axis."""
+    """Unit vector of the axis."""
     gain_n: float = 1.0
-    """Newtons per step of its reading."""
+    """Newtons per step of the reading."""
     zero: float = 0.0
-    """Its reading without touch."""
+    """Reading without touch."""
     sigma_n: float = 0.05
-    """Standard deviation of its noise."""
+    """Standard deviation of the noise."""
     range: tuple[float, float] | None = None
-    """Saturated readings at its ends; None: none."""
+    """Saturated readings at both ends; None: none."""
     preload_n: float | None = None
-    """Spring force on it without touch. None: unknown, and lifting is not reported."""
+    """Spring force without touch; None: unknown, and lifting is not reported."""
 
     def __post_init__(self) -> None:
         within("point_m", self.point_m, "m")
@@ -83,8 +83,7 @@ class LoadCells:
          matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
          surface: the bumper's outside.
          sheet_m: position of column 0 and row 0 of the sheet on the surface laid flat.
-         noise_n2: (n, n) covariance of the units' noise in N2, for units that share a supply or a reference; None:
-         independent, by each unit's ``sigma_n``, which it replaces.
+         noise_n2: (n, n) covariance of the units' noise, in place of each ``sigma_n``; None: independent.
         """
         if not units:
             raise HapticsError("there is no unit; give at least one")
@@ -117,7 +116,6 @@ class LoadCells:
         self._preload = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in self.units])
 
     def _spread(self) -> Floats:
-        """(6, 6): the units' noise as a covariance of the wrench."""
         per_newton = self.matrix / self._gains
         if self.noise_n2 is not None:
             return np.asarray(per_newton @ self.noise_n2 @ per_newton.T)
@@ -131,7 +129,7 @@ class LoadCells:
 
     def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
         """The contacts' wrench on the link, from one reading per unit. With ``motion`` the bumper's weight and inertia
-        are subtracted; without, it must be at rest as when its zeros were read."""
+        are subtracted; without, the bumper must be at rest as when its zeros were read."""
         read = array("readings", readings)
         if read.shape != self.zeros.shape:
             raise HapticsError(
@@ -156,7 +154,7 @@ class LoadCells:
         return tuple((deviations * self._gains + self._preload <= 0).nonzero()[0].tolist())
 
     def wrenches(self, readings: Floats) -> Floats:
-        """(m, 6): forces and moments of (m, n) readings, with the bumper at rest as when its zeros were read."""
+        """(m, 6) wrenches of (m, n) readings, with the bumper at rest as when its zeros were read."""
         return np.asarray((np.atleast_2d(self._read(readings)) - self.zeros) @ self.matrix.T)
 
     def _read(self, readings: Sequence[float] | Floats) -> Floats:
@@ -174,7 +172,6 @@ class LoadCells:
 
     @functools.cached_property
     def _seen(self) -> tuple[Floats, int, Vector, float]:
-        """Left singular vectors about the units' barycenter, moments over their distance; rank; place; distance."""
         x, y, z = np.mean([unit.point_m for unit in self.units], axis=0).tolist()
         moved = np.array(self.matrix)
         moved[3:] -= skew((x, y, z)) @ moved[:3]
@@ -191,8 +188,7 @@ class LoadCells:
 
     @property
     def unseen(self) -> Floats:
-        """Unseen components, (6 - rank, 6): the inner product of each row with a wrench about the link's origin. As a
-        motion, a row is one that no unit resists."""
+        """(6 - rank, 6): unseen components, by the inner product of each row with a wrench about the link's origin."""
         vectors, rank, place, length = self._seen
         lost = np.array(vectors[:, rank:])
         lost[3:] /= length
@@ -206,15 +202,15 @@ class LoadCells:
         return [_in_words(one) for one in reduced(self.unseen)]
 
     def noise_at(self, point_m: Vector) -> Floats:
-        """Standard deviations (3,) in N of the force of a single contact at a known point, along x, y and z."""
+        """(3,) standard deviations of the force of a single contact at a known point."""
         if self.rank < 6:
             raise HapticsError(f"the units see {self.rank} of 6 components; not all of a force is known at any point")
         exerts = np.concatenate([np.eye(3), skew(point_m)])
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(exerts.T @ self.noise.information @ exerts))))
 
     def lifting_n(self, point_m: Vector, along: Vector) -> float:
-        """The force in N, along the unit vector ``along`` at this point, that lifts a unit; infinite if none. Needs
-        every unit's ``preload_n``."""
+        """Force along the unit vector ``along`` at this point that lifts a unit; infinite if none. Needs every unit's
+        ``preload_n``."""
         if not np.isfinite(self._preload).all():
             raise HapticsError("preload_n is missing; give the preload of every unit")
         exerted = np.concatenate([along, np.cross(point_m, along)])
@@ -225,11 +221,8 @@ class LoadCells:
     def rezeroed(self, readings: Floats, zones: int, gravity_m_s2: Vector | None = None) -> LoadCells:
         """A copy with new zeros, from (m, n) readings without touch.
 
-        Raises :class:`HapticsError` if something touches: ``zones`` on the sheet, or readings that vary by more than
-        three times their noise.
-
-        Args:
-            gravity_m_s2: current gravity in the link's frame; None: as when the last zeros were read.
+        Raises :class:`HapticsError` if ``zones`` are pressed, or readings vary by more than three times their noise.
+        ``gravity_m_s2`` is in the link's frame; None: as when the last zeros were read.
         """
         if zones:
             raise HapticsError(f"{zones} zones are pressed; zeros are read while nothing touches")
@@ -248,8 +241,8 @@ class LoadCells:
     def changed(
         self, zeros: Floats, matrix: Floats | None, noise_n2: Floats | None, gravity_m_s2: Vector | None = None
     ) -> LoadCells:
-        """Units with these zeros (n,) in steps, this matrix, (6, n) in N and Nm per step, or None: not calibrated, and
-        this noise covariance, (n, n) in N2, or None: independent."""
+        """A copy with zeros (n,) in steps, matrix (6, n) in N and Nm per step or None, and noise covariance (n, n) in
+        N2 or None."""
         return LoadCells(
             [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, zeros)],
             frame=self.frame,
@@ -263,7 +256,7 @@ class LoadCells:
 
 
 def covariance(name: str, values: Any, count: int) -> Floats:
-    """(count, count): the given values, if a covariance without zero variances. Raises :class:`HapticsError`."""
+    """(count, count) covariance without zero variances. Raises :class:`HapticsError` for other values."""
     given = matrix(name, values, count, count)
     if not (np.diag(given) > 0).all():
         raise HapticsError(f"{name} has a variance of {np.diag(given).min():g}; each unit has some noise, above 0 N2")
@@ -273,7 +266,7 @@ def covariance(name: str, values: Any, count: int) -> Floats:
 
 
 def reduced(rows: Floats) -> Floats:
-    """Rows with the same span, each with a leading 1 that the others lack, so that each involves few components."""
+    """Rows with the same span, reduced so that each involves few components."""
     found = np.array(rows)
     done = 0
     for column in range(found.shape[1]):
@@ -332,7 +325,6 @@ def read(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _surface(values: Any) -> dict[str, Any]:
-    """The bumper's outside, and the sheet's origin on it."""
     kind = dict(values) if isinstance(values, dict) else values
     place = kind.pop("sheet_m", (0.0, 0.0)) if isinstance(kind, dict) else None
     found = read_surface(kind)
@@ -391,7 +383,7 @@ def _known(values: Any, keys: tuple[str, ...], name: str) -> None:
 
 
 def write(cells: LoadCells) -> str:
-    """The text that :func:`read` reads back."""
+    """The text of a units.toml."""
     lines = [f"frame = {json.dumps(cells.frame)}"] if cells.frame else []
     if any(cells.zero_gravity_m_s2):
         lines.append(f"zero_gravity_m_s2 = {json.dumps(list(cells.zero_gravity_m_s2))}")

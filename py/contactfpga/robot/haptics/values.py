@@ -1,5 +1,4 @@
-"""Invalid input of a bumper, checks of numbers from outside, and vectors of three numbers in plain Python, faster than
-numpy."""
+"""Checks of a bumper's numbers, and vectors of three numbers in plain Python, faster than numpy."""
 
 from __future__ import annotations
 
@@ -22,18 +21,18 @@ SMALLEST = 1e-9
 
 
 class HapticsError(ContactFPGAError, ValueError):
-    """An impossible value of a bumper, unit or contact; the message names it and the limit."""
+    """An impossible value of a bumper, unit or contact."""
 
 
 def number(name: str, value: Any, low: float = -LARGEST, high: float = LARGEST, unit: str = "") -> float:
-    """``value`` if it is a number from ``low`` to ``high``; raises :class:`HapticsError`."""
+    """Check a number from ``low`` to ``high``; raises :class:`HapticsError`."""
     if not is_finite(value) or not low <= value <= high:
         raise HapticsError(f"{name} is {shown(value)}; it must be a number from {low:g} to {high:g} {unit}".rstrip())
     return float(value)
 
 
 def positive(name: str, value: Any, unit: str) -> float:
-    """``value`` if it is a number above 0; raises :class:`HapticsError`."""
+    """Check a number above 0; raises :class:`HapticsError`."""
     if not is_finite(value) or not 0 < value <= LARGEST:
         raise HapticsError(f"{name} is {shown(value)}; it must be a number above 0 and at most {LARGEST:g} {unit}")
     if value < SMALLEST:
@@ -42,7 +41,7 @@ def positive(name: str, value: Any, unit: str) -> float:
 
 
 def within(name: str, values: Sequence[float], unit: str) -> None:
-    """Raises :class:`HapticsError` unless all of these are usable numbers."""
+    """Raise :class:`HapticsError` unless all values are finite numbers."""
     for value in values:
         if not -LARGEST <= value <= LARGEST:
             raise HapticsError(
@@ -51,7 +50,7 @@ def within(name: str, values: Sequence[float], unit: str) -> None:
 
 
 def array(name: str, values: Any) -> Floats:
-    """An array of usable numbers, of any shape; raises :class:`HapticsError`."""
+    """An array of finite numbers, of any shape; raises :class:`HapticsError`."""
     try:
         found = np.asarray(values, float)
     except OverflowError:  # one of Python's whole numbers
@@ -104,18 +103,18 @@ def cross(first: Sequence[float], second: Sequence[float]) -> Vector:
 
 
 def minus(vector: Vector) -> Vector:
-    """The opposite."""
+    """The opposite vector."""
     return -vector[0], -vector[1], -vector[2]
 
 
 def skew(point: Sequence[float]) -> Floats:
-    """The matrix (3, 3) from a force in N at the point in m to its moment in Nm about the origin."""
+    """(3, 3) matrix from a force at the point to its moment about the origin."""
     x, y, z = point
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def solve_symmetric(matrix: Sequence[Sequence[float]], wanted: Vector) -> Vector:
-    """The x with ``matrix`` x = ``wanted``. The (3, 3) matrix must be symmetric and positive definite."""
+    """The x with ``matrix`` x = ``wanted``, for a symmetric and positive definite (3, 3) matrix."""
     (a, b, c), (_, d, e), (_, _, f) = matrix
     low = b / a
     lower = c / a

@@ -1,5 +1,4 @@
-"""Force and moment on the link, with their noise: the units' common measurement, and its center of pressure on the
-bumper's outside."""
+"""Force and moment on the link, with their noise, and their center of pressure on the bumper's outside."""
 
 from __future__ import annotations
 
@@ -22,16 +21,15 @@ Block = tuple[Vector, ...]
 
 
 class Noise:
-    """The covariance of a wrench, and derived quantities; one object serves all wrenches of the same units."""
+    """The covariance of a wrench; one object serves all wrenches of the same units."""
 
     def __init__(self, covariance: Floats):
         self.covariance = covariance
-        """(6, 6): N2, Nm2 and N Nm; about the link's origin."""
+        """(6, 6) in N2, Nm2 and N Nm, about the link's origin."""
 
     @classmethod
     def checked(cls, covariance: Floats) -> Noise | None:
-        """The noise of a covariance from outside; None if it is all 0, which is uninformative. Raises
-        :class:`HapticsError` if it is no covariance."""
+        """The noise of a covariance; None if it is all 0. Raises :class:`HapticsError` if it is no covariance."""
         if not covariance.any():
             return None
         size = np.sqrt(np.abs(np.diag(covariance)))
@@ -47,7 +45,7 @@ class Noise:
 
     @functools.cached_property
     def _spectrum(self) -> tuple[Floats, Floats, Floats]:
-        """Eigenvalues and vectors of the correlations, and their standard deviations."""
+        """Eigenvalues and vectors of the correlations, and inverse standard deviations."""
         size = np.sqrt(np.diag(self.covariance))
         size = np.where(size > 1e-9 * size.max(), size, 0.0)
         over = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
@@ -56,15 +54,14 @@ class Noise:
 
     @functools.cached_property
     def blocks(self) -> tuple[Block, Block, Block]:
-        """Covariances force by force, force by moment, moment by moment, in plain numbers."""
+        """Covariances of forces, of force and moment, and of moments, in plain numbers."""
         parts = (self.covariance[:3, :3], self.covariance[:3, 3:], self.covariance[3:, 3:])
         force, both, moment = (tuple(map(tuple, part.tolist())) for part in parts)
         return force, both, moment
 
     @functools.cached_property
     def information(self) -> Floats:
-        """(6, 6): the inverse of the covariance. A component without noise is unseen by the units and gets no
-        weight."""
+        """(6, 6): inverse of the covariance, without weight for a component that the units do not see."""
         return np.asarray(self.root.T @ self.root)
 
     @functools.cached_property
@@ -75,7 +72,7 @@ class Noise:
         return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T * over)
 
     def widened(self, moments: Floats) -> Noise:
-        """The noise with ``moments``, (3, 3) in N2m2, added to the covariance of the seen moments."""
+        """The noise with (3, 3) ``moments`` in N2m2 added to the covariance of the seen moments."""
         more = np.zeros((6, 6))
         more[3:, 3:] = moments
         if self.rank < 6:
@@ -100,11 +97,11 @@ class Wrench:
     moment_nm: Vector
     """Moment about the origin of the link's frame."""
     noise: Noise | None = None
-    """None if unknown."""
+    """Noise of the wrench; None if unknown."""
     frame: str = ""
     """Name of the link's frame."""
     saturated: tuple[int, ...] = ()
-    """Indexes of saturated units: the wrench is wrong by an unknown amount."""
+    """Indexes of saturated units, which make the wrench wrong by an unknown amount."""
     lifted: tuple[int, ...] = ()
     """Indexes of lifted units, which would have to pull."""
 
@@ -119,13 +116,13 @@ class Wrench:
 
     @property
     def array(self) -> Floats:
-        """Force in N and moment in Nm, (6,)."""
+        """(6,): force in N and moment in Nm."""
         return np.array((*self.force_n, *self.moment_nm))
 
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """Motion of the link, in its own frame, for the bumper's inertial force."""
+    """Motion of the link in its own frame, for the bumper's inertial force."""
 
     gravity_m_s2: Vector = (0.0, 0.0, -9.80665)
     """Gravity in the link's frame."""
@@ -147,9 +144,9 @@ class Bumper:
 
     mass_kg: float
     center_m: Vector
-    """Its center of mass in the link's frame."""
+    """Center of mass in the link's frame."""
     inertia_kg_m2: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0),) * 3
-    """Inertia about its center of mass."""
+    """Inertia about the center of mass."""
 
     def __post_init__(self) -> None:
         number("mass_kg", self.mass_kg, 0, LARGEST, "kg")
@@ -158,7 +155,7 @@ class Bumper:
             within("inertia_kg_m2", row, "kg m2")
 
     def wrench(self, motion: Motion) -> Floats:
-        """The wrench (6,) in N and Nm of the units on the bumper that moves it with the link."""
+        """(6,) wrench of the units on the bumper that moves it with the link."""
         center, inertia = np.array(self.center_m), np.array(self.inertia_kg_m2)
         spin, more = np.array(motion.turning_rad_s), np.array(motion.turning_rad_s2)
         felt = np.array(motion.acceleration_m_s2) - np.array(motion.gravity_m_s2)
@@ -170,11 +167,11 @@ class Bumper:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Center:
-    """The place where one contact alone would exert the wrench, by a force and a moment about the normal."""
+    """The place where one contact alone would exert the wrench."""
 
     point_m: Vector
     normal: Vector
-    """Outward unit normal there."""
+    """Outward unit normal at the point."""
     normal_n: float
     """Push, above 0."""
     tangential_n: float
@@ -184,7 +181,7 @@ class Center:
     force_n: Vector
     """Force on the link."""
     sheet_m: tuple[float, float]
-    """The point on the surface laid flat: x and y of a plane, arc length and z of a cylinder."""
+    """The point on the surface laid flat; x is the arc length of a cylinder, y its z."""
     covariance_m2: Floats | None
     """(2, 2) covariance of ``sheet_m`` from the wrench's noise; None if unknown."""
 
@@ -213,7 +210,7 @@ class Plane:
         return Center((x, y, h), (0.0, 0.0, 1.0), -fz, math.hypot(fx, fy), torsion, wrench.force_n, (x, y), spread)
 
     def slopes(self, fz: float, x_m: float, y_m: float) -> Floats:
-        """Derivative (2, 6) of the center of pressure, in m per N and per Nm of the wrench."""
+        """(2, 6) derivative of the center of pressure by the wrench, in m per N and per Nm."""
         h = self.height_m
         return np.array([[h, 0, -x_m, 0, -1, 0], [0, h, -y_m, 1, 0, 0]]) / fz
 
@@ -228,7 +225,7 @@ class Plane:
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder:
-    """A cylinder about the link's z axis, whose radius includes the foam, as the force enters at the outside."""
+    """A cylinder about the link's z axis, whose radius includes the foam."""
 
     radius_m: float
 
@@ -258,7 +255,7 @@ class Cylinder:
         return Center(point, normal, -push, sideways, torsion, wrench.force_n, (radius * angle, z), spread)
 
     def slopes(self, wrench: Wrench, push: float, normal: Vector, z: float) -> Floats:
-        """Derivative (2, 6) of arc length and z, in m per N and per Nm of the wrench."""
+        """(2, 6) derivative of arc length and z by the wrench, in m per N and per Nm."""
         (fx, fy, _), (mx, my, mz) = wrench.force_n, wrench.moment_nm
         radius, square = self.radius_m, fx * fx + fy * fy
         across = mz / radius
@@ -286,7 +283,7 @@ SURFACES: dict[str, tuple[type[Plane] | type[Cylinder], str]] = {
 
 
 def read_surface(values: Any, name: str = "surface") -> Surface:
-    """The surface of a table; raises :class:`HapticsError`."""
+    """The surface of a TOML table; raises :class:`HapticsError`."""
     if not isinstance(values, dict) or values.get("kind") not in list(SURFACES):
         kind = values.get("kind") if isinstance(values, dict) else values
         raise HapticsError(

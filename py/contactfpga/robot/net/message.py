@@ -13,15 +13,13 @@ _MAGIC = _NAME + VERSION
 HEAD_BYTES = _HEAD.size
 
 MOST_BYTES = 1 << 16
-"""Most bytes of a board in one message."""
 MOST_ASKED = 512
-"""Most bytes of one message to a board."""
 BREAK_S = 2.0
-"""Length of a gap after which the number of wraps of frame times in it is unknown."""
+"""Gap after which the number of wraps of frame times is unknown."""
 BEAT_S = 0.25
-"""Longest interval of a publisher's messages, so that a loss is noticed without later data."""
+"""Longest interval of a publisher's messages, which shows losses without later data."""
 QUIET_S = 2 * BEAT_S
-"""Time without an accepted message after which contradicting messages may be genuine."""
+"""Time without an accepted message after which contradicting ones may be genuine."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -29,15 +27,15 @@ class Message:
     """A message of a publisher."""
 
     publisher: int
-    """A random number, drawn at each start of a publisher."""
+    """Random number, drawn at each start of a publisher."""
     sequence: int
-    """Number of messages before this one."""
+    """Messages before this one."""
     offset: int
-    """Number of bytes before this message's."""
+    """Bytes before this message's."""
     read_us: int
     """Read time, on the publisher's clock."""
     denied: int
-    """Messages to the board that it refused."""
+    """Messages to the board that the publisher refused."""
     data: bytes
 
     def encode(self) -> bytes:
@@ -54,12 +52,12 @@ class Message:
         return cls(publisher, sequence, offset, read_us, denied, payload[HEAD_BYTES:])
 
     def follows(self, other: Message) -> bool:
-        """Whether its publisher can have sent it after the other, with any number of messages between."""
+        """Whether the publisher can have sent this after the other, with any messages between."""
         after = self.sequence > other.sequence and self.offset >= other.offset + len(other.data)
         return self.publisher == other.publisher and after
 
     def continues(self, other: Message) -> bool:
-        """Whether it is the next message."""
+        """Whether this message is the next after the other."""
         return self.follows(other) and (self.sequence, self.offset) == (
             other.sequence + 1,
             other.offset + len(other.data),
@@ -75,16 +73,15 @@ class Stream:
     """Reassembles the bytes of messages, with a delimiter in each gap, so that no packet mixes two.
 
     Anyone who may write under the key can forge messages. A message that continues the last one is accepted at once.
-    Any other, such as the first and one after a gap, is held until the next message follows it. If it contradicts the
-    last one, nothing may have been accepted for :data:`QUIET_S`, either. So a single forged message blocks later ones
-    for at most :data:`QUIET_S` and two beats.
+    Any other is held until the next message follows it; if it contradicts the last one, nothing may have been accepted
+    for :data:`QUIET_S`, either. So a forged message blocks later ones for at most :data:`QUIET_S` and two beats.
     """
 
     def __init__(self, counters: NetCounters):
         self.heard_s: float | None = None
         """Arrival of the last message that its publisher can have sent now."""
         self.ended = False
-        """Whether the publisher announced its end, without later messages: another may follow at once."""
+        """Whether the publisher announced its end, without later messages."""
         self.other_version = False
         """Whether only messages of another version arrived."""
         self._counters = counters
@@ -98,7 +95,7 @@ class Stream:
         return None if self._last is None else self._last.publisher
 
     def take(self, payload: bytes, now_s: float) -> list[tuple[bytes, bool]]:
-        """The bytes added by a message that arrives at ``now_s``: pieces, each with whether it follows a break."""
+        """Bytes added by a message that arrives at ``now_s``: pieces, each with whether it follows a break."""
         message = Message.decode(payload)
         if message is None:
             self._counters.refused += 1
@@ -128,7 +125,6 @@ class Stream:
         return pieces
 
     def _may_come(self, message: Message, now_s: float) -> bool:
-        """Whether a message may follow the last one without continuing it."""
         last = self._last
         if last is None or message.follows(last) or now_s - self._taken_s >= QUIET_S:
             return True

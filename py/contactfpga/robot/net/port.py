@@ -18,14 +18,13 @@ if TYPE_CHECKING:
     import zenoh
 
 MOST_WAITING = 1 << 24
-"""Most unread bytes; beyond it the oldest are dropped."""
+"""Most unread bytes, beyond which the oldest are dropped."""
 FOUND_S = 3.0
 """Timeout for the first message of a publisher."""
 GONE_S = 1.0
-"""Silence after which a publisher is gone, whatever its token: anyone can declare a token."""
+"""Silence after which a publisher is gone, whatever its token, which anyone can declare."""
 LATE_S = 0.2
-"""How much longer than asked for a wait lasts if this process stood still, as one that is stopped or gets no processor.
-That is no silence of the publisher's, whose messages may wait to be taken."""
+"""Excess of a wait over its timeout from which this process, not the publisher, stood still."""
 
 
 class ZenohPort:
@@ -135,7 +134,6 @@ class ZenohPort:
                 self._changed.notify_all()
 
     def _leave_out(self) -> None:
-        """Drop the oldest unread bytes; the rest follows a break."""
         oldest, oldest_broken = self._pieces.popleft()
         self._waiting -= len(oldest)
         self.counters.left_out += len(oldest) - oldest.startswith(b"\0")
@@ -146,7 +144,6 @@ class ZenohPort:
         self._waiting += len(self._pieces[0][0]) - len(following)
 
     def _note(self, sample: zenoh.Sample) -> None:
-        """Handle the beginning or end of a publisher."""
         import zenoh
 
         name = str(sample.key_expr).rpartition("/")[2]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import zenoh
 
 SLICE_S = 0.01
-"""Longest interval of reading a port while bytes are collected, lest it overflows."""
+"""Longest interval of reading a port while bytes are collected, lest it overflow."""
 SIMULATED_S = 0.002
 """Most simulated time that passes at once."""
 
@@ -40,8 +40,8 @@ class BoardPort(Protocol):
 class BoardPublisher:
     """One board under one key: ``KEY/bytes`` from it, ``KEY/ask`` to it, ``KEY/alive/...`` while this runs.
 
-    ``batch_s``: time for which bytes are collected. ``block``: on a slow network wait and let the port overflow; else
-    Zenoh drops messages. Readers count both. ``commands``: pass commands as well as requests. Raises
+    Bytes are collected for ``batch_s``. On a slow network the publisher waits and lets the port overflow with
+    ``block``, else Zenoh drops messages. ``commands`` passes commands as well as requests. Raises
     :class:`~contactfpga.ContactFPGAError` if the key is taken.
     """
 
@@ -59,7 +59,7 @@ class BoardPublisher:
         import zenoh
 
         self.denied = self.passed = self.sent = 0
-        """Messages to the board refused, and passed; messages from it."""
+        """Messages to the board refused and passed; messages from it."""
         self._source, self._batch_s, self._commands, self._clock = source, batch_s, commands, clock
         self._number = random.SystemRandom().getrandbits(64)
         self._offset = 0
@@ -117,7 +117,6 @@ class BoardPublisher:
         return data
 
     def _take(self, sample: zenoh.Sample) -> None:
-        """Handle a request to the board."""
         data = sample.payload.to_bytes()
         asked = request_kind(data) if len(data) <= MOST_ASKED else RequestKind.OTHER
         if asked is RequestKind.OTHER or (asked is RequestKind.COMMAND and not self._commands):

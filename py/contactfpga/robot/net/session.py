@@ -32,11 +32,11 @@ def key_of(name: str, fingerprint: bytes) -> str:
 
 
 def own_endpoint() -> str:
-    """The default endpoint of publishers and ports.
+    """The default endpoint of publishers and ports: a Unix socket in a folder for this user alone, on Windows
+    :data:`LOOPBACK`.
 
-    It is a Unix socket in a folder for this user alone: in ``XDG_RUNTIME_DIR``, else in the folder for temporary files.
-    On Windows it is :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` if another user could open or
-    replace the folder.
+    The folder is in ``XDG_RUNTIME_DIR`` or that for temporary files. Raises :class:`~contactfpga.ContactFPGAError` if
+    another user could open or replace it.
     """
     if sys.platform == "win32":
         return LOOPBACK
@@ -75,9 +75,8 @@ def is_loopback(endpoint: str) -> bool:
 LEASE_MS = 1000
 """Silence after which a peer counts as gone."""
 MOST_RECEIVED = 1 << 20
-"""Approximate largest message that a session accepts: more than any of ours, and little memory."""
+"""Approximate largest message that a session accepts, more than any of ours."""
 CONNECT_MS = 2000
-"""Timeout of a connection."""
 
 
 FILES = (
@@ -89,7 +88,7 @@ FILES = (
 
 
 def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
-    """A session that others connect to, and that forwards between them: a router."""
+    """A router: a session that others connect to, and that forwards between them."""
     return _open({"mode": "router"}, endpoint, config, "listen")
 
 
@@ -175,7 +174,6 @@ def _step(what: str, reason: str, places: Any) -> str:
 
 
 def _answers(place: str) -> bool:
-    """Whether a TCP endpoint accepts connections."""
     found = re.fullmatch(r"(?:tcp|tls)/\[?(.+?)\]?:(\d+)(?:[?#].*)?", place)
     if found is None:
         return False
@@ -187,5 +185,4 @@ def _answers(place: str) -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """The message without places in Zenoh's sources."""
     return str(error).split(" at /")[0].strip("[] ") or type(error).__name__

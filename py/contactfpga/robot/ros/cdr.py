@@ -10,7 +10,7 @@ from typing import Any
 from contactfpga.robot.ros.types import PRIMITIVES, MessageField, message_type
 
 HEAD = b"\x00\x01\x00\x00"
-"""Header for plain CDR, lowest byte first."""
+"""Header of plain CDR, lowest byte first."""
 
 Message = Mapping[str, Any]
 """Fields by name; a nested message is a mapping, an array any sequence."""
@@ -45,7 +45,6 @@ def _puts(name: str) -> tuple[_Put, ...]:
 
 
 def _leaves(name: str, path: _Path) -> list[tuple[_Path, MessageField | None]]:
-    """Fields in order, with those of nested messages in place."""
     found: list[tuple[_Path, MessageField | None]] = []
     for field in message_type(name).fields:
         where = (*path, field.name)

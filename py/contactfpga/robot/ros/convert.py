@@ -89,7 +89,7 @@ def zone(found: Zone) -> Message:
 
 
 def zones(frame: Zones, head: Message, sigma_s: float | None = None) -> Message:
-    """A ``Zones``; ``sigma_s`` is the standard deviation of the header's time in s."""
+    """A ``Zones``; ``sigma_s`` is the standard deviation of the header's time."""
     return {
         "header": head,
         "stamp_sigma": _NAN if sigma_s is None else sigma_s,
@@ -107,7 +107,7 @@ def zones(frame: Zones, head: Message, sigma_s: float | None = None) -> Message:
 
 @functools.cache
 def flag_bits(flags: frozenset[str]) -> int:
-    """The flags of a frame as a ``Zones`` has them."""
+    """Flags of a frame as bits of a ``Zones``."""
     return sum(FLAGS[name] for name in flags)
 
 
@@ -131,18 +131,17 @@ def contacts(found: Iterable[Track], head: Message, forces: Contacts | None = No
 
 
 def forces_of(forces: Contacts | None) -> dict[int | None, Sequence[float]]:
-    """The known forces in N by the ids of their tracks."""
+    """Known forces in N by track id."""
     return {one.track: one.force_n for one in forces or () if one.force_n is not None}
 
 
 def wrench(found: Wrench, head: Message) -> Message:
-    """A ``geometry_msgs/WrenchStamped``: the contacts' common wrench on the link, about its origin."""
+    """A ``geometry_msgs/WrenchStamped``: the contacts' wrench on the link, about its origin."""
     return {"header": head, "wrench": {"force": vector(found.force_n), "torque": vector(found.moment_nm)}}
 
 
 def transform(head: Message, child: str, place_m: Sequence[float], turn_rad: Sequence[float]) -> Message:
-    """A ``tf2_msgs/TFMessage``: the pose of a frame in the header's; rotations about the fixed x, y and z axes in turn,
-    as in a URDF."""
+    """A ``tf2_msgs/TFMessage``: pose of a frame in the header's, with ``turn_rad`` as in :func:`quaternion`."""
     made = {"translation": vector(place_m), "rotation": quaternion(*turn_rad)}
     return {"transforms": [{"header": head, "child_frame_id": child, "transform": made}]}
 
@@ -198,7 +197,7 @@ def vector(values: Sequence[float]) -> Message:
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Message:
-    """A ``geometry_msgs/Quaternion``: rotations about the fixed x, y and z axes in turn, in rad."""
+    """A ``geometry_msgs/Quaternion`` of rotations about the fixed x, y and z axes in turn, in rad."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(one / 2), math.cos(one / 2)) for one in (roll, pitch, yaw))
     return {
         "x": sr * cp * cy - cr * sp * sy,
@@ -213,11 +212,10 @@ ADD, DELETE_ALL = 0, 3
 LIFETIME_NS = 500_000_000
 """Lifetime of markers without updates: no data is never no contact."""
 NEWTON_M = 0.01
-"""Length of an arrow per newton; without forces :data:`ARROW_M`."""
+"""Length of an arrow per newton; :data:`ARROW_M` without forces."""
 ARROW_M = 0.03
 
 _EDGE = 16
-"""Segments of each edge of the outline."""
 _GRAY, _BLUE, _ORANGE = (0.5, 0.5, 0.5, 1.0), (0.0, 0.45, 0.7, 0.9), (0.85, 0.37, 0.0, 1.0)
 
 
@@ -226,7 +224,7 @@ Place = Callable[[float, float], tuple[Sequence[float], Sequence[float]]]
 
 
 def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
-    """The rim of the sheet's cells in m, as points of a line; ``place`` overrides the Skin's surface."""
+    """Rim of the sheet's cells in m, as points of a line; ``place`` overrides the Skin's surface."""
     x0, x1 = -sheet.pitch_x_mm / 2, (sheet.columns - 0.5) * sheet.pitch_x_mm
     y0, y1 = -sheet.pitch_y_mm / 2, (sheet.rows - 0.5) * sheet.pitch_y_mm
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
@@ -240,8 +238,8 @@ def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
 
 
 def markers(rim: Sequence[Message], found: Sequence[Track], head: Message, forces: Contacts | None = None) -> Message:
-    """A ``visualization_msgs/MarkerArray`` for RViz and Foxglove: the rim, and for each contact a ball as large as its
-    zone, its id, and an arrow: the force on the link, or if unknown the inward normal."""
+    """A ``visualization_msgs/MarkerArray``: the rim, and for each contact a ball as large as its zone, its id, and an
+    arrow of the force on the link, or of the inward normal."""
     shown = [_marker(head, "", 0, ADD, action=DELETE_ALL)]
     shown.append(_marker(head, "sheet", 0, LINE_STRIP, scale=(0.001, 0.0, 0.0), color=_GRAY, points=rim))
     known = forces_of(forces)

@@ -37,7 +37,6 @@ def kept_inside(make: Callable[[], _Made]) -> _Made:
 
 
 def _sockets() -> dict[str, int]:
-    """The process's sockets: names, and a number of each."""
     found = {}
     for number in os.listdir(_FOLDER):
         with contextlib.suppress(OSError):  # closed meanwhile
@@ -68,8 +67,8 @@ class Publisher:
     """A participant with a writer for each topic; a context manager."""
 
     def __init__(self, namespace: str = "skin", domain: int = 0, network: bool = False):
-        """``namespace`` of the topics; ``domain`` is ROS_DOMAIN_ID. On this computer alone, unless ``network``. Raises
-        :class:`~contactfpga.MissingExtra`."""
+        """Join ``domain`` (ROS_DOMAIN_ID) on this computer alone, unless ``network``; topics are in ``namespace``.
+        Raises :class:`~contactfpga.MissingExtra`."""
         try:
             from cyclonedds.domain import Domain, DomainParticipant
         except ModuleNotFoundError as error:
@@ -93,8 +92,8 @@ class Publisher:
         return TOPICS[name].resolved(self._namespace)
 
     def send(self, topic: str, data: bytes) -> None:
-        """Publish a message by the name of its topic, a key of :data:`TOPICS`. Raises
-        :class:`~contactfpga.BoardClosed` after :meth:`close`."""
+        """Publish a message by a key of :data:`TOPICS`. Raises :class:`~contactfpga.BoardClosed` after
+        :meth:`close`."""
         if self._participant is None:
             raise BoardClosed("this publisher was closed; make another one")
         writer, kind = self._writers[topic]

@@ -1,5 +1,4 @@
-"""From a board's data to messages: selection and timing, and diagnostics. The same for a ROS 2 node and for Cyclone
-DDS."""
+"""From a board's data to messages: selection, timing and diagnostics, for a ROS 2 node and for Cyclone DDS."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from contactfpga.robot.haptics.live import FrameSource
 
 KEPT_S = 1.0
-"""Interval of measuring the difference of the clocks, which drift and may be set."""
+"""Interval of measuring the difference of the clocks, which drift."""
 _TRIES = 5
 
 
@@ -53,8 +52,7 @@ class Moments:
 
 
 def offset_ns(now_ns: Callable[[], int], clock: Callable[[], float]) -> int:
-    """The first clock's lead over the second in ns, by the least interrupted of several readings: a process may rest
-    between two looks at clocks."""
+    """The first clock's lead over the second in ns, by the least interrupted of several readings."""
     found = []
     for _ in range(_TRIES):
         before, moment_ns, after = clock(), now_ns(), clock()
@@ -64,7 +62,7 @@ def offset_ns(now_ns: Callable[[], int], clock: Callable[[], float]) -> int:
 
 OK, WARN, ERROR = range(3)
 WAITED_S = 0.25
-"""Waiting time of frames that is reported."""
+"""Waiting time of frames from which diagnostics report it."""
 
 _COUNTED = ("frames", "lost", "dropped", "overwritten", "resynchronized", "restarts", "skin_changes")
 _TROUBLE = ("lost", "damaged", "dropped", "restarts")
@@ -151,7 +149,7 @@ def _array(head: Message, name: str, level: int, text: str, hardware: str, value
 QUEUE = 4096
 """Frames that may wait while others are published."""
 BEHIND_S, BEHIND_HZ = 0.02, 10.0
-"""Waiting time of a frame, and the largest rate above it, so that later frames wait less."""
+"""Waiting time of a frame, and the largest rate above it."""
 EARLY = 0.1
 """Allowed earliness in periods: boards' frame rates are not exact."""
 POLL_S = 0.1
@@ -160,7 +158,7 @@ POLL_S = 0.1
 Send = Callable[[str, bytes], None]
 """Publishes a CDR message by the name of its topic in :data:`TOPICS`."""
 Felt = Callable[[Zones, Tracks], "Contacts | None"]
-"""The forces at the zones of a frame, from pressure units; None: it has no readings."""
+"""Forces at the zones of a frame, from pressure units; None without readings."""
 
 
 class Feed:
@@ -177,7 +175,7 @@ class Feed:
         """``now_ns`` is the clock of the messages, in ns."""
         self.settings = settings or Settings()
         self.left_out = 0
-        """Frames tracked but not published, because they were faster than ``zones_hz``."""
+        """Frames tracked but not published, as they were faster than ``zones_hz``."""
         self._board = board
         self._send = send
         self._felt = felt
@@ -194,7 +192,7 @@ class Feed:
         self._diagnostics = Diagnostics(board, self._frame, self.settings.silence_s)
 
     def run(self, frames: FrameSource, stop: Callable[[], bool] = lambda: False) -> None:
-        """Publish until ``stop`` returns true, or a recording ends; errors as for :meth:`Board.next`."""
+        """Publish until ``stop`` returns true or a recording ends; errors as for :meth:`Board.next`."""
         self.begin()
         while not stop():
             try:
@@ -234,7 +232,6 @@ class Feed:
         self._events, self._restarted = [], False
 
     def _wanted(self, zones: Zones) -> bool:
-        """Whether to publish a frame, given the backlog of a busy computer."""
         now = self._board.clock()
         if zones.arrived_s is not None and now - zones.arrived_s > BEHIND_S:
             return now - self._published_s >= 1 / BEHIND_HZ
@@ -257,7 +254,6 @@ class Feed:
         self._send(topic, encode(TOPICS[topic].type, message))
 
     def _is_due(self, what: str, rate_hz: float) -> bool:
-        """Whether it is due at this average rate, without catching up."""
         now, due, period_s = self._board.clock(), self._due[what], 1 / rate_hz
         if now < due - EARLY * period_s:
             return False

@@ -15,14 +15,14 @@ class Topic:
     """A topic with its type."""
 
     name: str
-    """Name below the namespace; with a slash, absolute."""
+    """Name below the namespace; absolute with a slash."""
     type: str
     depth: int
     latched: bool = False
     """Whether late subscribers get the last message."""
 
     def resolved(self, namespace: str) -> str:
-        """The full name."""
+        """Full name of the topic."""
         return self.name if self.name.startswith("/") else f"/{namespace.strip('/')}/{self.name}"
 
 
@@ -48,13 +48,13 @@ class Settings:
     frame: str = ""
     """Name of the link's frame; "": the board's name, or ``skin`` if unnamed."""
     parent: str = ""
-    """The frame in which the sheet's is published; "": not published here."""
+    """Frame in which the sheet's is published; "" for none."""
     place_m: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """Position of the sheet's frame in its parent, in m."""
+    """Position of the sheet's frame in its parent."""
     turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """Rotation of the sheet's frame: about the fixed x, y and z axes in turn, in rad."""
+    """Rotation of the sheet's frame about the fixed x, y and z axes in turn."""
     zones_hz: float = 1000.0
-    """Largest rate of zones, tracks and contacts; a frame with another number of zones is always published."""
+    """Largest rate of frames; a frame with another number of zones is always published."""
     markers_hz: float = 30.0
     diagnostics_hz: float = 1.0
     silence_s: float = 0.5

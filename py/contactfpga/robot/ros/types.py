@@ -60,7 +60,7 @@ bool mesh_use_embedded_materials
 """,
     "visualization_msgs/MarkerArray": "Marker[] markers\n",
 }
-"""The standard messages of ROS 2 that we use, with fields in order, as in Jazzy and Kilted."""
+"""Standard messages of ROS 2 in use, with fields in order, as in Jazzy and Kilted."""
 
 PRIMITIVES = {
     "bool": "?",
@@ -80,7 +80,7 @@ PRIMITIVES = {
 
 
 def messages() -> Path:
-    """Folder of our message texts, ``Zones.msg`` and the others."""
+    """Folder of our message texts, such as ``Zones.msg``."""
     package = Path(str(files("contactfpga"))).resolve()
     installed = package / "robot" / "ros" / "msg"
     return installed if installed.is_dir() else package.parents[1] / "ros2" / PACKAGE / "msg"  # in a source tree
@@ -98,7 +98,7 @@ class MessageField:
 
     @property
     def nested(self) -> bool:
-        """Whether it holds messages."""
+        """Whether the field holds messages."""
         return "/" in self.type
 
 
@@ -110,7 +110,6 @@ class MessageType:
     """Package and type: ``contactfpga_msgs/Zones``."""
     fields: tuple[MessageField, ...]
     constants: tuple[tuple[str, int], ...]
-    """Named constants."""
     text: str
 
     def constant(self, name: str) -> int:
@@ -120,7 +119,7 @@ class MessageType:
 
 @functools.cache
 def message_type(name: str) -> MessageType:
-    """A type by its name: ours, or a standard message that we use. Raises KeyError otherwise."""
+    """A type by its name: ours, or one of :data:`STANDARD`. Raises KeyError."""
     package, _, short = name.partition("/")
     if package != PACKAGE:
         return _parsed(name, STANDARD[name])
@@ -192,7 +191,7 @@ _NESTED, _FIXED_ARRAY, _ANY_ARRAY = 1, 48, 144
 
 @functools.cache
 def type_hash(name: str) -> str:
-    """``RIHS01_`` and 64 hexadecimal digits."""
+    """Hash of a type: ``RIHS01_`` and 64 hexadecimal digits."""
     described = {
         "type_description": _described(message_type(name)),
         "referenced_type_descriptions": [_described(one) for one in needed(name)],

@@ -1,4 +1,4 @@
-"""`contactfpga build`: a bitstream for a board, its FPGA resources, and the sheet's wiring."""
+"""`contactfpga build`: a bitstream for a board, its resources, and the sheet's wiring."""
 
 from __future__ import annotations
 
@@ -60,8 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if it cannot work with its
-    times."""
+    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if its times do not suffice."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)
@@ -74,7 +73,7 @@ def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several)
 
 
 def _check(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> int:
-    """Print what fits and what does not, and fitting values."""
+    """Print what fits, what does not, and fitting values."""
     from contactfpga_hdl.board import build
 
     if isinstance(design, Several):
@@ -119,7 +118,6 @@ def _changed(several: Several) -> list[dict[str, Any]]:
 
 
 def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> dict[str, Any]:
-    """Build the bitstream and print its resources; returns them for JSON."""
     from contactfpga_hdl.board import build
 
     folder = outputs.folder(args.output or default_folder(board, args.kit))
@@ -141,7 +139,6 @@ def _described(skin: Skin | Several) -> str:
 
 
 def default_folder(board: BoardSpec, kit: str | None) -> Path:
-    """Folder of the bitstream of a board, or of a kit."""
     return Path("build", "kits", kit) if kit else Path("build", board.name)
 
 
@@ -161,10 +158,8 @@ class WiringTable:
     circuit: Circuit | None
     """None: the Skin's file has no table ``[circuit]``, so resistors have no values."""
     sites: Sequence[str]
-    """FPGA pins of the wires."""
 
     def show(self) -> None:
-        """Print the table."""
         for sheet, skin in self._sheets:
             terminal.say(
                 f"{self.board.title}, {sheet and f'sheet {sheet}: '}{skin.rows}x{skin.columns}, rows {skin.row_drive}, "
@@ -186,7 +181,7 @@ class WiringTable:
         terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
 
     def to_dict(self) -> dict[str, Any]:
-        """The table for JSON; ohms are null where nothing is fitted or stated."""
+        """The table for JSON; ohms are null if nothing is fitted or stated."""
         return {
             "wires": [
                 {"wire": wire.port, "pin": self.board.label(wire.pin) if wire.pin else None, "fpga": site}
@@ -204,7 +199,7 @@ class WiringTable:
 
     @property
     def _sheets(self) -> list[tuple[str, Skin]]:
-        """Each Skin with the number of its sheet; "" for a single one."""
+        """Each Skin with its sheet's number; "" for a single one."""
         if isinstance(self.skin, Several):
             return [(str(number), skin) for number, skin in enumerate(self.skin.skins)]
         return [("", self.skin)]
@@ -236,7 +231,6 @@ class WiringTable:
 
 
 def _show(rows: Sequence[Sequence[str]]) -> None:
-    """Print the nonempty columns, if there are rows."""
     from contactfpga.tools.console import tables  # JSON needs no display
 
     if len(rows) > 1:

@@ -1,4 +1,4 @@
-"""`contactfpga doctor`: checks everything between this computer and the board, and names remedies."""
+"""`contactfpga doctor`: checks the path from this computer to the board, with remedies."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ EXTRA = None
 COUNTED_S = 1.0
 
 FAULTS = ("stuck", "flutter")
-"""Kinds of suspicion that are faults, not notes: a hand alone does not cause them."""
+"""Suspicions that are faults, not notes: a hand alone does not cause them."""
 
 STUCK_S = 10.0
-"""Default time after which a constantly pressed switch is reported."""
+"""Default time in s after which a pressed switch is reported."""
 
 ZONES_ONLY = (
     'the board sends zones, so dead and loose switches cannot be told; for these set report = "cells" in the Skin\'s '
@@ -72,12 +72,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Report:
-    """The findings so far, printed at once unless ``silent``."""
-
     def __init__(self, silent: bool):
         self.stats: Stats | None = None
         self.lines: list[str] | None = None
-        """Names of the faults last reported by the board; None: it reports none."""
+        """Last reported line faults; None: the board reports none."""
         self._silent = silent
         self._findings: list[Finding] = []
 
@@ -164,7 +162,7 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
 
 
 def _watch(args: argparse.Namespace) -> int:
-    """Watch for ``args.seconds`` or until Ctrl-C; returns 1 if a switch is stuck, loose or never read pressed."""
+    """Watch for ``args.seconds`` or until Ctrl-C; returns 1 if a switch is stuck, loose or never pressed."""
     with flags.opened(args) as board:
         skin = flags.known_skin(board)
         watch = Watch(skin, stuck_s=args.stuck_s or STUCK_S)
@@ -222,8 +220,9 @@ def _without_mask(skin: Skin | None) -> list[Finding]:
 
 
 def dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
-    """The names of switches that ``never`` read pressed, of all ``seen``. Whole lines come first, as broken wires
-    rather than dead switches."""
+    """Names of switches that ``never`` read pressed, of all ``seen``; whole lines, probably broken wires, come
+    first.
+    """
     rows = sorted({row for row, _ in never if not seen[row].any()})
     columns = sorted({column for _, column in never if not seen[:, column].any()})
     left = [(row, column) for row, column in never if row not in rows and column not in columns]
@@ -247,7 +246,7 @@ def _watched(watch: Watch, findings: list[Finding], seconds: float, faults: int)
 
 
 def _self_test(args: argparse.Namespace) -> int:
-    """Test for ``args.seconds`` or until Ctrl-C; returns 1 if lines are joined or a diode is bridged."""
+    """Test for ``args.seconds`` or until Ctrl-C; returns 1 for joined lines or bridged diodes."""
     with flags.opened(args) as board:
         known: list[LineFinding] = []
         last: list[SelfTest] = []

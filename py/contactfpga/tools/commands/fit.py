@@ -129,7 +129,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
-    """The task, and all candidates; raises ValueError for impossible requests."""
+    """The task and all candidates; raises ValueError for impossible requests."""
     from contactfpga_sim.lab.fit import candidates
     from contactfpga_sim.lab.fit.faces import feels
     from contactfpga_sim.lab.fit.sources import Recorded, default_count, source
@@ -163,7 +163,6 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
-    """The covers of the Skin's file, named ones, or defaults; none for recordings."""
     from contactfpga_sim.lab import covers
     from contactfpga_sim.lab.fit import faces
 
@@ -177,7 +176,6 @@ def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
 
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:
-    """The methods of the named labellers, or of ``cells``: the host labels them."""
     from contactfpga_sim.lab.fit.candidates import METHODS, by
 
     if not names:
@@ -194,7 +192,6 @@ def _share(percent: float | None) -> float | None:
 
 
 def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
-    """Print the results so far; returns a sentence on them."""
     from contactfpga_sim.lab.fit import show
 
     again = "run the same command again to go on from there"

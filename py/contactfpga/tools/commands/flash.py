@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _file(args: argparse.Namespace, board: BoardSpec) -> Path:
-    """The bitstream to write, which may be missing for a kit without a released one."""
+    """The bitstream, which may be missing for a kit without a released one."""
     if args.kit and not args.file:
         released = kits.kit(args.kit).bitstream
         return released if released.is_file() else bitstream_path(board, default_folder(board, args.kit))
@@ -65,7 +65,7 @@ def _build(kit: kits.Kit, folder: Path) -> None:
 
 
 def _tool(programmer: Programmer) -> str | None:
-    """Path of the program, or of its wheel's command if it starts; None otherwise."""
+    """Path of the program, or of its wheel's command if that starts; otherwise None."""
     if (found := shutil.which(programmer.tool)) is not None or not programmer.wheel:
         return found
     beside = shutil.which(programmer.wheel) or shutil.which(programmer.wheel, path=str(Path(sys.executable).parent))

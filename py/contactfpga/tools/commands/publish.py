@@ -31,8 +31,7 @@ PORTS = (
     "them publish several boards (default: the one supported board plugged in; with --skin, the one with that Skin)."
 )
 SHOWN_S = 0.2
-"""Interval of checking which boards are still there. Boards lost within it, as all sheets of one FPGA, are reported
-together."""
+"""Interval of checks; boards lost within it, as all sheets of one FPGA, are reported together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +52,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command until Ctrl-C, or until every board is gone."""
+    """Run until Ctrl-C, or until every board is gone."""
     if args.listen and args.connect:
         raise ContactFPGAError("give --listen or --connect, not both")
     if args.key is not None and len(args.ports) > 1:
@@ -83,7 +82,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int]]:
-    """Device and baud rate of each board, by key."""
     found: dict[str, tuple[str, int]] = {}
     for port in args.ports or [None]:
         if port is not None and port.startswith(("replay:", NET)):
@@ -97,14 +95,13 @@ def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int
 
 
 def _refuse(first: str, second: str, of: str) -> NoReturn:
-    """Refuse two ports with the same key."""
     if _place(first) == _place(second) != ("sim", None):
         raise ContactFPGAError(f"{second} is the port {first}, which is named already; name it once")
     raise ContactFPGAError(f"{first} and {second} would both be {of}; give their Skins different names")
 
 
 def _place(port: str) -> tuple[str, int | None]:
-    """The device behind a name and the sheet's number; each bare ``sim://`` is a board of its own."""
+    """The device of a port and the sheet's number; each bare ``sim://`` is a separate board."""
     sheet = SheetOf.parse(port)
     name, number = (port, None) if sheet is None else (sheet.port, sheet.number)
     virtual = name.startswith("sim:")
@@ -114,7 +111,6 @@ def _place(port: str) -> tuple[str, int | None]:
 
 
 def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
-    """Run one thread per publisher. If a board is gone, the others go on."""
     stop = threading.Event()
     ended: queue.SimpleQueue[Exception] = queue.SimpleQueue()
     threads = [threading.Thread(target=_run, args=(*one, stop, ended), daemon=True) for one in publishers.items()]
@@ -138,7 +134,6 @@ def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
 
 
 def _ended(ended: queue.SimpleQueue[Exception]) -> list[Exception]:
-    """Reasons of the boards lost together."""
     try:
         found = [ended.get(timeout=SHOWN_S)]
     except queue.Empty:

@@ -1,4 +1,4 @@
-"""`contactfpga record`: a board's data into a file; and recovery of a file that was not closed."""
+"""`contactfpga record`: a board's data into a file; and recovery of an unclosed file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 EXTRA = "record"
 
 SHOWN_S = 0.5
-"""Interval of the progress display."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -105,7 +104,7 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
 
 def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
-    """A function that computes the forces at contacts of a link with pressure units."""
+    """Maker of the forces at contacts of a link with pressure units."""
     from contactfpga.robot.body.snapshot import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
@@ -139,8 +138,6 @@ def _pieces(count: int) -> str:
 
 
 class _Progress:
-    """A progress line, overwritten if the terminal can, and the final message."""
-
     def __init__(self, session: Session) -> None:
         self._session = session
         self._live = terminal.of(sys.stderr).live

@@ -119,7 +119,6 @@ def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: flo
 
 
 def _given(skin: Skin, wanted: dict[str, float | None]) -> dict[str, Any]:
-    """Whether the Skin's times suffice."""
     return {
         name: {
             "given": getattr(skin, name),

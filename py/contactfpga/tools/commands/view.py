@@ -76,5 +76,4 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _has_display() -> bool:
-    """Whether a browser would have a window."""
     return not sys.platform.startswith("linux") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

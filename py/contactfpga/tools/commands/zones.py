@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Follow:
-    """Follows contacts over all frames, also those not shown, if ids or forces are requested."""
+    """Follows contacts over all frames, also those not shown, for ids or forces."""
 
     def __init__(self, args: argparse.Namespace, forces: Forces | None):
         self._tracker = Tracker() if args.tracks else None
@@ -59,7 +59,7 @@ class _Follow:
         self.forces = forces
 
     def frames(self, board: Board) -> FrameSource:
-        """The board's frames up to the requested end; with forces, each once its readings are known."""
+        """The board's frames up to the requested end; with forces, once their readings are known."""
         frames: FrameSource = board if self.forces is None else WithReadings(board)
         return frames if self._seconds is None else _TimeLimit(frames, self._seconds)
 
@@ -71,7 +71,7 @@ class _Follow:
 
 
 class _TimeLimit:
-    """Yield frames for this many seconds of device time, then end as a recording does."""
+    """Frames of this device time in s."""
 
     def __init__(self, frames: FrameSource, seconds: float):
         self._frames, self._left_us = frames, seconds * 1e6

@@ -1,1 +1,1 @@
-"""Common code of commands: terminal, interrupts, numbers on the command line, tables, places for output."""
+"""Common code of commands."""

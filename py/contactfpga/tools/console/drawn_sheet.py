@@ -1,7 +1,6 @@
-"""A sheet drawn with characters, row 0 on top, from the board's frames alone.
+"""A sheet drawn with characters, row 0 on top, from one frame.
 
-Cells are drawn if the board sends them. Of a zone only size and barycenter are known, not its shape, so a thin circle
-shows the size, with a line of explanation below.
+A board that sends zones tells sizes and barycenters, but no shapes. So a thin circle shows the size of a zone.
 """
 
 from __future__ import annotations
@@ -17,12 +16,11 @@ from contactfpga.zones.zone import Zones
 Mask = Iterable[tuple[int, int]]
 
 SCALES = (4, 2, 1)
-"""Dots per cell, the largest drawing first. A character holds 2 x 4 dots, as in braille."""
+"""Dots per cell, the largest drawing first. A braille character has 2 x 4 dots."""
 
 ACROSS, DOWN = 2, 4
 
 FREE, CELL, CIRCLE, CENTER, MASKED, SEEN, FLUTTERS, STUCK = range(8)
-"""Meaning of a character."""
 
 STYLES = {
     FREE: "dim",
@@ -45,7 +43,7 @@ _SIGNS = {
 
 @dataclasses.dataclass(frozen=True)
 class Marks:
-    """Knowledge of cells from earlier frames: (rows, columns) bool each."""
+    """Knowledge of cells from earlier frames, (rows, columns) bool each."""
 
     seen: np.ndarray
     flutters: np.ndarray
@@ -82,8 +80,7 @@ def size(zones: Zones, scale: int) -> tuple[int, int]:
 def draw(
     zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask = (), marks: Marks | None = None
 ) -> SheetDrawing:
-    """The sheet of one frame: pressed cells if the board sends them, else the zones' barycenters and sizes. ``mask``:
-    the (row, column) of absent switches; ``marks``: of a board that sends cells."""
+    """The sheet of one frame. ``mask``: (row, column) of absent switches; ``marks``: of a board that sends cells."""
     wide, high = size(zones, scale)
     signs = _SIGNS[unicode]
     characters = np.full((high, wide), signs[FREE])
@@ -155,13 +152,12 @@ def _cells(dots: np.ndarray, scale: int, full: str, unicode: bool) -> np.ndarray
 
 
 def _spread(cells: np.ndarray, scale: int) -> np.ndarray:
-    """Each cell as scale x scale dots."""
     spread: np.ndarray = cells.repeat(scale, axis=0).repeat(scale, axis=1)
     return spread
 
 
 def _blocks(dots: np.ndarray, filled: bool = False) -> np.ndarray:
-    """(lines, columns, 4, 2): the dots of each character; beyond the sheet they are ``filled`` or not."""
+    """(lines, columns, 4, 2): the dots of each character, ``filled`` beyond the sheet or not."""
     high, wide = dots.shape
     padded = np.pad(dots, ((0, -high % DOWN), (0, -wide % ACROSS)), constant_values=filled)
     blocks: np.ndarray = padded.reshape(-(-high // DOWN), DOWN, -(-wide // ACROSS), ACROSS).swapaxes(1, 2)
@@ -174,7 +170,7 @@ def _braille(dots: np.ndarray) -> np.ndarray:
 
 
 def _circles(zones: Zones, scale: int) -> np.ndarray:
-    """(dots down, dots across) bool: for each zone a circle of its area about its barycenter."""
+    """(dots down, dots across) bool: a circle of each zone's area about its barycenter."""
     sheet = zones.sheet
     dots = np.zeros((sheet.rows * scale, sheet.columns * scale), bool)
     high, wide = dots.shape
@@ -191,7 +187,6 @@ def _circles(zones: Zones, scale: int) -> np.ndarray:
 
 
 def _centers(zones: Zones, scale: int) -> Iterable[tuple[int, int]]:
-    """Column and line of each barycenter's character."""
     wide, high = size(zones, scale)
     for x, y in _places(zones, scale):
         column, line = math.floor(x / ACROSS), math.floor(y / DOWN)
@@ -200,7 +195,7 @@ def _centers(zones: Zones, scale: int) -> Iterable[tuple[int, int]]:
 
 
 def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
-    """The barycenters in dots from the upper left corner of cell (0, 0)."""
+    """Barycenters in dots from the upper left corner of cell (0, 0)."""
     sheet = zones.sheet
     middle = (0.5 if scale < SCALES[0] else 0.25) * scale
     found = [

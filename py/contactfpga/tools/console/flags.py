@@ -46,7 +46,6 @@ def sheet(parser: argparse.ArgumentParser, skin: str) -> None:
 
 
 def kit(parser: argparse.ArgumentParser) -> None:
-    """Add a kit by name."""
     parser.add_argument("--kit", metavar="NAME", help="The sheet of this kit (docs/kits.md).")
 
 
@@ -61,7 +60,7 @@ def sheet_file(args: argparse.Namespace) -> str | None:
 
 
 def board(args: argparse.Namespace) -> BoardSpec | None:
-    """The board of ``--board`` or its argument, or of ``--kit``; None if neither is given."""
+    """The board of ``--board``, its argument or ``--kit``; None if none is given."""
     if not args.kit:
         return find(args.board) if args.board else None
     found = kits.kit(args.kit).board
@@ -71,7 +70,7 @@ def board(args: argparse.Namespace) -> BoardSpec | None:
 
 
 def named_board(args: argparse.Namespace) -> BoardSpec:
-    """Like :func:`board`; raises :class:`ContactFPGAError` without a board or a kit."""
+    """Like :func:`board`; raises :class:`ContactFPGAError` instead of None."""
     found = board(args)
     if found is None:
         known = " or --kit ".join(kits.names())
@@ -80,13 +79,13 @@ def named_board(args: argparse.Namespace) -> BoardSpec:
 
 
 def design(parser: argparse.ArgumentParser, skin: str) -> None:
-    """Add a Skin, a kit's or several of them; ``skin``: help of the first option."""
+    """Add one Skin, a kit's or several; ``skin``: help of the first option."""
     sheet(parser, skin)
     parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
 
 
 def designed(args: argparse.Namespace, usual: Skin, load: Callable[[str], Skin] = Skin.load) -> Skin | Several:
-    """The design by the options of :func:`design`, or the default Skin; ``load`` reads a Skin's file."""
+    """The design by the options of :func:`design`, or the default Skin."""
     args.skin = sheet_file(args)
     if args.skin and args.sheets:
         raise ContactFPGAError("give --skin or --sheets, not both; the Skins of several sheets are in their file")
@@ -102,7 +101,7 @@ def seconds(parser: argparse.ArgumentParser) -> None:
 
 
 def forces(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add forces from pressure units; ``what`` the command does with them."""
+    """Add forces from pressure units; ``what``: their use."""
     units = f"{what}, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
     friction = "Friction coefficient of what touches (default: 0.5); needs --units."
@@ -110,7 +109,7 @@ def forces(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def check_forces(args: argparse.Namespace) -> None:
-    """Before a board is opened: raises :class:`ContactFPGAError` for friction without forces."""
+    """Raise :class:`ContactFPGAError` for friction without forces, before a board is opened."""
     if args.friction is not None and args.units is None:
         raise ContactFPGAError("--friction needs --units: it is used for forces only")
 
@@ -134,14 +133,13 @@ def known_skin(board: Board) -> Skin | None:
 
 
 def workers(parser: argparse.ArgumentParser) -> None:
-    """Add the flags for workers of a long computation."""
+    """Add the worker processes of a long computation."""
     parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")
     dask = "Send the work to the Dask cluster with this scheduler."
     parser.add_argument("--dask", metavar="ADDRESS", help=dask)
 
 
 def output(parser: argparse.ArgumentParser, folder: str) -> None:
-    """Add a folder for results."""
     usual = f"Folder for the results (default: {folder})."
     parser.add_argument("--output", metavar="DIR", default=folder, help=usual)
 

@@ -1,4 +1,4 @@
-"""Forces at the zones of a board that has pressure units, for commands that show them."""
+"""Forces at the zones of a board with pressure units, for commands."""
 
 from __future__ import annotations
 
@@ -38,7 +38,6 @@ class Forces:
         return None if path is None else cls(cells_of(board, path), 0.5 if friction is None else friction)
 
     def take(self, zones: Zones, tracks: Tracks | None) -> None:
-        """Add the next frame."""
         self._alone.take(zones)
         self.contacts = felt(self._cells, zones, self._friction, tracks=tracks, alone=self._alone)
         if zones.units is not None:
@@ -50,7 +49,6 @@ class Forces:
         return self.contacts
 
     def to_dict(self) -> dict[str, object]:
-        """The forces in plain Python values, ready for JSON."""
         found = self.contacts
         if found is None:
             return {"contacts": None}

@@ -1,4 +1,4 @@
-"""How a command ends on failure or interruption: at once, with its status, without useless output.
+"""The end of a command on failure or interruption: at once, with its status, without useless output.
 
 The signal TERM, which stops services, acts like Ctrl-C, with its own status.
 """
@@ -26,21 +26,21 @@ from contactfpga.tools.console import signals
 from contactfpga.tools.console.signals import SIGNALS
 
 AGAIN_S = 0.01
-"""Delay of repeating a signal that Python dropped where nothing can be raised, as in a destructor."""
+"""Delay of repeating a signal that Python dropped, as in a destructor."""
 
 _came: int | None = None
 """The signal since the command began, unless it was the normal end."""
 
 
 class Interruption(KeyboardInterrupt):
-    """Ctrl-C, once the results so far are safe; the message names their place."""
+    """Ctrl-C after the results were saved; the message names their place."""
 
 
 def guarded(body: Callable[[], int | None]) -> int:
     """The status of ``body``; neither Ctrl-C nor a user's error ends it with a traceback.
 
-    A shell starts background processes with Ctrl-C ignored, and their children inherit this. A command is ended by the
-    same signal, so it listens anyway.
+    Shells start background processes with Ctrl-C ignored, but the same signal ends them; this function handles it
+    anyway.
     """
     global _came
     _came = None
@@ -59,8 +59,8 @@ def guarded(body: Callable[[], int | None]) -> int:
 def leave(status: int) -> NoReturn:
     """End the process with a status of :func:`guarded`.
 
-    After a signal the process skips destructors of C++ libraries: a library interrupted while loading may crash in
-    them, as matplotlib 3.10 does. Functions of :mod:`atexit` still run.
+    After a signal the process skips destructors of C++ libraries, because a library interrupted while loading may crash
+    in them, as matplotlib 3.10 does. Functions of :mod:`atexit` still run.
     """
     if status in map(signals.status, SIGNALS):
         atexit._run_exitfuncs()
@@ -103,7 +103,7 @@ def _cut_short(said: str = "") -> int:
 
 @contextlib.contextmanager
 def usual_end() -> Iterator[None]:
-    """For code that normally runs until Ctrl-C, which is no failure."""
+    """Context of code that normally runs until Ctrl-C, which is no failure."""
     global _came
     try:
         yield
@@ -118,7 +118,7 @@ def _told(error: OSError) -> str:
 
 
 def failed(reason: object) -> int:
-    """Print why a command failed; returns its status. Failures due to a signal are none."""
+    """Print why a command failed; returns its status. Failures due to a signal are not printed."""
     if _came is not None:
         return _cut_short()
     silence_amaranth()
@@ -160,7 +160,6 @@ def _again(what: sys.UnraisableHookArgs) -> None:
 
 
 def _send(number: int) -> None:
-    """Send a signal to the main thread, waking it if asleep."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:  # Windows
@@ -168,7 +167,7 @@ def _send(number: int) -> None:
 
 
 def silence_amaranth() -> None:
-    """Silence Amaranth's warnings about unused components, whose reason is known."""
+    """Silence Amaranth's warnings about unused components."""
     unused = sys.modules.get("amaranth._unused")
     if unused is not None:
         warnings.simplefilter("ignore", unused.UnusedMustUse)

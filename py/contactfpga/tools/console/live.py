@@ -1,4 +1,4 @@
-"""Follow a board frame by frame, and draw some frames. Drawing needs rich, which scripts do without."""
+"""Follows a board frame by frame, and draws some frames. Only drawing needs rich."""
 
 from __future__ import annotations
 
@@ -27,15 +27,14 @@ if TYPE_CHECKING:
 REFRESH_US = 66_667
 
 LISTED_S = 1.0
-"""Interval of frames listed below one another."""
 
 SILENT_S = 0.2
-"""Time without a frame, beyond the board's needs, that is displayed as silence."""
+"""Excess over the board's longest pause that is displayed as silence."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Room:
-    """Available space for a frame."""
+    """Space for a frame."""
 
     console: Console
     width: int
@@ -44,7 +43,6 @@ class Room:
     unicode: bool
 
     def without(self, lines: int) -> Room:
-        """The space left after this many lines."""
         return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
 
 
@@ -61,8 +59,9 @@ def _ignore(zones: Zones) -> None:
 def show(
     board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: FrameSource | None = None
 ) -> int:
-    """Show one frame with ``--once``, else fifteen per second until Ctrl-C or the recording ends, or one per second
-    without redrawing; ``frames``: source of frames, default the board."""
+    """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends, or one per
+    second without redrawing.
+    """
     console = terminal.console()
     frames = frames or board
     if args.once:
@@ -78,7 +77,6 @@ def show(
 def _display(
     board: Board, args: argparse.Namespace, render: Render, take: Take, frames: FrameSource, console: Console
 ) -> None:
-    """Show frames until the end."""
     if not terminal.of().live:
         if sys.stdout.isatty():
             what = "contactfpga: this terminal cannot be redrawn, so one frame per second is shown, and the last one"
@@ -96,8 +94,8 @@ def _display(
 def follow(
     board: Board, args: argparse.Namespace, take: Callable[[Zones], None], render: Render | None = None
 ) -> tuple[float, list[Finding]]:
-    """Pass every frame to ``take`` for ``args.seconds`` of device time (None: no limit), until the recording or the
-    frames end, or Ctrl-C. If the terminal can redraw, it shows fifteen per second by ``render``.
+    """Pass every frame to ``take`` for ``args.seconds`` of device time (None: no limit), until the frames end, or
+    Ctrl-C; show fifteen per second by ``render`` if the terminal can redraw.
 
     Returns the followed device time in s, and findings about its end and lost frames.
     """
@@ -123,7 +121,7 @@ def follow(
 
 @contextlib.contextmanager
 def shown(render: Render | None) -> Iterator[Take]:
-    """Draws the given frames by ``render``, if the terminal can redraw."""
+    """Context that draws the given frames by ``render``, if the terminal can redraw."""
     if render is None or not terminal.of().live:
         yield lambda zones: None
         return
@@ -149,8 +147,6 @@ def room(console: Console, endless: bool = False) -> Room:
 def _list(
     board: Board, frames: FrameSource, args: argparse.Namespace, console: Console, render: Render, take: Take
 ) -> None:
-    """Show one frame per second below the other, beginning with the first, and finally the last, of a recording or at
-    Ctrl-C."""
     waits: Zones | None = None  # the last one, while it is not shown
     due_s = -math.inf
 
@@ -173,10 +169,7 @@ def _list(
 def _paced(
     board: Board, frames: FrameSource, timeout: float, take: Take, tell_silence: bool = False
 ) -> Iterator[Zones | Silence]:
-    """One frame every REFRESH_US of device time, and always the last of a recording.
-
-    With ``tell_silence`` missing frames yield a silence until the timeout.
-    """
+    """One frame every REFRESH_US of device time, and the last of a recording; with ``tell_silence``, also silences."""
     wait_s = min(timeout, SILENT_S + longest_pause_s(board.hello, None)) if tell_silence else timeout
     refresh = _Refresh()
     skipped = None
@@ -201,8 +194,9 @@ def _paced(
 
 
 class _Refresh:
-    """Selects frames: one every REFRESH_US of device time, and not faster in real time, as simulated boards and
-    recordings would be."""
+    """Selects one frame every REFRESH_US of device time, and not faster in real time, as simulated boards and
+    recordings would be.
+    """
 
     def __init__(self) -> None:
         self._shown_us = -REFRESH_US

@@ -1,4 +1,4 @@
-"""Numbers on the command line: each type names its range and unit when a value is outside."""
+"""Types of numbers on the command line, whose errors name range and unit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ def number(low: float, high: float, unit: str = "", *, above: bool = False, hint
 
 
 def whole(low: int, high: int, unit: str = "") -> Callable[[str], int]:
-    """A whole number from ``low`` to ``high``."""
     return _between(int, "whole number", low, high, unit, False, "")
 
 
@@ -44,7 +43,7 @@ def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
 
 
 def length(high: float, low: float = MIN_LENGTH_M) -> Callable[[str], float]:
-    """A length in m; values in mm are out of range."""
+    """A length in m, whose range excludes values in mm."""
     return number(low, high, "m", hint=IN_METERS)
 
 
@@ -71,7 +70,6 @@ SECONDS = number(0, 86_400, "s", above=True)
 BAUD = whole(limits.MIN_BAUD, limits.MAX_CLOCK_HZ // 2, "bits per second")
 PITCH_MM = number(limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
 CELL = number(-1e300, 1e300)
-"""A threshold for cells."""
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
 TURN = number(-7, 7, "rad", hint="angles are in rad, 90 degrees are 1.5708")

@@ -21,7 +21,6 @@ def folder(path: str | Path, option: str = "--output") -> Path:
 
 
 def _made(place: Path, asked: Path, option: str) -> None:
-    """Create a folder; ``asked``: the path that the user named."""
     try:
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=place):

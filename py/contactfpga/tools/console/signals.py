@@ -13,7 +13,7 @@ def status(number: int) -> int:
 
 
 def end_at_once(number: int, _: object = None) -> None:
-    """Signal handler that ends the process at once, while a command starts, or at the second signal."""
+    """Signal handler that ends the process at once, for a starting command and for a second signal."""
     os._exit(status(number))
 
 

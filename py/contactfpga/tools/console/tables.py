@@ -15,7 +15,6 @@ from rich.table import Table
 from contactfpga import terminal
 
 GAP = 3
-"""Characters between columns."""
 
 FOLDED = 24
 """Least width of a column of sentences."""
@@ -41,10 +40,10 @@ def tables(
     texts: Sequence[int] = (),
     styles: Mapping[int, str] | None = None,
 ) -> Iterator[Table]:
-    """The head and lines of ``rows`` as few tables of this width, each beginning with the first ``keys`` columns.
+    """The head and lines of ``rows`` as few tables of this width, each with the first ``keys`` columns.
 
-    ``texts``: left-aligned columns of words; the last column is wrapped if needed, and so is the first if it is the
-    only key. ``styles``: of lines by number.
+    ``texts``: left-aligned columns of words. The last column is wrapped if needed, and so is an only key. ``styles``:
+    of lines by number.
     """
     columns = [list(column) for column in zip(*rows, strict=True)]
     last = len(columns) - 1
@@ -77,7 +76,6 @@ def _widths(columns: Sequence[Sequence[str]], last_folds: bool) -> list[int]:
 
 
 def _folded(heading: str, width: int) -> str:
-    """The heading in lines of this width, or of its longest word."""
     longest = max(map(cell_len, heading.split()), default=1)
     return "\n".join(textwrap.wrap(heading, max(width, longest), break_on_hyphens=False)) or heading
 

@@ -21,24 +21,20 @@ from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.zone import Zones
 
 BESIDE = 3
-"""Characters between the sheet and the table."""
 
 LEGEND_LINES = 2
 
 TABLE_LINES = 6
-"""Lines of a table: title, head, rules and caption."""
 
 SUSPECTED = 4
-"""Lines of current suspicions of a watch."""
 
 NAMED = 12
-"""Pressed cells listed by place."""
 
 
 def zones_view(
     board: Board, zones: Zones, room: Room, tracks: Tracks | None = None, forces: Forces | None = None
 ) -> RenderableType:
-    """The sheet, with the table of its zones beside or below; with ``tracks``, contact ids, with ``forces``, pushes."""
+    """The sheet, with the table of its zones beside or below; ``tracks`` add contact ids, ``forces`` pushes."""
     said = () if forces is None else forces.sentences()
     below = status(board, zones, room.width, said)
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
@@ -59,7 +55,7 @@ def zones_view(
 
 
 def watch_view(board: Board, watch: Watch, suspected: list[str], zones: Zones, room: Room) -> RenderableType:
-    """The sheet with a watch's knowledge of its switches, and the newest suspicions below."""
+    """The sheet with a watch's knowledge of its switches, and the newest suspicions."""
     count = f"{len(watch.never)} switches never pressed so far" if watch.seen is not None else "zones only"
     below = "\n".join([*suspected[-SUSPECTED:], count, status(board, zones, room.width)])
     below = "\n".join(terminal.wrapped(line, room.width, 2) for line in below.split("\n"))
@@ -82,7 +78,7 @@ def _marks(watch: Watch) -> drawn_sheet.Marks | None:
 
 
 def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
-    """The sheet, with the places of its pressed cells below; for a board that sends cells."""
+    """The sheet of a board that sends cells, with the places of pressed cells below."""
     assert zones.cells is not None
     places = [f"({row}, {column})" for row, column in zip(*zones.cells.nonzero())]
     named = [*places[:NAMED], *([f"and {len(places) - NAMED} more"] if len(places) > NAMED else [])]
@@ -95,7 +91,6 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
 
 
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
-    """The scale of the drawing, and whether the table is beside it, preferably."""
     for scale in drawn_sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
         if drawn_sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
             return scale, True
@@ -124,7 +119,7 @@ def table(
 
 
 def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
-    """Push of each zone in N, with its least and largest value (95 of 100)."""
+    """Push of each zone in N, with its 95 % interval."""
     if contacts is None:
         return [()] * len(zones)
     left, found = iter(contacts), []
@@ -137,7 +132,6 @@ def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
 
 
 def _interval(contact: Contact) -> tuple[float | None, float | None]:
-    """The interval; unknown without its solver."""
     try:
         return contact.interval_n or (None, None)
     except MissingExtra:
@@ -145,12 +139,10 @@ def _interval(contact: Contact) -> tuple[float | None, float | None]:
 
 
 def _names(track: Track) -> str:
-    """The ids of a zone, the main one first."""
     return "+".join(map(str, (track.id, *track.merged)))
 
 
 def _mask(board: Board) -> drawn_sheet.Mask:
-    """The switches that the board's Skin leaves out; none if only its hello is known."""
     try:
         return board.skin.mask
     except ContactFPGAError:
@@ -158,7 +150,6 @@ def _mask(board: Board) -> drawn_sheet.Mask:
 
 
 def styled(drawing: drawn_sheet.SheetDrawing) -> Text:
-    """A drawing with its colors."""
     text = Text(no_wrap=True)
     for number, (characters, kinds) in enumerate(zip(drawing.characters, drawing.kinds.tolist())):
         if number:

@@ -39,15 +39,13 @@ COLUMNS = {
 """Type and meaning of each column."""
 
 ROWS = 1 << 16
-"""Rows of a piece."""
 
 _NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False, "")
 Piece = dict[str, np.ndarray]
 
 
 def pieces(recording: Recording, rows: int = ROWS) -> Iterator[Piece]:
-    """The table in pieces of about this many rows: an array for each of :data:`COLUMNS`. There is at least one
-    piece."""
+    """The table in at least one piece of about ``rows`` rows: an array for each of :data:`COLUMNS`."""
     trackers: dict[str, Tracker] = {}
     counts: dict[str, int] = {}
     found: list[tuple[object, ...]] = []
@@ -104,10 +102,10 @@ KEY = "contactfpga"
 
 
 def export(recording: Recording, path: str | Path) -> int:
-    """Write the table to a file named ``.parquet``, ``.npz`` or ``.csv``; returns the number of rows.
+    """Write the table to a file named ``.parquet``, ``.npz`` or ``.csv``, which appears once complete; returns the
+    number of rows.
 
-    The file appears once it is complete. Raises :class:`ContactFPGAError`; :class:`~contactfpga.MissingExtra` without
-    pyarrow, which Parquet needs.
+    Raises :class:`ContactFPGAError`; :class:`~contactfpga.MissingExtra` without pyarrow, which Parquet needs.
     """
     target = Path(path)
     write = _WRITERS.get(target.suffix.lower())
@@ -123,8 +121,6 @@ def export(recording: Recording, path: str | Path) -> int:
 
 
 class _PieceCounter:
-    """Counts the rows of pieces."""
-
     def __init__(self, parts: Iterable[Piece]):
         self._parts = parts
         self.rows = 0

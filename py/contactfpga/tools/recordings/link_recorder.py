@@ -1,4 +1,4 @@
-"""One board under recording: reads and writes its data, as bytes and as messages for other programs."""
+"""One board under recording: its data as bytes, and as messages for other programs."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zone, Zones
 
 QUEUE = 1 << 16
-"""Frames that wait to be written as messages; their bytes are written first."""
+"""Most frames that wait to be written as messages."""
 POLL_S = 0.01
-"""Interval of writing bytes."""
 END_S = 1.0
-"""Time for writing the remaining frames as messages at the end."""
+"""Time for writing the remaining frames at the end."""
 AT_ONCE_S = 1e-6
 BATCH_BYTES = 2048
 """Bytes per write: about 100 frames with a zone each."""
@@ -43,7 +42,6 @@ class Buffer:
     """A tap with a buffer of bytes."""
 
     events: Events
-    """All events of the board, from the first byte on."""
 
     def __init__(self) -> None:
         self._pieces: collections.deque[tuple[bytes, float]] = collections.deque()
@@ -53,11 +51,9 @@ class Buffer:
         self._lock = threading.Lock()
 
     def opened(self, board: Board) -> None:
-        """Listen to a board before its first byte."""
         self.events = board.events(QUEUE)
 
     def take(self, data: bytes, clock_s: float) -> None:
-        """Add bytes with their arrival time."""
         with self._lock:
             if data and not self._ended:
                 self._pieces.append((data, clock_s))
@@ -71,7 +67,7 @@ class Buffer:
             return self._ended
 
     def close(self) -> None:
-        """End; buffered bytes can still be read."""
+        """End; buffered bytes stay readable."""
 
     def due(self, clock_s: float) -> bool:
         """Whether enough bytes wait, or for long enough."""
@@ -87,9 +83,9 @@ class Buffer:
 
 
 class LinkRecorder:
-    """Writes a board's data until it is stopped, the played recording ends, or the port is lost. ``events``: the
-    board's, from the first on. Without ``said`` it writes only bytes. ``late``: frames wait for their readings of
-    pressure units."""
+    """Writes a board's data until it is stopped, the played recording ends, or the port is lost. ``events``: all of the
+    board; ``said``: None for bytes only; ``late``: frames wait for their readings of pressure units.
+    """
 
     def __init__(
         self,
@@ -103,13 +99,10 @@ class LinkRecorder:
         self.board = board
         self.name = link.name
         self.frames = 0
-        """Frames read."""
         self.seconds = 0.0
         """Recorded time: on the board's clock, for a recording in device time."""
         self.notes: list[str] = []
-        """Messages for the user."""
         self.error: ContactFPGAError | None = None
-        """The error that ended it early."""
         self._events = events
         self._buffer = buffer
         self._link = link
@@ -143,7 +136,7 @@ class LinkRecorder:
             self.error = error
 
     def next(self, timeout: float = 1.0) -> Zones:
-        """The next frame; earlier data are written."""
+        """The next frame, after earlier data are written."""
         while True:
             if self._left == 0:
                 raise ReadTimeout(f"{self.name}: nothing more is to be recorded")
@@ -190,7 +183,7 @@ class LinkRecorder:
         self._link.poll()
 
     def _clock_s(self) -> float:
-        """The current time; for a recording, without a clock, the time of its last frame."""
+        """The current time; for a recording, that of its last frame."""
         now_s = self.board.clock() if self.board.live else self._last_us / 1e6
         self._begun_s = now_s if self._begun_s is None else self._begun_s
         self.seconds = max(self.seconds, now_s - self._begun_s)
@@ -204,12 +197,10 @@ class LinkRecorder:
 
 @dataclasses.dataclass(frozen=True)
 class Mount:
-    """A board's place on a robot: its messages have places in the frame of the robot's link, not the sheet's."""
+    """A board's place on a robot, for messages with places in the frame of the robot's link."""
 
     frame: str
-    """Frame of the robot's link."""
     place: Place
-    """Place in that frame."""
 
     def zone(self, zone: Zone) -> Zone:
         """The zone with its place in the link's frame."""
@@ -235,15 +226,12 @@ ZONES, TRACKS, CONTACTS = (f"{PACKAGE}/{name}" for name in ("Zones", "Tracks", "
 TRANSFORMS, MARKERS, WRENCH = "tf2_msgs/TFMessage", "visualization_msgs/MarkerArray", "geometry_msgs/WrenchStamped"
 
 DRAWN_S = 1 / 30
-"""Interval of messages for 3-D programs."""
 WORLD = "world"
-"""The frame of a board without a robot."""
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
 class LinkMessages:
-    """Writes one link's data as standard messages, in order. Those of a board on a robot have places in the robot's
-    frame."""
+    """Writes one link's data as standard messages, in order."""
 
     def __init__(self, board: Board, link: LinkFile, mount: Mount | None = None, felt: Felt | None = None):
         self._link = link
@@ -255,7 +243,6 @@ class LinkMessages:
         self._rim = outline(board.sheet, None if mount is None else mount.place)
 
     def told(self, item: SideEvent, clock_s: float) -> None:
-        """Write an event between frames."""
         time_ns = self._link.time_ns(clock_s)
         if isinstance(item, Faults):
             self._link.write("faults", FAULTS, of_faults(item.names, time_ns, self._frame), clock_s)
@@ -263,7 +250,7 @@ class LinkMessages:
             self._link.write("units", UNITS, of_units(item, time_ns, self._frame), clock_s)
 
     def frame(self, zones: Zones, clock_s: float) -> None:
-        """Write a frame; contacts whenever they change, and periodically, with messages for 3-D programs."""
+        """Write a frame; contacts when they change and periodically, with messages for 3-D programs."""
         known_s = [one for one in (zones.host_time_s, zones.arrived_s) if one is not None]
         sampled_s = known_s[0] if known_s else clock_s
         head = convert.header(self._link.time_ns(sampled_s), self._frame)
@@ -294,11 +281,9 @@ class LinkMessages:
 
 
 def of_faults(names: tuple[str, ...], time_ns: int, frame: str) -> bytes:
-    """Faults by name."""
     return encode(FAULTS, {"header": convert.header(time_ns, frame), "names": names})
 
 
 def of_units(samples: UnitSamples, time_ns: int, frame: str) -> bytes:
-    """A sweep of the pressure units."""
     values = {name: getattr(samples, name) for name in ("readings", "sigma", "saturated")}
     return encode(UNITS, {"header": convert.header(time_ns, frame), "device_time_us": samples.time_us} | values)

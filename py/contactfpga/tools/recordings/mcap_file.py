@@ -1,4 +1,4 @@
-"""An MCAP file under construction, with whole pieces only, whatever happens to the program or the disk."""
+"""An MCAP file under construction, with whole pieces only, even if the program or the disk fails."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RecordingFailed(ContactFPGAError):
 
 
 class WholeFile:
-    """A new file that writes the bytes up to each :meth:`flush` together; on failure it keeps none of them."""
+    """A new file that writes the bytes up to each :meth:`flush` together, or on failure none of them."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -47,7 +47,6 @@ class WholeFile:
         return self._whole + len(self._waiting)
 
     def write(self, data: bytes) -> int:
-        """Buffer bytes."""
         self._waiting += data
         return len(data)
 
@@ -64,7 +63,7 @@ class WholeFile:
         self._whole += count
 
     def close(self) -> None:
-        """Close the file; may be called twice. Buffered bytes are dropped."""
+        """Close the file without buffered bytes; may be called twice."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
@@ -83,10 +82,10 @@ class WholeFile:
 
 CHUNK_BYTES = 1 << 16
 FLUSH_S = 0.1
-"""Largest number of waiting bytes, and their longest wait: the loss if the program dies. Half of our promise, as the
-system may delay us."""
+"""Most waiting bytes, and their longest wait: half of the promised loss if the program dies, as the system may delay a
+write.
+"""
 _MESSAGE_BYTES = 31
-"""Bytes of a message's record besides its data."""
 
 
 class McapFile:
@@ -122,7 +121,6 @@ class McapFile:
         return self._file.tell() + self._waiting
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add texts outside of the messages."""
         self._writer.add_metadata(name, dict(values))
         self.flush()
 
@@ -166,7 +164,6 @@ class McapFile:
             self.flush()
 
     def flush(self) -> None:
-        """Write buffered messages."""
         self._waiting, self._since_s = 0, math.inf
         self._guarded(self._writer.flush)
 

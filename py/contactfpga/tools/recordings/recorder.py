@@ -212,7 +212,6 @@ def link_name(hello: Hello) -> str:
 
 
 def _epoch_ns(board: Board) -> int:
-    """Offset of the board's clock from 1970."""
     return offset_ns(time.time_ns, board.clock)
 
 

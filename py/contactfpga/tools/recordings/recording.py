@@ -30,7 +30,7 @@ LAST_S = 0.2
 class Recording:
     """The output of `contactfpga record`, closed or recovered; split files by the name recorded to.
 
-    Every call reads the file anew, without caching. Frames are made of the board's own bytes, as by the driver. Raises
+    Every call reads the file again. Frames are made from the board's own bytes, as by the driver. Raises
     :class:`ContactFPGAError` for an unreadable file.
     """
 
@@ -45,13 +45,14 @@ class Recording:
 
     @property
     def duration_s(self) -> float:
-        """From its first byte to its last one."""
+        """Seconds from the first byte to the last one."""
         return (self._file.end_ns - self._file.start_ns) / 1e9
 
     @functools.cached_property
     def links(self) -> dict[str, Hello]:
         """The first hello of each link, whose ``sheet`` has lines and lengths, in order of addition. Links without a
-        hello are omitted: their frames are unreadable. Raises :class:`ContactFPGAError` if none is left."""
+        hello are omitted, as their frames are unreadable. Raises :class:`ContactFPGAError` if none is left.
+        """
         found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
         if not found:
             raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
@@ -68,8 +69,9 @@ class Recording:
         return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:
-        """(seconds since the beginning, link, :class:`Zones`) from ``start_s`` on and before ``end_s``, in order; with
-        ``link`` only of this one."""
+        """(seconds since the beginning, link, :class:`Zones`) from ``start_s`` up to ``end_s``, in order; ``link``:
+        only of this one.
+        """
         for name, value in (("start_s", start_s), ("end_s", 0.0 if end_s is None else end_s)):
             if not is_finite(value) or value < 0:
                 raise ValueError(f"{name} is {value!r}; it must be a number of seconds, 0 or more")
@@ -89,7 +91,7 @@ class Recording:
         return table + notebook.beside((link, zones.svg()) for link, zones in last.items())
 
     def raw_bytes(self, link: str | None = None) -> Iterator[tuple[float, bytes]]:
-        """(seconds since the beginning, bytes arrived by then) of a link: everything that came over its port."""
+        """(seconds since the beginning, bytes arrived by then) of a link."""
         return ((self._seconds(moment_ns), data) for moment_ns, data in self._file.pieces(link))
 
     def _seconds(self, moment_ns: int) -> float:

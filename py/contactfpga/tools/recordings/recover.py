@@ -1,4 +1,4 @@
-"""Closes a recording whose program was killed or whose disk was full: copies all whole parts into a new file."""
+"""Closes a recording whose program was killed or whose disk was full, by copying all whole parts into a new file."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class RecoveryReport:
     """The new file."""
     messages: int = 0
     seconds: float = 0.0
-    """From the first message to the last one."""
+    """Seconds from the first message to the last one."""
     damaged: int = 0
     """Inner pieces omitted because they are damaged or too large."""
     cut: int = 0
     """Bytes of an incomplete final piece."""
     closed: bool = False
-    """Whether it was properly closed; of several, the last one."""
+    """Whether the last recording was properly closed."""
     recordings: int = 1
     """Consecutive recordings in the file."""
     beyond: int = 0
@@ -39,8 +39,8 @@ class RecoveryReport:
 
 def recover(path: str | Path, into: str | Path | None = None) -> RecoveryReport:
     """Copy the whole parts into a new file, by default ``touches_recovered.mcap`` for ``touches.mcap``, which appears
-    once complete; the old one is unchanged. Raises :class:`RecordingError` if there is nothing to copy, no room, or
-    such a file already."""
+    once complete. Raises :class:`RecordingError` if there is nothing to copy, no room, or such a file already.
+    """
     source = Path(path)
     target = source.parent / f"{source.stem}_recovered{source.suffix}" if into is None else Path(into)
     try:
@@ -91,14 +91,11 @@ def _copy_all(file: BinaryIO, new: Path, found: RecoveryReport) -> None:
 
 
 class _Definitions:
-    """Schemas and channels of one recording, by number."""
-
     def __init__(self) -> None:
         self.schemas: dict[int, Any] = {}
         self.channels: dict[int, Any] = {}
 
     def take(self, record: Any) -> None:
-        """Add a record if it is one of them."""
         from mcap.records import Channel, Schema
 
         if isinstance(record, Schema):
@@ -108,8 +105,6 @@ class _Definitions:
 
 
 class _Copy:
-    """The new file."""
-
     def __init__(self, path: Path):
         self._file = McapFile(path)
         self.definitions: list[_Definitions] = []
@@ -117,7 +112,6 @@ class _Copy:
         self._first_ns: int | None = None
 
     def take(self, record: Any, found: RecoveryReport) -> None:
-        """Add a record of the old file."""
         from mcap.records import Message, Metadata
 
         known = self.definitions[-1]
@@ -136,7 +130,7 @@ class _Copy:
 
 
 def _definitions(file: BinaryIO) -> list[_Definitions]:
-    """Definitions of each recording; a closed one repeats them at its end, in case their first piece is damaged."""
+    """Definitions of each recording; a closed one repeats them at its end, in case its first piece is damaged."""
     from mcap.opcode import Opcode
 
     found: list[_Definitions] = []

@@ -25,8 +25,6 @@ from contactfpga.tools.recordings.recorder import Recorder, Split, link_name
 
 @dataclasses.dataclass(frozen=True)
 class _OpenLink:
-    """A link whose board is open."""
-
     name: str
     board: Board
     events: Events
@@ -39,8 +37,8 @@ class Session:
     """Records boards into ``path``: :meth:`add` each of them, then :meth:`start`; a context manager that ends it.
 
     ``split``: limits of a file; then ``touches.mcap`` becomes ``touches_0001.mcap`` and so on. ``bytes_only`` omits
-    messages: about a fifth of the size, without loss, as they can be made of the bytes. The file must not exist yet.
-    ``about``: texts to store by name, beside those of each link. Raises :class:`ContactFPGAError`.
+    messages, which can be made from the bytes: about a fifth of the size. ``about``: texts to store by name. Raises
+    :class:`ContactFPGAError`, also if the file exists.
     """
 
     def __init__(
@@ -101,7 +99,8 @@ class Session:
 
     def start(self, seconds: float | None = None) -> None:
         """Create the file, and record for ``seconds``, or until :meth:`stop`. Raises ValueError, and
-        :class:`ContactFPGAError` without a board or if started before."""
+        :class:`ContactFPGAError` without a board or if started before.
+        """
         if seconds is not None and (not is_finite(seconds) or seconds <= 0):
             raise ValueError(f"seconds is {shown(seconds)}; it must be a positive number, or None until stop()")
         if self._begun is not None:
@@ -176,7 +175,6 @@ class Session:
                 raise link.error
 
     def forked(self) -> None:
-        """Stop recording in a child process; the parent goes on."""
         self._stop, self._ended, self._begun = threading.Event(), threading.Event(), None
         self._ended.set()
         self._opened, self.links, self._threads, self._recorder = [], [], [], None
@@ -198,7 +196,7 @@ class Session:
 
     @property
     def files(self) -> list[Path]:
-        """Its files, the first one first."""
+        """Its files in order."""
         return [] if self._recorder is None else self._recorder.files
 
     def __enter__(self) -> Session:
@@ -211,7 +209,7 @@ class Session:
 
 
 def check_new(path: str | Path) -> None:
-    """Raises :class:`ContactFPGAError` for what cannot be the name of a new recording."""
+    """Raises :class:`ContactFPGAError` for an invalid name of a new recording."""
     if Path(path).suffix != SUFFIX:
         raise ContactFPGAError(f"{path} does not end in {SUFFIX}, by which programs know such files; name it so")
     if os.path.lexists(path):

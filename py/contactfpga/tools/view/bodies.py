@@ -1,4 +1,4 @@
-"""A robot with sheets on its links, live or recorded: each link's newest frame, and sliders for its joints."""
+"""A robot with sheets on its links, live or recorded."""
 
 from __future__ import annotations
 
@@ -49,7 +49,6 @@ ROBOT_SIDES = {
         "back": (-1.0, 0.0, 0.1),
     }.items()
 }
-"""A robot faces x, with z up."""
 
 
 class RobotSource(Protocol):
@@ -60,7 +59,6 @@ class RobotSource(Protocol):
     angles: dict[str, float]
     """Angles set by the sliders, in rad, in m for prismatic joints."""
     virtual: dict[str, Touchable]
-    """Virtual boards by link."""
 
     def states(self) -> dict[str, LinkState]:
         """Current states of all links."""
@@ -86,7 +84,6 @@ class BodySource:
         return driver.open(virtual, plan.skin, timeout=self._timeout)
 
     def states(self) -> dict[str, LinkState]:
-        """Current states of all links."""
         return self._open.latest().links
 
     def close(self) -> None:
@@ -110,14 +107,9 @@ class DrawnRobot:
         arrows: np.ndarray | None = None,
         label: str | None = None,
     ) -> list[contacts.Row]:
-        """A link's newest frame; returns its contacts.
-
-        Args:
-         name: of the link.
-         state: its state.
-         truth: (rows, columns) closed switches, if known.
-         arrows: (n, 2, 3) forces in m in the sheet's frame, replacing those that units measure.
-         label: the link's name in the contacts' rows.
+        """Draw a link's newest frame; returns its contacts. ``truth``: (rows, columns) closed switches, if known;
+        ``arrows``: (n, 2, 3) forces in m in the sheet's frame, replacing those that units measure; ``label``: the
+        link's name in the contacts' rows.
         """
         stage, plan = self.stage.stages[name], self._links[name]
         if state.zones is None:
@@ -143,10 +135,9 @@ class DrawnRobot:
 
 
 class RobotView(abc.ABC):
-    """A robot in a server's page: its picture, the table of its contacts, and further facts."""
+    """A robot in a server's page, with its contacts and further facts."""
 
     stage: RobotStage
-    """Stage of the robot, or of the first of several."""
 
     def __init__(self, server: viser.ViserServer, points: Callable[[], np.ndarray]):
         """``points``: (n, 3) in m, for cameras to hold."""
@@ -158,7 +149,6 @@ class RobotView(abc.ABC):
         self._table = server.gui.add_html(contacts.table(()))
 
     def _add_rest(self, server: viser.ViserServer, title: str) -> None:
-        """Add sides to look from, and facts, to the panel."""
         controls.add(server, self.cameras, lambda: (f"contactfpga: {shortened(title)}", self._rows))
         self._facts = server.gui.add_markdown("")
 
@@ -186,8 +176,6 @@ class RobotView(abc.ABC):
 
 
 class BodyView(RobotView):
-    """A robot with boards, or a recording of them."""
-
     def __init__(self, server: viser.ViserServer, source: RobotSource):
         self._source = source
         self.stage = RobotStage(server, source.body)
@@ -217,7 +205,6 @@ class BodyView(RobotView):
         return [row for name, state in self._states.items() for row in self._draw(name, state)]
 
     def _move(self) -> None:
-        """Draw the links at their current poses."""
         if self._source.angles != self._moved:
             self._moved = dict(self._source.angles)
             self.stage.move(self._moved)
@@ -312,6 +299,6 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
 
 
 def holds_robot(recording: Recording) -> bool:
-    """Whether a recording has a robot with all files of its table; earlier versions stored the table alone."""
+    """Whether a recording has a robot with all files of its table, which earlier versions omitted."""
     texts = recording.texts(packed.ROBOT)
     return bool(texts) and set(texts[0]) != {packed.TOML}

@@ -1,4 +1,4 @@
-"""Cameras that hold the whole scene in any window, and the sides to look from."""
+"""Cameras that hold the whole scene in any window."""
 
 from __future__ import annotations
 
@@ -17,9 +17,8 @@ if TYPE_CHECKING:
 FOV_RAD = math.radians(32)
 """Vertical field of view."""
 ROOM = 1.04
-"""Margin of the window left free."""
+"""Scale of the view for a free margin."""
 FIRST = 1.6
-"""Aspect ratio of a window of unknown size."""
 NEAR = 0.02
 """Nearest drawn depth over the distance."""
 
@@ -69,7 +68,9 @@ def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_R
 
 
 def sides_of(tiles: Tiles) -> dict[str, Side]:
-    """Views of a sheet: oblique, frontal, along it, and from behind. One around a limb lies, with row 0 on the left."""
+    """Views of a sheet: oblique, frontal, along it, and from the back. A sheet around a limb lies, with row 0 on the
+    left.
+    """
     if tiles.sheet.radius_mm is None:
         normal, away, aside = (each.mean(0) for each in (tiles.normals, tiles.along_y, tiles.along_x))
         return {
@@ -106,11 +107,9 @@ class Cameras:
         server.on_client_disconnect(lambda client: self._sizes.pop(client.client_id, None))
 
     def show(self, client: Any, name: str) -> None:
-        """Turn this browser's camera to a side."""
         self.look(client.camera, self.sides[name])
 
     def look(self, camera: Any, side: Side) -> None:
-        """Fit the scene in this camera, from a side."""
         placed = fitted(self._points(), side, camera.aspect, camera.fov)
         with camera.client.atomic():
             camera.up_direction = side.up
@@ -127,7 +126,6 @@ class Cameras:
         client.camera.on_update(self._resized)
 
     def _resized(self, camera: Any) -> None:
-        """Fit again from its direction, if the window's size changed."""
         size = _size(camera)
         if self._sizes.get(camera.client.client_id) != size:
             self._sizes[camera.client.client_id] = size

@@ -1,4 +1,4 @@
-"""Charts in the panel, as SVG in the page's colors: contacts and area over the last seconds, forces since a touch."""
+"""Charts in the panel, as SVG in the page's colors."""
 
 from __future__ import annotations
 
@@ -12,14 +12,11 @@ from contactfpga.tools.view.sources import CHART_S, Strip
 
 WIDTH, HEIGHT = 310, 150
 LEFT, RIGHT, TOP, BOTTOM = 26, 34, 24, 118
-"""Plot within the picture, in its units of about a pixel."""
 SECONDS = (-10, -8, -6, -4, -2, 0)
 AREA = "#2b8fd0"
-"""Lighter than the pressed cells' color, for dark panels."""
 FORCES = ((picture_style.VERMILLION, ""), ("#d99000", "5 2"), (AREA, ""))
 """Colors and dashes of the curves of :func:`force_chart`."""
 LEGEND = 14
-"""Height of a line of the legend."""
 
 
 def chart(strip: Strip) -> str:
@@ -39,8 +36,9 @@ def chart(strip: Strip) -> str:
 
 
 def force_chart(forces_n: np.ndarray, seconds: float, curves: Sequence[tuple[int, str]]) -> str:
-    """SVG of (curves, n) forces in N over ``seconds`` from a touch, nan where unknown; ``curves``: of each the number
-    of its color and dashes in :data:`FORCES`, and its name."""
+    """SVG of (curves, n) forces in N over ``seconds`` from a touch, nan where unknown; ``curves``: number in
+    :data:`FORCES` and name of each.
+    """
     most = top(np.nan_to_num(forces_n), 5, (1, 2, 3, 4, 6, 8, 10))
     shift = LEGEND * len(curves) - TOP + 18
     parts = []
@@ -67,14 +65,13 @@ def _svg(parts: Sequence[str], height: float, label: str) -> str:
 
 
 def top(values: np.ndarray, least: int, steps: Sequence[int] = (1, 2, 5, 10)) -> int:
-    """One of the steps times a power of ten, at least the largest value, so that the axis seldom changes."""
+    """Top of an axis: a step times a power of ten, at least the largest value, so that the axis seldom changes."""
     wanted = max(least, math.ceil(values.max(initial=0.0)))
     power = int(10 ** (len(str(wanted)) - 1))
     return next(times * power for times in steps if times * power >= wanted)
 
 
 def _signed(number: float) -> str:
-    """Write a number with the minus sign of typography."""
     return f"{number:g}".replace("-", "−")
 
 
@@ -87,7 +84,6 @@ def _y(share: float) -> float:
 
 
 def _axis(most: int, x: float, anchor: str) -> Iterator[str]:
-    """Numbers at 0, half and the top, and horizontal lines."""
     for share in (0.0, 0.5, 1.0):
         y = _y(share)
         yield from _text(x, y + 3.5, f"{share * most:g}", anchor)
@@ -96,7 +92,6 @@ def _axis(most: int, x: float, anchor: str) -> Iterator[str]:
 
 
 def _times(marks: Iterable[tuple[float, str]], name: str) -> Iterator[str]:
-    """Numbers below shares of the plot's width, and their unit."""
     for share, mark in marks:
         yield from _text(_x(share), BOTTOM + 13, mark, "middle")
     yield from _text((LEFT + WIDTH - RIGHT) / 2, BOTTOM + 27, name, "middle")
@@ -107,7 +102,6 @@ def _text(x: float, y: float, text: str, anchor: str) -> Iterator[str]:
 
 
 def _line(across: np.ndarray, upward: np.ndarray, color: str, dashes: str = "") -> str:
-    """A line through shares of the plot's width and height."""
     points = " ".join(f"{_x(x):.1f},{_y(y):.1f}" for x, y in zip(across, upward))
     return f'<polyline points="{points}" fill="none" stroke-linejoin="round" {_stroke(color, dashes)}/>'
 

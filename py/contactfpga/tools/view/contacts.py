@@ -1,4 +1,4 @@
-"""Descriptions of contacts, beside them on the sheet, and in the panel's table."""
+"""Descriptions of contacts, on the sheet and in the panel's table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contactfpga.tracking.tracks import Track
 from contactfpga.zones.zone import Zone
 
 MOST = 8
-"""Contacts with a full description; further ones have ids alone."""
+"""Contacts with a full description."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,18 +21,16 @@ class Row:
 
     id: int | None
     x_mm: float | None
-    """None: it goes all the way round."""
+    """None: the zone surrounds the limb."""
     y_mm: float | None
     area_mm2: float
     area_cells: int
     age_s: float | None
     force_n: float | None = None
-    """None: not measured."""
     link: str = ""
 
     @property
     def place(self) -> str:
-        """Place in mm."""
         if self.y_mm is None or math.isnan(self.y_mm):
             return "nowhere"
         return f"{'all round' if self.x_mm is None else f'{self.x_mm:.1f}'}, {self.y_mm:.1f}"
@@ -75,7 +73,7 @@ def force_at(zone: Zone, pushes: Sequence[tuple[Zone, float | None]]) -> float |
 
 
 def table(found: Sequence[Row], no_data: bool = False) -> str:
-    """HTML of the table. Names of links come from strangers and are escaped."""
+    """HTML of the table, with names of links escaped, which come from strangers."""
     if no_data:
         return _framed("No data", "")
     count = len(found)

@@ -1,4 +1,4 @@
-"""Sides to look from and a picture to save: buttons and keys of each view."""
+"""Controls of each view: sides to look from, and a picture to save."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ if TYPE_CHECKING:
 KEYS: tuple[Any, ...] = ("1", "2", "3", "4")
 
 Caption = Callable[[], tuple[str, Sequence[Row]]]
-"""What is shown and when, and its contacts."""
+"""Title with time, and contacts."""
 
 
 def add(server: viser.ViserServer, cameras: Cameras, caption: Caption) -> None:
-    """Add the controls to the panel."""
     gui = server.gui
     named = {f"{side} ({key})": side for key, side in zip(KEYS, cameras.sides)}
     buttons = gui.add_button_group("view", tuple(named))

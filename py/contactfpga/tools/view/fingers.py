@@ -28,13 +28,13 @@ class Finger:
     force_n: float
 
     def covers(self, x_mm: float, y_mm: float, around_mm: float | None = None) -> bool:
-        """Whether this place is under it; ``around_mm``: see :attr:`contactfpga.skin.sheet.Sheet.around_mm`."""
+        """Whether the finger covers this place; ``around_mm``: see :attr:`contactfpga.skin.sheet.Sheet.around_mm`."""
         off_mm = across(self.x_mm - x_mm, around_mm)
         return off_mm**2 + (self.y_mm - y_mm) ** 2 <= self.radius_mm**2
 
 
 class Pressable(Protocol):
-    """What fingers can press."""
+    """A board that fingers can press."""
 
     def touch(self, fingers: Sequence[Finger]) -> None:
         """Touch the sheet with these fingers, besides its scene, until the next call; from any thread."""
@@ -45,7 +45,7 @@ class Pressable(Protocol):
 
 
 class Touchable(Pressable, Protocol):
-    """A virtual board; :class:`contactfpga_sim.model.board.virtual.VirtualBoard` is one."""
+    """A virtual board, such as :class:`contactfpga_sim.model.board.virtual.VirtualBoard`."""
 
     @property
     def pressed(self) -> np.ndarray:
@@ -56,8 +56,8 @@ class Touchable(Pressable, Protocol):
 
 
 class Hand:
-    """The mouse's fingers. A click adds one or lifts the one there; a drag moves one from its start, or else one that
-    is lifted at its end. Thread-safe.
+    """The mouse's fingers. A click adds or lifts a finger. A drag moves the finger at its start, or else a new one that
+    its end lifts. Thread-safe.
 
     :attr:`radius_mm` and :attr:`force_n` are those of the next finger.
     """
@@ -92,7 +92,7 @@ class Hand:
             self._tell()
 
     def drag(self, who: object, x_mm: float, y_mm: float) -> None:
-        """Begin or continue a drag; ``who``: whose mouse it is."""
+        """Begin or continue a drag; ``who``: owner of the mouse."""
         with self._lock:
             before = self._dragged.get(who) or self._taken(who, x_mm, y_mm)
             self._dragged[who] = dataclasses.replace(before, x_mm=x_mm, y_mm=y_mm)
@@ -123,7 +123,6 @@ class Hand:
             self._tell()
 
     def _taken(self, who: object, x_mm: float, y_mm: float) -> Finger:
-        """The finger with which a drag begins."""
         for finger in self._down:
             if finger.covers(x_mm, y_mm, self._around_mm):
                 self._down.remove(finger)

@@ -37,16 +37,16 @@ def blobs(tiles: Tiles, lift_mm: float) -> Blobs:
 
 
 def shine(colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Colors, (n, 3) uint8, and opacities, (n, 1) from 0 to 1, of the blobs of cells with these colors, (cells, 3)
-    uint8: only closed ones shine."""
+    """Colors, (n, 3) uint8, and opacities, (n, 1) from 0 to 1, of the blobs of cells with these (cells, 3) uint8
+    colors; only closed ones shine.
+    """
     tints = [colors + white * (255.0 - colors) for _, white, _ in PARTS]
     lit = picture.lit(colors)[:, None]
     return np.concatenate(tints).astype(np.uint8), np.concatenate([opacity * lit for _, _, opacity in PARTS])
 
 
 class Glow:
-    """Draws the light. All blobs exist from the beginning: new ones would be drawn before the page knows their
-    place."""
+    """Draws the light. All blobs exist from the beginning, as the page draws new ones before it knows their place."""
 
     def __init__(self, server: viser.ViserServer, name: str, tiles: Tiles, lift_mm: float):
         self._blobs = found = blobs(tiles, lift_mm)
@@ -54,5 +54,4 @@ class Glow:
         self._handle = server.scene.add_gaussian_splats(name, found.centers_mm, found.spreads_mm2, *dark, scale=MM)
 
     def show(self, colors: np.ndarray) -> None:
-        """Show cells with these colors."""
         self._handle.set_gaussians(self._blobs.centers_mm, self._blobs.spreads_mm2, *shine(colors))

@@ -1,4 +1,4 @@
-"""The carrier of a drawn sheet: a forearm with foam for a cylinder, else a plate."""
+"""The carrier of a drawn sheet: a forearm with foam for a cylinder, otherwise a plate."""
 
 from __future__ import annotations
 
@@ -12,21 +12,18 @@ if TYPE_CHECKING:
     import viser
 
 FOAM_MM = 5.0
-"""Thickness of the drawn foam, without effect: the default of a Skin's `[cover]`."""
+"""Thickness of the drawn foam: the default of a Skin's `[cover]`."""
 UNDER_MM = 1.2
-"""Distance from the cells to their carrier."""
 LEFT_MM = 1.0
-"""Remaining foam over a closed cell."""
 REACH = 1.6
 """Distance from a closed cell to undented foam, in pitches."""
 SIDES = 72
-"""Sides of a solid of revolution."""
 
 CORE, COLLAR, JOINT, FOAM, PLATE = (52, 58, 67), (176, 183, 192), (96, 104, 115), (228, 234, 240), (52, 58, 67)
 
 
 class Limb:
-    """A forearm about the sheet's z axis, from the elbow below to the wrist above, in foam."""
+    """A forearm in foam about the sheet's z axis, with the elbow below."""
 
     def __init__(self, server: viser.ViserServer, tiles: Tiles, node: str):
         sheet = tiles.sheet
@@ -92,7 +89,7 @@ def dented(vertices: np.ndarray, tiles: Tiles, closed: np.ndarray) -> np.ndarray
 
 
 def plate(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices in mm and faces of a thin plate along the surface under all cells and slightly beyond."""
+    """Vertices in mm and faces of a thin plate under all cells and slightly beyond."""
     sheet = tiles.sheet
     beyond = 0.35
     x_mm = np.linspace(-0.5 - beyond, sheet.columns - 0.5 + beyond, 2 * sheet.columns + 1) * sheet.pitch_x_mm
@@ -103,13 +100,13 @@ def plate(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
 
 
 def add_plate(server: viser.ViserServer, tiles: Tiles, node: str) -> None:
-    """Draw the plate."""
     _add(server, f"{node}/plate", *plate(tiles), PLATE)
 
 
 def revolved(profile: np.ndarray, sides: int = SIDES, first: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and outward faces of a profile (k, 2), radius and z in one unit, revolved about z in ``sides``
-    steps from the angle ``first`` in rad."""
+    steps from the angle ``first`` in rad.
+    """
     angles = first + np.linspace(0, 2 * np.pi, sides + 1)
     radius, height = profile[:, :1], profile[:, 1:]
     rings = np.stack([radius * np.cos(angles), radius * np.sin(angles), height + 0 * angles], -1)
@@ -117,7 +114,6 @@ def revolved(profile: np.ndarray, sides: int = SIDES, first: float = 0.0) -> tup
 
 
 def _grid(rows: int, columns: int) -> np.ndarray:
-    """Two triangles per cell of a grid of vertices, row by row."""
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.stack([first, first + 1, first + columns + 1], -1)
     upper = np.stack([first, first + columns + 1, first + columns], -1)
@@ -130,7 +126,6 @@ def _ring(inner: float, outer: float, low: float, high: float, edge: float = 1.5
 
 
 def _rounded(radius: float, low: float, high: float, ball: float) -> np.ndarray:
-    """A shaft that ends in a ball below."""
     turn = np.linspace(-np.pi / 2, 0.35 * np.pi, 20)
     points = np.stack([ball * np.cos(turn), low + ball + ball * np.sin(turn)], -1)
     return np.concatenate([points, [(0.72 * radius, high - 14), (radius, high - 4), (radius, high)]])

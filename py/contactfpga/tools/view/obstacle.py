@@ -10,21 +10,16 @@ NOTHING, BALL, HAND = OBSTACLES = ("none", "ball", "hand")
 FASTEST_M_S = 0.5
 """Largest speed of following the mouse, as MuJoCo's contacts ignore the speed of placed bodies."""
 AWAY_M = np.array([0.0, 0.0, 100.0])
-"""Waiting place of unchosen obstacles."""
 AHEAD_M = 0.06
-"""Initial place in front of a sheet, along x."""
 BALL_M = 0.03
-"""Radius."""
 STEEP = 1 / 3
 """Sine of the elevation from which the view counts as downward."""
 FARTHEST = 3.0
 """Largest depth over that of the grip."""
 COLORS = {BALL: (0.87, 0.56, 0.02, 1.0), HAND: (0.89, 0.67, 0.54, 1.0)}
 ALL_BITS = 2**31 - 1
-"""Collision bits of a geom that touches everything touchable."""
 
 FINGERS_M = (-0.033, -0.011, 0.011, 0.033)
-"""Places of fingers along x on the palm, which is across y; they point up."""
 
 
 def add(spec: Any) -> None:
@@ -52,7 +47,6 @@ class Obstacle:
 
     def __init__(self) -> None:
         self.kind = NOTHING
-        """One of :data:`OBSTACLES`."""
         self.wanted_m = self.at_m = AWAY_M
 
     def put(self, kind: str, at_m: np.ndarray) -> None:
@@ -73,7 +67,7 @@ class Obstacle:
 
 
 class Grip:
-    """A drag in the horizontal plane seen from above, else in the plane of two axes that faces the camera."""
+    """A drag in the horizontal plane seen from above, otherwise in the coordinate plane that faces the camera."""
 
     def __init__(self, obstacle: Obstacle, eye_m: np.ndarray, grabbed_m: np.ndarray):
         """(3,) places of the camera, and of the grip."""

@@ -39,11 +39,10 @@ if TYPE_CHECKING:
     import viser
 
 PANEL_S = 0.25
-"""Interval of writing the panel."""
 
 
 class View:
-    """Shows a source in a server's page."""
+    """A source shown in a server's page."""
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
         self._source = source
@@ -54,7 +53,6 @@ class View:
         self._told_s = 0.0
         self._moment: Moment | None = None
         self.drawn = 0
-        """Moments drawn."""
         if hand is not None:
             self.stage.press_with(hand)
 
@@ -71,7 +69,6 @@ class View:
 
 
 FOREARM = Skin(rows=16, columns=16, closed=True, surface="cylinder", radius_mm=45.0)
-"""As in examples/forearm.toml."""
 
 
 def own_skin(flat: bool = False) -> Skin:
@@ -88,7 +85,6 @@ class ServedView:
     view: View | RobotView
     source: Source | BodySource | BodyPlayer | SimulatedSource
     hand: Hand | None
-    """The mouse's hand, on a virtual board."""
     url: str
     """Address with the token, which permits reading and pressing."""
 
@@ -102,29 +98,23 @@ class ViewRequest:
     skin: str | Path | None = None
     baud: int | None = None
     timeout: float = 1.0
-    """Seconds for the hello."""
     link: str | None = None
-    """Link of a recording of several boards."""
     units: str | Path | None = None
     """File of the pressure units; by default from ``sim://``."""
     flat: bool = False
-    """By default show a flat sheet instead of one around a forearm."""
     reading: Reading = silent
     """Receives the progress of reading a recording without index."""
     mujoco: str | None = None
     """File of a MuJoCo model that wears the sheets of the robot of :attr:`port`."""
     reflex: str | None = None
-    """Python file of its reflexes."""
     gateware: bool = False
-    """Use the compiled gateware, not the golden model."""
 
 
 @contextlib.contextmanager
 def opened(
     named: ViewRequest | None = None, host: str = server.LOCAL, http_port: int | None = None
 ) -> Iterator[ServedView]:
-    """Open the request, a virtual board by default, and serve a view of it; raises the errors of
-    :func:`contactfpga.open`."""
+    """Open the request and serve a view of it; raises the errors of :func:`contactfpga.open`."""
     named = named or ViewRequest()
     _check(named)
     source, hand = _source(named)
@@ -195,7 +185,6 @@ def _is_virtual(port: str) -> bool:
 
 
 def _cells(named: ViewRequest) -> LoadCells | None:
-    """The units of the request. Raises :class:`~contactfpga.robot.haptics.HapticsError`."""
     path = named.units
     if path is None and named.port is not None and _is_virtual(named.port):
         path = Sim.parse(named.port).units
@@ -203,7 +192,6 @@ def _cells(named: ViewRequest) -> LoadCells | None:
 
 
 def _virtual(named: ViewRequest) -> Any:
-    """A virtual board; by default an untouched one of the Skin, or a sheet around a forearm."""
     if named.port is not None:
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
@@ -212,7 +200,7 @@ def _virtual(named: ViewRequest) -> Any:
 
 
 def browse(url: str) -> None:
-    """Open it in the user's browser, through a page that only this user can read, since command lines are public."""
+    """Open the address in the browser through a file that only this user can read, since command lines are public."""
     with tempfile.NamedTemporaryFile("w", suffix=".html", prefix="contactfpga-", delete=False) as file:
         file.write(f"<!doctype html><title>contactfpga</title><script>location.replace({url!r})</script>\n")
     atexit.register(Path(file.name).unlink, missing_ok=True)

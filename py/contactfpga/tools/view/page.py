@@ -1,5 +1,4 @@
-"""Changes of viser's page: its panel under the sheet on a phone, none of its own marks over the sheet; and a
-picture."""
+"""Changes of viser's page, and a picture of it."""
 
 from __future__ import annotations
 
@@ -11,7 +10,6 @@ if TYPE_CHECKING:
     import viser
 
 PANEL_PX = 330
-"""Width of the panel beside the sheet."""
 
 STYLE = """
 @media (max-width: 36em) {
@@ -66,13 +64,11 @@ SCRIPT = """
   };
 })();
 """
-"""Script that removes viser's drag arrow and rotation cross, and saves a picture of the view, in the page's colors,
-with lines of text below."""
+"""Script that moves viser's panel on phones, removes its own marks, and saves a picture with lines of text."""
 
 
 def dress(server: viser.ViserServer) -> None:
-    """Apply the changes for all clients. viser has no setting for them, but sends a script where a part of the page
-    asks for one."""
+    """Apply the changes for all clients, by the scripts that parts of viser's page ask for."""
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.set_panel_label("contactfpga")
     server.gui.main_panel.dock_right()

@@ -1,4 +1,4 @@
-"""The panel beside the sheet: counters, chart, the mouse's finger, a recording's timeline."""
+"""The panel beside the sheet."""
 
 from __future__ import annotations
 
@@ -40,7 +40,6 @@ TRUTH = (
 FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {picture.MM_PER_N:g} mm per newton")
 TITLE = 36
 MOST_N = 30.0
-"""Largest force of the mouse's finger."""
 
 
 class Panel:
@@ -85,7 +84,6 @@ class Panel:
         return f"{title}, {self._moment.zones.time_us / 1e6:.6f} s since power-up", contacts.rows(self._moment)
 
     def write(self, moment: Moment | None) -> None:
-        """Write the current facts."""
         self._moment = moment
         self._table.content = contacts.table(() if moment is None else contacts.rows(moment))
         self._facts.content = as_markdown(facts(self._source, moment))
@@ -114,7 +112,6 @@ class TimelineControls:
             player.speed = SPEEDS[speed.value]
 
     def write(self) -> None:
-        """Write the current position."""
         if self._player.playing:
             self._place.value = self._player.position_s
         self._button.label = "Pause" if self._player.playing else "Play"
@@ -131,8 +128,9 @@ def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
 
 
 def as_markdown(rows: Iterable[tuple[str, str]]) -> str:
-    """Names and values, a line each, shown verbatim: names of links, files and Skins come from strangers, and the page
-    would otherwise run their HTML and load their pictures."""
+    """Names and values, a line each, verbatim: they may come from strangers, and the page would otherwise run their
+    HTML and load their pictures.
+    """
     return "\n".join(f"**{_plain(name)}** {_plain(value)}  " for name, value in rows)
 
 

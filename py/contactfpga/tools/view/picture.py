@@ -17,7 +17,6 @@ from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone, Zones
 
 SIDES = 48
-"""Of a circle."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -36,8 +35,9 @@ OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
         picture_style.INK,
     )
 )
-"""Cells: open; closed on a virtual board that sends zones only, by its own truth; closed by the board's report;
-possibly ghosts of other closed ones; of a link without data."""
+"""Colors of cells: open; closed by a virtual board's truth, beyond its zones; closed by the board's report; possibly
+ghosts; of a link without data.
+"""
 
 CIRCLE, TRAIL, PUSH, AXIS = (
     rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE, picture_style.GRAY)
@@ -86,7 +86,6 @@ def spots(zones: Zones, surface: Surface, lift_mm: float) -> Spots:
 
 
 def radius_mm(zone: Zone) -> float:
-    """Radius of the circle with the zone's area."""
     return math.sqrt(zone.area_mm2 / math.pi)
 
 
@@ -105,16 +104,14 @@ def _lifted(surface: Surface, x_mm: np.ndarray, y_mm: np.ndarray, lift_mm: float
 
 
 MM_PER_N = 4.0
-"""Length of an arrow per newton."""
 LEAST_N = 0.02
-"""Weakest force with an arrow."""
 
 
 def pushes(contacts: Contacts, zones: Zones, cells: LoadCells, surface: Surface) -> np.ndarray:
     """(n, 2, 3) arrows in m, one for each contact with a force, from outside to its zone's barycenter.
 
-    The units' surface has its own frame, and may be the outside of a foam: forces are resolved along its normal, rows
-    and columns, and drawn along those of the sheet.
+    Forces are resolved along the normal, rows and columns of the units' surface, which may be the outside of a foam,
+    and drawn along those of the sheet.
     """
     placed = [zone for zone in zones if zone.x_mm is not None]
     arrows = []
@@ -151,7 +148,6 @@ class Trails:
         self._ways: dict[int, list[tuple[int, np.ndarray]]] = {}
 
     def add(self, tracks: Tracks) -> None:
-        """Add the contacts of the next frame."""
         if tracks.restarted:
             self._ways.clear()
         for track in tracks.active:

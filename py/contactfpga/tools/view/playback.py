@@ -1,4 +1,4 @@
-"""Playback at a chosen speed from a chosen position; and of one board."""
+"""Playback at a chosen speed from a chosen position."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ from contactfpga.zones.zone import Zones
 Item = TypeVar("Item")
 
 SPEEDS = {"1/1000": 0.001, "1/100": 0.01, "1/10": 0.1, "1/4": 0.25, "1": 1.0, "4": 4.0, "16": 16.0}
-"""Recording seconds per second, by name in the panel."""
 
 BEFORE_S = 0.25
-"""Time before the chosen position that is read as well, which contains at least a keep-alive."""
+"""Time before the chosen position that is read as well, with at least a keep-alive."""
 
 
 class Playback(abc.ABC, Generic[Item]):
@@ -32,7 +31,6 @@ class Playback(abc.ABC, Generic[Item]):
     def __init__(self, duration_s: float, clock: Callable[[], float] = time.monotonic):
         self.duration_s = duration_s
         self.position_s = 0.0
-        """The shown moment."""
         self.playing = True
         self.speed = 1.0
         self._clock = clock
@@ -48,7 +46,7 @@ class Playback(abc.ABC, Generic[Item]):
 
     @abc.abstractmethod
     def follow(self, seconds: float, item: Item) -> None:
-        """Add the next item, visible now or earlier."""
+        """Add the next item."""
 
     def play(self) -> None:
         """Continue; from the beginning if ended."""
@@ -58,7 +56,6 @@ class Playback(abc.ABC, Generic[Item]):
             self.playing = True
 
     def pause(self) -> None:
-        """Stay at this moment."""
         self.playing = False
 
     def seek(self, seconds: float) -> None:
@@ -97,7 +94,6 @@ class Playback(abc.ABC, Generic[Item]):
                 break
 
     def close(self) -> None:
-        """Release the recording."""
         self._items = iter(())
 
 

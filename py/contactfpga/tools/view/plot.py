@@ -39,7 +39,6 @@ def draw(recording: BoardRecording, path: Path) -> Path:
 
 
 def title(recording: BoardRecording, touches: Touches) -> str:
-    """Title of the picture."""
     sheet = touches.sheet
     name = recording.title.rpartition("/")[2]
     return f"{name}: {sheet.rows}x{sheet.columns} cells, {touches.frames:,} frames in {touches.duration_s:.1f} s"
@@ -105,13 +104,12 @@ def _losses(axes: Axes, touches: Touches, recording: BoardRecording) -> None:
 
 STEPS = 600
 CHUNK = 2000
-"""Frames per batch."""
 LONGEST_S = 0.25
 """Longest validity of a frame: a board with ``send = "on_change"`` sends at least that often."""
 
 
 class Touches:
-    """A recording of one sheet, gathered for a plot: a fixed number of time steps, and the sheet's cells."""
+    """A recording of one sheet in a fixed number of time steps."""
 
     def __init__(self, sheet: Sheet, duration_s: float, steps: int = STEPS):
         self.sheet, self.duration_s = sheet, max(duration_s, 1e-6)
@@ -125,13 +123,11 @@ class Touches:
         self.touched_s = np.zeros((sheet.rows, sheet.columns))
         """Time of a barycenter in each cell; with ``report = "cells"``, time for which each cell was pressed."""
         self.lost = np.zeros(steps, int)
-        """Sent frames that are missing."""
         self._before: Zones | None = None
         self._before_s = 0.0
 
     @classmethod
     def of(cls, recording: BoardRecording) -> Touches:
-        """Gather a whole recording."""
         found = cls(recording.sheet, recording.duration_s)
         same = ((seconds, zones) for seconds, zones in recording.frames() if zones.sheet == recording.sheet)
         for chunk in _chunks(same):
@@ -176,7 +172,6 @@ class Touches:
                 self.rows[:, step] = np.maximum(self.rows[:, step], cells.sum(1))
 
     def _hold(self, zones: Zones, since_s: float, until_s: float) -> None:
-        """Extend the last frame of a chunk to the next one's first."""
         held_s = min(until_s - since_s, LONGEST_S)
         if zones.cells is not None:
             self.touched_s += zones.cells * held_s

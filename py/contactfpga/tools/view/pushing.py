@@ -20,18 +20,13 @@ if TYPE_CHECKING:
     import viser
 
 PUSH_N = 5.0
-"""Initial force of the mouse's finger."""
 APART = 2.3
 """Distance of copies, in radii of a robot at its start."""
 ABOVE = 0.1
-"""Height of a copy's name above it, in these radii."""
 ABREAST = Side(np.array([1.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]))
-"""Viewing direction for several copies."""
 
 
 class SimulatedView(RobotView):
-    """Shows a simulated robot."""
-
     def __init__(self, server: viser.ViserServer, source: SimulatedSource):
         self._server, self._source = server, source
         self._stages: list[RobotStage] = []
@@ -56,7 +51,6 @@ class SimulatedView(RobotView):
         return np.concatenate([robot.stage.points_m() for robot in self._robots])
 
     def _arrange(self) -> None:
-        """Make adjacent stages for new copies."""
         self._drawn = copies = self._source.copies
         while len(self._stages) < len(copies):
             self._add_stage()
@@ -118,14 +112,12 @@ class SimulatedView(RobotView):
         return rows
 
     def _look_again(self) -> None:
-        """Let cameras hold all copies."""
         sides = self.cameras.sides
         sides[OVERVIEW] = ROBOT_SIDES[OVERVIEW] if len(self._drawn) == 1 else ABREAST
         for client in self._server.get_clients().values():
             self.cameras.show(client, OVERVIEW)
 
     def _draw(self, number: int) -> list[contacts.Row]:
-        """Draw one copy."""
         copy, robot, name = self._drawn[number], self._robots[number], self._names[number]
         robot.stage.place(copy.poses())
         several = len(self._drawn) > 1
@@ -145,7 +137,6 @@ class SimulatedView(RobotView):
     # ---- the panel
 
     def _add_pushing(self) -> None:
-        """Add controls of force, obstacle, reflex and restart, and felt forces."""
         source, gui = self._source, self._server.gui
         with gui.add_folder("Robot"):
             skin = gui.add_dropdown("skin", (*SKINS, ALL), initial_value=source.skin)

@@ -30,14 +30,15 @@ class BoardRecording(Protocol):
 
     @property
     def duration_s(self) -> float:
-        """Duration of the recording."""
+        """Duration in s."""
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """Seconds from its beginning and frame, in order, from ``start_s`` up to ``end_s``."""
+        """Seconds from the beginning and frame, in order, from ``start_s`` up to ``end_s``."""
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """Seconds from its beginning, and delay in s of bytes that ended a frame beyond the earliest. Empty without
-        arrival times in the file."""
+        """Seconds from the beginning and delay in s of bytes that ended a frame beyond the earliest; empty without
+        arrival times.
+        """
 
 
 Reading = Callable[[int, int], object]
@@ -97,8 +98,6 @@ class Clock:
 
 @dataclasses.dataclass(frozen=True)
 class _Piece:
-    """Result of one read of the file."""
-
     frames: int
     last_s: float
 
@@ -128,7 +127,6 @@ class ByteRecording:
 
     @property
     def count(self) -> int:
-        """Total number of frames."""
         return sum(piece.frames for piece in self._pieces)
 
     def lateness(self) -> Iterator[tuple[float, float]]:
@@ -171,11 +169,9 @@ class LinkRecording:
         return self.recording.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """:meth:`BoardRecording.frames` of the link."""
         return ((seconds, zones) for seconds, _, zones in self.recording.frames(start_s, end_s, self._link))
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """:meth:`BoardRecording.lateness` of the link."""
         conversation = Conversation(self.title, live=False)
         found = []
         for seconds, data in self.recording.raw_bytes(self._link):

@@ -32,7 +32,7 @@ BONE = rgb(picture_style.GRAY)
 MESHES = (*mesh_file.SUFFIXES, mesh_file.COLLADA)
 MAX_MESHES = 1000
 MAX_MESH_BYTES = 100_000_000
-"""Most bytes of all meshes of a robot; the triangle limit is that of a single mesh."""
+"""Most bytes of all meshes of a robot."""
 REST = "what is beyond the limit of all meshes"
 
 
@@ -77,20 +77,19 @@ def _path(name: str, folder: Path) -> Path | None:
 
 
 class RobotStage:
-    """Links as readable meshes, else as lines between joints; and a stage for each sheet."""
+    """Links as readable meshes, otherwise as lines between joints; and a stage for each sheet."""
 
     def __init__(self, server: viser.ViserServer, body: Body, solids: Sequence[Solid] = (), node: str = ROOT):
         """``solids``: drawn in place of the URDF's links."""
         self._server, self._body, self._node = server, body, node
         self._root = server.scene.add_frame(node, show_axes=False)
         self.at_m = np.zeros(3)
-        """Drawn position of the robot's base."""
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
         """Kinds of unreadable mesh files."""
         self._meshes = self._mesh_bytes = self._triangles = 0
         self._corners: list[tuple[str, np.ndarray]] = []
-        """Links with the corners of a box around a mesh, (8, 3) in m in the link's frame."""
+        """Corners of a box around each link's mesh, (8, 3) in m in the link's frame."""
         self._poses: Mapping[str, Pose] = {}
         self._hidden: set[str] = set()
         scene = server.scene
@@ -167,7 +166,6 @@ class RobotStage:
         self._bones.points = bones.astype(np.float32)
 
     def place(self, poses: Mapping[str, Pose]) -> None:
-        """Draw the links at these poses."""
         self._poses = poses
         orientations = quaternions(np.array([pose.rotation for pose in poses.values()]))
         for name, plan in self._body.links.items():

@@ -14,11 +14,8 @@ if TYPE_CHECKING:
     import viser
 
 BEYOND = 1.1
-"""Distance from the outermost cells to the numbers, in pitches."""
 MARKS = 4
-"""Approximate count of numbers along an edge."""
 AXIS = 2.5
-"""Length of an axis, in pitches."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +37,7 @@ class Ruler:
 
 
 def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
-    """Ruler of a sheet. For a sheet whose ends meet, row numbers are along the seam and opposite."""
+    """Ruler of a sheet. For a closed sheet, row numbers are along the seam and opposite."""
     sheet = tiles.sheet
     pitch_x, pitch_y = sheet.pitch_x_mm, sheet.pitch_y_mm
 
@@ -59,7 +56,7 @@ def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
 
 
 def add(server: viser.ViserServer, node: str, tiles: Tiles, lift_mm: float) -> None:
-    """Draw it; a limb hides what is behind."""
+    """Draw it; a limb hides the far side."""
     drawn, scene = ruler(tiles, lift_mm), server.scene
     scene.add_line_segments(f"{node}/axes", drawn.axes, picture.AXIS, thickness=2.5, thickness_units="screen")
     for number, mark in enumerate(drawn.marks):
@@ -68,12 +65,11 @@ def add(server: viser.ViserServer, node: str, tiles: Tiles, lift_mm: float) -> N
 
 
 def numbers(count: int) -> range:
-    """Return the numbers of about MARKS of ``count`` lines, evenly spaced from the first."""
+    """About MARKS of ``count`` line numbers, evenly spaced from the first."""
     return range(0, count, max(1, round(count / MARKS)))
 
 
 def named(kind: str, number: int, pitch_mm: float) -> str:
-    """Number and place of a line."""
     return f"{kind} 0" if number == 0 else f"{number}: {number * pitch_mm:.0f} mm"
 
 

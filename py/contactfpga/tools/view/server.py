@@ -1,7 +1,4 @@
-"""viser's server behind a guard.
-
-Only a browser with the token may read and press, on a page of this server.
-"""
+"""viser's server with a guard: only a browser with the token may read and press, on a page of this server."""
 
 from __future__ import annotations
 
@@ -37,21 +34,21 @@ class Response:
 
 
 class Guard:
-    """Decides whether each request is served.
+    """Decides whether each request is served, by Host, Origin and token.
 
-    Another site's page can make this browser send requests, even to 127.0.0.1, but cannot choose their Host and Origin,
-    and does not know the token: so all three are checked. The token is in the first address, then in a cookie, which
-    browsers do not send for other sites.
+    Another site's page can make this browser send requests, even to 127.0.0.1, but can choose neither Host nor Origin,
+    and does not know the token. The token is in the first address, then in a cookie, which browsers do not send for
+    other sites.
     """
 
     def __init__(self, host: str, token: str | None = None):
         self.host = host
-        """The listening address."""
         self.token = token or secrets.token_urlsafe(TOKEN_BYTES)
 
     def check(self, path: str, headers: Mapping[str, str], port: int, upgrade: bool) -> Response | None:
         """A refusing answer; None: the request may pass. ``headers``: by name, in any case; ``upgrade``: it requests a
-        WebSocket, which carries all reading and pressing."""
+        WebSocket, which carries all reading and pressing.
+        """
         host = _one(headers, "Host")
         if not self._is_ours(host, port):
             return Response(403, f"Host {host!r} is not this server's name; use the address that it printed.\n")
@@ -106,7 +103,8 @@ class Guard:
 
     def _welcome(self, port: int) -> Response:
         """Lead the browser to the page without the token, by the page itself: a redirect from another site would
-        withhold the cookie."""
+        withhold the cookie.
+        """
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         dark = "matchMedia('(prefers-color-scheme: dark)').matches"
         page = (
@@ -122,7 +120,6 @@ _NO_TOKEN = Response(403, "The token is missing or is another one; open the whol
 
 
 def _one(headers: Mapping[str, str], name: str) -> str:
-    """A header's value; "" if absent."""
     return next((value for key, value in headers.items() if key.lower() == name.lower()), "")
 
 
@@ -145,7 +142,6 @@ def _is_address(name: str) -> bool:
 LOCAL = "127.0.0.1"
 PORT = 8080
 PORTS_TRIED = 20
-"""Number of ports tried from :data:`PORT` on by default."""
 
 
 def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None) -> tuple[viser.ViserServer, Guard]:
@@ -189,7 +185,7 @@ def _free_port(host: str, port: int | None) -> int:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[Callable[[], bool]]:
-    """While viser starts, make its listener ask the guard first."""
+    """Make viser's listener ask the guard first."""
     import websockets.asyncio.server as listening
 
     serve = listening.serve
@@ -242,6 +238,6 @@ def _forget_tunnel(server: viser.ViserServer) -> None:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End the server, which prints its own farewell."""
+    """End the server without viser's farewell."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()

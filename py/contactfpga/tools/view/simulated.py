@@ -25,15 +25,14 @@ from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.sources import SimulatedPace
 
 REFLEX_S = 1e-3
-"""Interval of calling a reflex."""
 NO_REFLEX = "none"
 BARE, LATE, KIT = SKINS = ("without skin", "6 ms late", "with the kit")
 ALL = "side by side"
 LATE_S = 6e-3
-"""Delay from the sheet's scan to the reflex: the paper's time for screening the sensors and computing (section IV
-A)."""
+"""Delay from the sheet's scan to the reflex: the paper's time for screening the sensors and computing (section
+IV A).
+"""
 SWEEP_S, SWEEP_STEPS = 0.1, 100
-"""Duration and steps of a force sweep."""
 
 Reflex = Callable[[Snapshot, float], float]
 """From the felt contacts and the joint's angle to a joint speed."""
@@ -67,7 +66,6 @@ class RobotCopy:
             self.most_n[name] = max(self.most_n[name], self.force_n(name))
 
     def _seen(self) -> Snapshot | None:
-        """The reflex's current knowledge; None: nothing yet."""
         now: Snapshot = self.sheets.snapshot()
         if self.skin != LATE:
             return now
@@ -80,7 +78,6 @@ class RobotCopy:
         return seen if due_s <= now.host_time_s else None
 
     def _angle(self) -> float:
-        """Angle of the first actuator's joint."""
         model = self.sheets.model
         return float(self.sheets.data.qpos[model.jnt_qposadr[model.actuator_trnid[0, 0]]])
 
@@ -107,8 +104,7 @@ class RobotCopy:
 
 
 class Sweep:
-    """The largest forces of each copy since a touch, restarted by the first touch after :data:`SWEEP_S`, like an
-    oscilloscope."""
+    """The largest forces of each copy since a touch, restarted by the first touch after :data:`SWEEP_S`."""
 
     def __init__(self, copies: int):
         self.forces_n = np.full((copies, SWEEP_STEPS), np.nan)
@@ -117,7 +113,6 @@ class Sweep:
         self._before = np.zeros(copies)
 
     def add(self, seconds: float, forces_n: Sequence[float]) -> None:
-        """Add the forces of all copies at a time."""
         forces = np.array(forces_n)
         ended = self._began_s is None or seconds - self._began_s >= SWEEP_S - 1e-9
         if ended and ((forces > 0) & (self._before == 0)).any():
@@ -139,7 +134,6 @@ class SharedLink:
         self.fingers: tuple[Finger, ...] = ()
 
     def touch(self, fingers: Sequence[Finger]) -> None:
-        """Push it in every copy from the next step on."""
         self.fingers = tuple(fingers)
 
 
@@ -161,17 +155,14 @@ class SimulatedSource:
         self.reflex = next(iter(self.reflexes), NO_REFLEX)
         """Name of the acting reflex; :data:`NO_REFLEX`: the model's first command stays."""
         self.skin = KIT
-        """One of :data:`SKINS`, or :data:`ALL`."""
         self.body = Body.load(robot)
         self._model = _compiled(self._parts, model, robot, self.body)
         if self.reflexes and not self._model.nu:
             raise ContactFPGAError(f"{model} has no actuator; --reflex needs one, a <velocity> servo of a joint")
         self.copies: list[RobotCopy] = []
-        """Copies by :attr:`skin`, renewed at each start."""
         self.links = {name: SharedLink() for name in self.body.links}
         self.obstacle = obstacle.Obstacle()
         self.simulated_s = 0.0
-        """Total simulated time over all starts."""
         self.pace = SimulatedPace(self.simulated_s)
         self._restart()
 
@@ -214,7 +205,6 @@ class SimulatedSource:
             pace.ran(self.simulated_s - began_s, time.monotonic() - began)
 
     def _step(self) -> None:
-        """Step all copies, with the same fingers and obstacle."""
         step_s = float(self._model.opt.timestep)
         fingers = {name: link.fingers for name, link in self.links.items()}
         self.obstacle.go_on(step_s)
@@ -234,7 +224,6 @@ class SimulatedSource:
         return solids.solids_of(self._model, self.body.links)
 
     def close(self) -> None:
-        """Free the boards."""
         for copy in self.copies:
             copy.sheets.close()
 

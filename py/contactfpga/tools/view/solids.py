@@ -17,7 +17,6 @@ from contactfpga.tools.view.limb import revolved
 UNDER = 0.96
 """Scale of the geom under a sheet, so that the cells are visible."""
 PLANE_M = 1.0
-"""Half a side of an infinite plane."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,18 +35,17 @@ class Solid:
 
 def solids_of(model: Any, worn: Collection[str]) -> list[Solid]:
     """All drawable geoms; ``worn``: names of those that wear a sheet. Raises :class:`~contactfpga.ContactFPGAError` for
-    a mesh with too many triangles."""
+    a mesh with too many triangles.
+    """
     found = [_solid(model, number, worn) for number in range(model.ngeom)]
     return [solid for solid in found if solid is not None]
 
 
 def named(model: Any, number: int) -> str:
-    """A body's name."""
     return str(model.body(number).name) or f"body{number}"
 
 
 def _solid(model: Any, number: int, worn: Collection[str]) -> Solid | None:
-    """A geom; None for kinds not drawn: height fields, distance fields."""
     import mujoco
 
     geom = model.geom(number)
@@ -73,7 +71,6 @@ def _mesh(model: Any, number: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _form(kind: int, size: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices in m and faces of MuJoCo's primitives."""
     from mujoco import mjtGeom
 
     turn = np.linspace(-np.pi / 2, np.pi / 2, 17)

@@ -26,12 +26,10 @@ MAX_LAG_S = 0.1
 """Largest lag of a board that is caught up; beyond it, time slips."""
 
 MOMENT_S = 0.04
-"""Computing time of one moment."""
 LEAST_S = 0.0005
 SMOOTHING = 0.2
 
 WINDOW_S = 2.0
-"""Window of the reported share of real time."""
 
 
 class SimulatedPace:
@@ -65,8 +63,7 @@ class SimulatedPace:
 
     @property
     def most_s(self) -> float:
-        """Seconds of time that this machine simulates within :data:`MOMENT_S`, so that slow machines show shorter
-        moments."""
+        """Seconds that this machine simulates within :data:`MOMENT_S`: slow machines show shorter moments."""
         return max(MOMENT_S * self._speed, LEAST_S)
 
     @property
@@ -77,16 +74,13 @@ class SimulatedPace:
 
 
 STEP_S = 0.02
-"""Duration of a shown moment."""
 
 SILENT_S = 0.5
 """Silence that is reported; a working board sends a frame at least every 0.1 s."""
 
 KEEPS_UP = 0.97
-"""Share of real time that counts as keeping up."""
 
 WAITING = 65_536
-"""Most frames that wait for a moment's end."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,17 +88,17 @@ class Moment:
     """Content of a drawing."""
 
     zones: Zones
-    """The newest frame."""
     tracks: Tracks
     truth: np.ndarray | None = None
     """(rows, columns) bool: closed switches of a virtual board."""
     felt: tuple[Contacts, Zones] | None = None
     """The newest known forces with their frame, some milliseconds older than :attr:`zones`, as later readings must
-    arrive first."""
+    arrive first.
+    """
     pushes: Sequence[tuple[Zone, float | None]] = ()
     """Zones of the measured frame with a place, each with the push in N if known."""
     arrows: np.ndarray | None = None
-    """(n, 2, 3) in m, in the sheet's frame: pushes on a robot's link, whose units use the link's frame."""
+    """(n, 2, 3) in m, in the sheet's frame: pushes on a robot's link."""
 
 
 class Source(Protocol):
@@ -129,8 +123,9 @@ class Source(Protocol):
 
 
 class BoardSource:
-    """A board, or a virtual one whose simulated time passes like real time: with ``virtual`` one that can be touched
-    and knows its closed switches; else with ``simulated``."""
+    """A board, or a virtual one whose simulated time passes like real time: ``virtual`` can be touched and knows its
+    closed switches, ``simulated`` cannot.
+    """
 
     def __init__(
         self,
@@ -142,7 +137,6 @@ class BoardSource:
     ):
         self.title, self.sheet = title, board.sheet
         self.cells = cells
-        """Places of the pressure units, if known."""
         self._felt_in: Zones | None = None
         self.meter = Meter()
         self._board, self._virtual = board, virtual
@@ -160,7 +154,6 @@ class BoardSource:
         return Moment(zones, self._tracker.update(zones), truth, felt, () if felt is None else pushes(*felt))
 
     def _felt(self, newest: Zones) -> tuple[Contacts, Zones] | None:
-        """The forces of the previously newest frame."""
         before, self._felt_in = self._felt_in, newest
         if self.cells is None or before is None or before.units is None:
             return None
@@ -168,7 +161,6 @@ class BoardSource:
         return None if found is None else (found, before)
 
     def _wait(self) -> bool:
-        """Whether frames came."""
         seconds = STEP_S
         if self._pace is not None:
             due = self._pace.due(self._board.clock())
@@ -216,7 +208,7 @@ def pushes(contacts: Contacts, zones: Zones) -> list[tuple[Zone, float | None]]:
 
 
 AT_REST = 15.0
-"""Frame rate of an unchanged board that sends changes and keep-alives, at least one each 0.1 s."""
+"""Frame rate of an untouched board with ``send = "on_change"``."""
 
 
 def paced(frames_per_s: float) -> str:
@@ -243,12 +235,11 @@ class Strip:
 
 
 class Meter:
-    """Frame counters over the last second, and the lines of the strip chart, in device time."""
+    """Frame counters over the last second, and the data of the strip chart, in device time."""
 
     def __init__(self) -> None:
         self.stats = Stats()
         self.dropped = 0
-        """Frames that arrived faster than they could be shown."""
         self._times_us: collections.deque[tuple[int, int]] = collections.deque()
         self._late_s: collections.deque[float] = collections.deque(maxlen=50)
         self._steps: collections.deque[tuple[int, int, float]] = collections.deque(maxlen=int(CHART_S / CHART_STEP_S))
@@ -280,7 +271,7 @@ class Meter:
             self._steps.append((int(step), int(count), float(area)))
 
     def take_latency(self, batch: Batch, virtual: bool) -> None:
-        """Add their latencies; ``virtual``: the board's clock is that of arrivals, without estimation."""
+        """Add their latencies; ``virtual``: device times and arrivals share one clock."""
         frames = batch.frames
         sampled_s = frames["time_us"] / 1e6 if virtual else frames["host_time_s"]
         late_s = frames["arrived_s"] - sampled_s
@@ -302,7 +293,6 @@ class Meter:
 
     @property
     def strip(self) -> Strip:
-        """Data of the chart."""
         steps = np.array([step for step, _, _ in self._steps], float)
         seconds = (steps - steps[-1]) * CHART_STEP_S if len(steps) else steps
         kept = seconds > -CHART_S

@@ -18,11 +18,8 @@ if TYPE_CHECKING:
 
 NODE = "/sheet"
 FILLED = 0.86
-"""Width of a tile over the pitch."""
 THICK = 0.08
-"""Height of a tile over the pitch."""
 LABELS = 24
-"""Contacts with a number beside them."""
 
 BOX = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-1.0, 0.0)])
 FACES = np.array(
@@ -70,7 +67,6 @@ class Stage:
         self._points: Any = None
         self._labels: list[Any] = []
         self.told = contacts.MOST
-        """Contacts with a full description."""
         self._glow = glow.Glow(server, f"{node}/glow", tiles, under_mm) if carried else None
         self._trails = picture.Trails(tiles.surface, self._lift_mm + 0.03 * self._pitch_mm)
         self._colors: np.ndarray | None = None
@@ -78,7 +74,6 @@ class Stage:
             self._carry(under_mm)
 
     def _carry(self, under_mm: float) -> None:
-        """Draw the carrier, rows, columns and origin."""
         if self.limb is None:
             add_plate(self._server, self.tiles, self._node)
         ruler.add(self._server, self._node, self.tiles, under_mm + 0.2 * self._pitch_mm)
@@ -141,7 +136,6 @@ class Stage:
         handle.visible = True
 
     def _forces(self, moment: Moment) -> np.ndarray:
-        """(n, 2, 3) arrows."""
         if moment.felt is not None and self._load_cells is not None:
             return picture.pushes(*moment.felt, self._load_cells, self.tiles.surface)
         return np.zeros((0, 2, 3)) if moment.arrows is None else moment.arrows
@@ -190,7 +184,6 @@ class Stage:
             label.visible = False
 
     def _met(self, origin_m: Any, direction: np.ndarray) -> tuple[float, float] | None:
-        """Place where a world ray meets the sheet."""
         return self.tiles.met((np.array(origin_m) - self.point_m) @ self.rotation / MM, direction @ self.rotation)
 
     def press_with(self, hand: Hand) -> None:
@@ -216,7 +209,6 @@ class Stage:
 
 
 EVERYWHERE, KEY, RIM = 0.9, 2.0, 0.8
-"""Strengths of the lights."""
 
 
 def light(server: viser.ViserServer, side: tuple[float, float, float]) -> None:

@@ -10,7 +10,6 @@ from contactfpga import surfaces
 from contactfpga.skin.sheet import Sheet
 
 MM = 1e-3
-"""Meters per mm, as the scene is in m."""
 
 
 class Tiles:
@@ -52,7 +51,7 @@ class Tiles:
 
     @property
     def size_mm(self) -> float:
-        """The diagonal of the box around the sheet."""
+        """Diagonal of the box around the sheet."""
         reach = self.points_mm.max(0) - self.points_mm.min(0)
         return float(np.linalg.norm(reach)) + max(self.sheet.pitch_x_mm, self.sheet.pitch_y_mm)
 

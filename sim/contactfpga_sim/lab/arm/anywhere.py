@@ -1,4 +1,4 @@
-"""Touches anywhere on the arm: the newtons that each part of the sheet costs."""
+"""Peak forces of touches anywhere, by the parts of the sheet."""
 
 from __future__ import annotations
 
@@ -17,22 +17,20 @@ from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
 from contactfpga_sim.lab.flips.campaign import wilson
 
 TOUCHES = 120
-"""Touches of each geometry."""
 
 SAME = 0.03
-"""A worst value is printed only if both halves of the touches agree within this share."""
+"""Largest relative difference of the two halves of the touches at which a worst value is printed."""
 
 QUANTILE = 0.95
 
 
 class Geometry(NamedTuple):
-    """The parts that a sheet is built of."""
+    """Parts of a sheet."""
 
     face: str
     """One of :data:`FACES`."""
     pitch_mm: float
     threshold_n: float
-    """Closing force of a switch, in N."""
     foam_mm: float
 
     def case(self) -> Case:
@@ -66,7 +64,7 @@ FACES: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "caps": _CAP,
     "tiles": _CAP,
 }
-"""Changes to the paper's case by the parts that take the foam's force, for a pitch in mm and a closing force in N."""
+"""Changes to the paper's case by face, for pitch in mm and closing force in N."""
 
 PAPER = Geometry("flush, point force", 10.0, 1.0, 5.0)
 BEST = Geometry("tiles", 6.4, 0.4, 5.0)
@@ -86,7 +84,7 @@ _CHANGES = (
 
 
 def _around(base: Geometry) -> list[Geometry]:
-    """The geometry and all that differ from it in one thing."""
+    """The geometry and its neighbors, each with one part changed."""
     return list(dict.fromkeys([base, *(base._replace(**change) for change in _CHANGES)]))
 
 
@@ -96,7 +94,7 @@ WAYS = ("6 ms", "UART", "pin", "limit alone")
 
 
 def ways(case: Case, skin: Skin, latency_s: float = 6e-3) -> tuple[Latencies, ...]:
-    """Latencies of :data:`WAYS`: a fixed one, two measured through the gateware, none."""
+    """Latencies of :data:`WAYS`: one fixed, two from the gateware, none."""
     return ((latency_s,), *(places.measured_s(case, skin, way) for way in ("uart", "pin")), ())
 
 
@@ -116,7 +114,7 @@ def many(
     executor: Executor,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> dict[Any, Found]:
-    """Peaks of the batches of several cases, by their keys."""
+    """Peaks of several cases, by their keys."""
     futures = {executor.submit(places.work, batch): batch for batches in tasks.values() for batch in batches}
     done = {}
     for future in as_completed(futures):
@@ -130,7 +128,7 @@ def many(
 
 
 def study() -> dict[Geometry, list[Batch]]:
-    """The batches of every geometry. Times are the reference Skin's; the pitch does not change them."""
+    """Batches by geometry, all with the reference Skin's times: the pitch does not change them."""
     known = ways(Case.load("paper"), Skin())
     return {
         geometry: places.batches(
@@ -146,8 +144,7 @@ def mean_n(halves: Sequence[Peaks]) -> float:
 
 
 def worst_text(halves: Sequence[Peaks]) -> str:
-    """The largest peak force in N if both halves of the touches agree on it; else the 95 % quantile with its 95 %
-    interval."""
+    """Largest peak force in N if both halves agree, else the 95 % quantile with its interval."""
     most = [float(half.force_n.max()) for half in halves]
     if max(most) <= (1 + SAME) * min(most):
         return f"{max(most):.1f}"
@@ -174,7 +171,7 @@ HEADINGS = ("way", "touches", "mean peak force, N", "worst, N", "torque limit fi
 
 
 def lines(case: Case, found: Found, first: str) -> list[list[str]]:
-    """Headings and a line per way of one case; ``first`` names the fixed latency."""
+    """Headings and a line per way; ``first`` names the fixed latency."""
     told = [list(HEADINGS)]
     for name, halves in zip((first, *WAYS[1:]), found):
         count = sum(len(half.force_n) for half in halves)
@@ -184,7 +181,7 @@ def lines(case: Case, found: Found, first: str) -> list[list[str]]:
 
 
 def as_json(found: Found, first: str) -> dict[str, Any]:
-    """The peaks in SI units, touch by touch."""
+    """Peaks of each touch in SI units."""
     return {
         name: {
             "peak_force_n": np.concatenate([half.force_n for half in halves]).tolist(),
@@ -196,7 +193,6 @@ def as_json(found: Found, first: str) -> dict[str, Any]:
 
 
 def _deep(thickness_m: float, halves: Sequence[Peaks]) -> str:
-    """The foam's largest indentation, and how often it reaches the base."""
     deep = np.concatenate([half.indentation_m for half in halves])
     flat = deep > thickness_m
     return f"{1e3 * deep.max():.1f}" + (f", flat {share_text(flat)}" if flat.any() else "")
@@ -233,8 +229,7 @@ class Effect(NamedTuple):
 
 
 def effects(found: Mapping[Geometry, Found], base: Geometry) -> list[Effect]:
-    """Effects, by UART, of every geometry that differs from ``base`` in one thing; and of the least latency in place of
-    the paper's 6 ms."""
+    """Effects by UART of each geometry one change away from ``base``, and of the least latency."""
     uart = WAYS.index("UART")
     told = []
     for geometry in found:
@@ -253,7 +248,7 @@ def _shown(value: str | float) -> str:
 
 
 def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
-    """Headings and a line per change, around the paper's sheet and around the best."""
+    """Headings and a line per change to the paper's sheet and to the best."""
     told = [["from", "what changes", "in place of", "now", "mean peak force, N"]]
     for name, base in (("the paper's sheet", PAPER), ("tiles", BEST)):
         for one in sorted(effects(found, base), key=lambda effect: effect.newtons):
@@ -262,7 +257,7 @@ def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
 
 
 def matters(found: Mapping[Geometry, Found]) -> str:
-    """A sentence on the change that saves the paper's sheet the most newtons, and on the best sheet."""
+    """A sentence on the best change to the paper's sheet, and on the best sheet."""
     least: dict[str, Effect] = {}
     for one in effects(found, PAPER):
         if one.factor not in least or one.newtons < least[one.factor].newtons:

@@ -1,4 +1,4 @@
-"""All parameters of a run of the arm, read from one TOML file."""
+"""Parameters of a run, read from a TOML file."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ from contactfpga_sim.lab.arm.parts import BEHAVIORS, ArmLink, Contacts, Control,
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz", "bonded", "frictionless")
 MAX_STEPS = 1_000_000
-"""Largest number of steps in a run."""
 STEPS_A_TIME_CONSTANT = 4
-"""Steps required in the current's time constant, the plant's shortest."""
+"""Least steps in the time constant of the current, the plant's shortest."""
 
 
 class CaseError(ContactFPGAError, ValueError):
-    """An impossible case; the message names the field, its value and the limit."""
+    """An impossible case; the message names field, value and limit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,10 +38,10 @@ class Case:
     usb: Usb = dataclasses.field(default_factory=Usb)
     run: Run = dataclasses.field(default_factory=Run)
     model: str = "point"
-    """Force spread below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`). All but ``point``
-    press as wide as Hertz's patch of the foam's R*."""
+    """Spread of force below the cover, one of :data:`MODELS`. All but ``point`` press as wide as Hertz's patch of
+    the foam's R*."""
     cap: Cap | None = None
-    """Cap on each switch; None: the foam presses the switches' own flush faces."""
+    """Cap on each switch; None: the foam presses the switches' flush faces."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)
@@ -69,7 +68,6 @@ class Case:
 
     @functools.cached_property
     def cover(self) -> Cover:
-        """The cover that presses on the switches."""
         foam = self.foam
         known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa, "poisson": foam.poisson}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
@@ -97,8 +95,7 @@ class Case:
 
     @classmethod
     def load(cls, name: str | Path) -> Case:
-        """Load a packaged case by name (:func:`names`), or a TOML file, whose ``like`` names the case it differs
-        from."""
+        """Load a packaged case by name, or a TOML file; its ``like`` names the case it differs from."""
         return _case(str(name), _values(str(name)))
 
 

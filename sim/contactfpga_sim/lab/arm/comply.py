@@ -1,4 +1,4 @@
-"""Active compliance: how the arm yields to a push and returns, and how fast it may be pushed."""
+"""Active compliance: how far the arm yields to a push, and how fast it may be pushed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.run import RunRecord, run
 
 BACK_M = 1e-3
-"""Distance from its start within which the arm counts as back."""
 
 FASTEST_M_S = 5.0
 """Upper end of the search for the fastest push."""
 
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
-"""Pushes shown, as shares of the fastest one that the arm yields to."""
+"""Pushes as shares of the fastest one that the arm yields to."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,15 +24,12 @@ class Push:
 
     speed_m_s: float
     peak_torque_nm: float
-    """Largest true torque between motor and arm."""
     peak_force_n: float
     peak_indentation_m: float
     yields_m: float
-    """Largest yield of the arm, at the lever."""
     back_s: float | None
     """Time from the first touch until the arm is back for good; None: not in this run."""
     stopped: bool
-    """The torque limit ended the compliance."""
 
 
 def pushed(case: Case, speed_m_s: float) -> tuple[Push, RunRecord]:
@@ -60,7 +56,7 @@ def pushed(case: Case, speed_m_s: float) -> tuple[Push, RunRecord]:
 
 
 def fastest_m_s(case: Case, resolution: float = 0.005) -> float:
-    """The fastest push, to ``resolution`` in m/s and rounded down, at which the torque stays below the limit."""
+    """The fastest push, rounded down to ``resolution`` in m/s, with torque below the limit."""
 
     def holds(steps: int) -> bool:
         speed = steps * resolution
@@ -75,6 +71,6 @@ def fastest_m_s(case: Case, resolution: float = 0.005) -> float:
 
 
 def pushes(case: Case) -> tuple[float, list[Push]]:
-    """The fastest push in m/s that the arm yields to, and results up to it and for one faster push."""
+    """The fastest push in m/s, and results up to it and beyond."""
     fastest = fastest_m_s(case)
     return fastest, [pushed(case, share * fastest)[0] for share in SHARES]

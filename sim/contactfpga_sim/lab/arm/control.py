@@ -1,4 +1,4 @@
-"""The motor's controller: a PI speed loop and its reaction to contact."""
+"""The motor's controller: a PI speed loop that reacts to contact."""
 
 from __future__ import annotations
 
@@ -9,25 +9,22 @@ from contactfpga_sim.lab.arm.case import Case
 
 
 class SensorReadings(NamedTuple):
-    """The controller's inputs at one sample."""
+    """The controller's inputs at a sample."""
 
     angle_rad: float
     speed_rad_s: float
     torque_nm: float
-    """Torque as the sensor reads it."""
     contact: bool
-    """Contact as the controller receives it."""
     alive: bool
-    """Whether the host was heard recently."""
 
 
 class Controller:
-    """PI speed controller with one of two behaviors.
+    """PI speed controller.
 
-    ``reverse``, the paper's: on contact, or torque at the limit, the arm goes back until the contact is resolved, then
-    slows to rest. ``comply``: the arm follows the torque like an inertia with damper and spring, but still goes back at
-    the torque limit. If the host falls silent, the arm stops; in a contact it first retreats the full distance. A
-    contact that persists then may be stale: it causes no second retreat until it was away once; the torque limit does.
+    Behavior ``reverse``, the paper's: on contact, or torque at the limit, the arm goes back until the contact is
+    resolved, then slows to rest. ``comply``: the arm follows the torque like an inertia with damper and spring, but
+    goes back at the torque limit. A silent host stops the arm; in a contact it first retreats the full distance. If the
+    contact persists it may be stale: only the torque limit causes another retreat until it was away once.
     """
 
     def __init__(self, case: Case):
@@ -47,7 +44,7 @@ class Controller:
         self._old: collections.deque[SensorReadings] = collections.deque()
 
     def sample(self, seconds: float, now: SensorReadings) -> float:
-        """The current in A to request until the next sample."""
+        """Requested current in A until the next sample."""
         sensed = self._late(now)
         over = abs(sensed.torque_nm) >= self._control.torque_limit_nm
         if now.contact:

@@ -1,4 +1,4 @@
-"""Parts of a case of the arm: link, motor, controller, foam, switches, touched things, and the host's link."""
+"""Parts of a case of the arm."""
 
 from __future__ import annotations
 
@@ -32,14 +32,13 @@ class _Checked:
 
 @dataclasses.dataclass(frozen=True)
 class ArmLink(_Checked):
-    """The arm, which turns about one joint; gravity plays no part."""
+    """The arm on one joint, without gravity."""
 
     inertia_kgm2: float
-    """J about the joint, in kg m2, without the motor."""
+    """J about the joint, without the motor."""
     lever_m: float
-    """Distance in m from the joint to where speeds are measured, and to touches without a lever of their own."""
+    """Distance from the joint to where speeds are measured, and to touches without their own lever."""
     speed_m_s: float
-    """Speed of approach, in m/s."""
     _zero = ("speed_m_s",)
 
 
@@ -56,13 +55,12 @@ class Motor(_Checked):
     inductance_h: float
     supply_v: float
     current_a: float
-    """Largest requested current, in A."""
     current_gain: float
     """Gain of the current loop, in V/A."""
 
     @property
     def torque_nm_a(self) -> float:
-        """Torque at the joint, in Nm/A."""
+        """Torque at the joint per ampere."""
         return self.gear * self.torque_constant
 
     @property
@@ -81,35 +79,33 @@ class Control(_Checked):
     """Speed controller, behavior, and trusted inputs."""
 
     period_s: float
-    """Sampling period, in s."""
     proportional: float
     """Current for an error of the joint's speed, in A s/rad."""
     integral: float
     """Integral gain in A/rad, held while the current is at its limit."""
     reverse_m_s: float
-    """Speed of the retreat from a contact, at the lever, in m/s."""
+    """Speed of the retreat, at the lever."""
     slowing_m_s2: float
-    """Deceleration after a contact is resolved, in m/s2."""
     torque_limit_nm: float
-    """Torque between motor and arm that causes a retreat whatever the sheet reports, in Nm."""
+    """Torque that causes a retreat whatever the sheet reports."""
     sensor_nm: float = 3.0
     """Range at which the torque sensor saturates."""
     clear_s: float = 1e-3
-    """Time without contact after which it counts as resolved, in s."""
+    """Time without contact that resolves it."""
     retreat_m: float = 0.01
-    """Longest retreat, and the retreat after the torque limit, which cannot detect the end of a contact."""
+    """Longest retreat; always used after the torque limit, which cannot detect a contact's end."""
     watchdog_s: float = 20e-3
-    """Host silence after which the arm stops, in s."""
+    """Host silence that stops the arm."""
     delay_s: float = 0.0
-    """Age of the measured speed and torque, in s, if the loop runs over a link."""
+    """Age of measurements if the loop runs over a link."""
     behavior: str = "reverse"
     """One of :data:`BEHAVIORS`."""
     virtual_kgm2: float = 0.02
-    """``comply``: inertia of the admittance, in kg m2."""
+    """``comply``: inertia of the admittance."""
     virtual_damping: float = 0.5
-    """``comply``: damping of the admittance, in Nm s/rad."""
+    """``comply``: damping in Nm s/rad."""
     virtual_stiffness: float = 4.0
-    """``comply``: stiffness of the return spring, in Nm/rad."""
+    """``comply``: return spring in Nm/rad."""
     _zero = ("delay_s", "clear_s", "virtual_stiffness")
 
 
@@ -120,14 +116,13 @@ class Foam(_Checked):
     modulus_pa: float
     poisson: float
     radius_m: float
-    """Effective radius R*, in m."""
     thickness_m: float
     damping: float = 0.0
     """Damping in s/m, after Hunt and Crossley; 0: lossless."""
     base_n_m: float = 1e6
-    """Stiffness of the base in N/m, added once the foam is pressed flat, to its thickness."""
+    """Base, added once the foam is pressed flat."""
     cut: bool = False
-    """Whether the foam is cut into tiles between the caps; the plant's spring stays that of whole foam."""
+    """Whether foam is cut into tiles; the plant's spring stays that of whole foam."""
     _zero = ("damping",)
 
     @functools.cached_property
@@ -136,7 +131,7 @@ class Foam(_Checked):
         return elastic.stiffness(Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson)))
 
     def force_n(self, indentation_m: float, rate_m_s: float = 0.0) -> float:
-        """Force in N at an indentation that grows by ``rate_m_s``; never negative."""
+        """Force at an indentation that grows by ``rate_m_s``; never negative."""
         if indentation_m <= 0:
             return 0.0
         force = self.stiffness * indentation_m * math.sqrt(indentation_m) * (1 + self.damping * rate_m_s)
@@ -145,7 +140,7 @@ class Foam(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Contacts(_Checked):
-    """The switches below the cover; defaults are those of :class:`contactfpga.design.cover.Switch`."""
+    """Switches below the cover, by default :class:`contactfpga.design.cover.Switch`'s."""
 
     force_n: float
     area_m2: float
@@ -154,43 +149,38 @@ class Contacts(_Checked):
     hysteresis: float = 0.2
     preload_n: float = 0.0
     bounce_s: float = 0.0
-    """Bounce time after closing and after opening."""
     bounce_period_s: float = 0.4e-3
-    """Period of one opening and closing while bouncing."""
     _zero = ("travel_m", "spread", "hysteresis", "preload_n", "bounce_s")
 
     @functools.cached_property
     def switch(self) -> Switch:
-        """The switch without its bounce."""
         return Switch(self.force_n, self.area_m2, self.travel_m, self.spread, self.hysteresis, self.preload_n)
 
 
 @dataclasses.dataclass(frozen=True)
 class Touch(_Checked):
-    """Something that the arm runs into, or that pushes it."""
+    """A thing that the arm runs into, or that pushes it."""
 
     x_mm: float = 80.0
-    """Position on the sheet laid flat, along the columns; column 0 is at 0."""
+    """Place along the columns of the flat sheet; column 0 is at 0."""
     y_mm: float = 80.0
     lever_m: float | None = None
     """Distance from the joint; None: the link's."""
     gap_m: float = 0.0
-    """Extra distance beyond the first thing that is touched."""
+    """Distance beyond the first touched thing."""
     mass_kg: float = 0.0
-    """Mass of the part that gives way; 0: it is rigid."""
+    """Mass of the yielding part; 0: rigid."""
     stiffness_n_m: float = 0.0
-    """Stiffness of that mass's support."""
     damping_ns_m: float = 0.0
     push_m_s: float = 0.0
-    """Speed toward the arm; 0: it stays where it is."""
+    """Speed toward the arm; 0: at rest."""
     push_m: float = 0.0
-    """Distance that it moves toward the arm."""
     hold_s: float = 0.0
-    """Time at the end of the push, before it goes back as fast."""
+    """Time at the push's end before an equally fast return."""
     _zero = ("x_mm", "y_mm", "gap_m", "mass_kg", "stiffness_n_m", "damping_ns_m", "push_m_s", "push_m", "hold_s")
 
     def pushed(self, seconds: float) -> tuple[float, float]:
-        """Distance and speed of its approach to the arm."""
+        """Distance and speed toward the arm."""
         if seconds <= 0 or not self.push_m_s:
             return 0.0, 0.0
         takes = self.push_m / self.push_m_s
@@ -204,16 +194,15 @@ class Touch(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Usb(_Checked):
-    """Path of bytes from the board's UART to the program: a USB serial chip, and the host."""
+    """Path of bytes from UART through a USB serial chip to the program."""
 
     packet_bytes: float = 510
-    """Bytes at which the chip sends before its timer runs out."""
+    """Bytes at which the chip sends before its timer ends."""
     timer_s: float = 1e-3
-    """Latency timer: the driver sets 1 ms; an operating system's default is 16 ms."""
+    """Latency timer: 1 ms by the driver; operating systems default to 16 ms."""
     frame_s: float = 125e-6
-    """Interval at which the host polls."""
     host_s: float = 0.1e-3
-    """Time through the host's program to the motor's controller."""
+    """Time through the host's program to the controller."""
     _zero = ("timer_s", "host_s")
 
 
@@ -222,8 +211,7 @@ class Run(_Checked):
     """Times of the simulation."""
 
     step_s: float = 10e-6
-    """Step of the integrator and of the exchange between gateware and plant, in s."""
+    """Step of integrator and gateware exchange."""
     lead_s: float = 20e-3
     """Time from power-up, the controller's first sample, to the touch; a whole number of steps."""
     duration_s: float = 0.25
-    """Longest time from the touch to the end."""

@@ -1,4 +1,4 @@
-"""Pictures of a run, after the paper's Figs. 6 and 7, and what latency costs: force and thickness against it."""
+"""Pictures of a run (the paper's Figs. 6 and 7), and charts of force and thickness over latency."""
 
 from __future__ import annotations
 
@@ -26,16 +26,15 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.VERMILLION, "linestyle": style.DASHES[0], "linewidth": 1.8},
     {"color": style.BLUE, "linestyle": style.DASHES[1], "linewidth": 1.8},
 )
-"""Line styles of the runs drawn: after the given latency, by the UART and by the pin."""
+"""Line styles of the runs."""
 
 DRAWN = {"speed": ("speed_rad_s", "angular speed, rad/s"), "torque": ("sensor_nm", "torque between motor and arm, Nm")}
 NAMES = {"speed": "arm-fig6-speed", "torque": "arm-fig7-torque"}
 FROM_S, TO_S = -5e-3, 40e-3
-"""Time range of the pictures."""
 
 
 def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
-    """Both pictures in each format into ``folder``."""
+    """Both pictures in each format."""
     folder.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(style.SETTINGS):
         figures = {name: course(found, *DRAWN[name]) for name in DRAWN}
@@ -74,7 +73,7 @@ LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3
 SPEEDS_M_S = tuple(0.02 * step for step in range(1, 31))
 THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
 INSTANTS = 8
-"""Touch instants that the gateware's own runs use, a controller period apart."""
+"""Touches of the gateware's runs, a controller period apart."""
 COLORS = {"6 ms": style.BLACK, "UART": style.VERMILLION, "pin": style.BLUE, "last byte": style.GREEN}
 BOUND_OF = "bound, "
 BOUND: dict[str, Any] = {"linewidth": 1.2, "linestyle": style.DASHES[2]}
@@ -83,7 +82,7 @@ TICKS_MS = (0.01, 0.1, 1, 10)
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """All tasks by their picture."""
+    """Tasks by picture."""
 
     force: tuple[SweepTask, ...]
     sheet: dict[str, tuple[SweepTask, ...]]
@@ -92,7 +91,6 @@ class Plan:
 
     @property
     def all(self) -> list[SweepTask]:
-        """All tasks."""
         groups = [self.force, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
         return [task for group in groups for task in group]
 
@@ -122,7 +120,7 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
 
 
 def check(case: Case) -> None:
-    """Raise :class:`CaseError` for a case that has no charts."""
+    """Raise :class:`CaseError` for a case without charts."""
     if case.control.behavior != "reverse" or not case.link.speed_m_s:
         raise CaseError(
             f"behavior is {case.control.behavior!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
@@ -151,7 +149,6 @@ def _axes(x: str, y: str) -> tuple[Figure, Any]:
 
 
 def _latencies(place: Any, case: Case) -> None:
-    """The latency axis, with each way's bound, and zero at the bottom."""
     for name, bound in sweep.bounds_s(case, Skin()).items():
         place.axvline(1e3 * bound, color=COLORS[name], label=f"{BOUND_OF}{name}", **BOUND)
     place.set_xscale("log")
@@ -202,7 +199,7 @@ def _thickness(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> F
 
 
 def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
-    """All numbers, a line per run, in SI units."""
+    """Write a line per run, in SI units."""
     names = [field.name for field in dataclasses.fields(SweepPoint)]
     with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)

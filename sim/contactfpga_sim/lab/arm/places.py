@@ -1,6 +1,6 @@
-"""Touches anywhere on the sheet: the arm over many places, controller phases and latencies.
+"""Touches anywhere on the sheet.
 
-Places fill pitch cells in the sheet's middle evenly; each has a moment between two controller samples and a latency
+Places fill pitch cells in the sheet's middle evenly; each has an instant between controller samples and a latency
 measured through the gateware.
 """
 
@@ -20,16 +20,16 @@ from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S
 
 ENDS_S = 20e-3
-"""A peak is over by this time plus the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`."""
+"""Time that, with the time for :data:`contactfpga_sim.lab.arm.sweep.ENDS_M`, ends a peak."""
 
 INSTANTS = 8
-"""Touches through the gateware that measure a way's latencies, a controller period apart."""
+"""Touches that measure latencies, a controller period apart."""
 
 SPAN = 3
-"""Pitches along each side of the touched square in the sheet's middle."""
+"""Pitches along each touched side."""
 
 SEEDS = (0, 1)
-"""Each seed has half of the touches, so that comparing the halves shows the uncertainty."""
+"""Seeds of half of the touches each; the halves' difference shows the uncertainty."""
 
 Latencies = tuple[float, ...]
 """Equally likely latencies in s; empty: the sheet reports nothing."""
@@ -51,15 +51,13 @@ class Peaks:
     """Arrays (touches,) of one way."""
 
     force_n: Floats
-    """Peak force of each touch."""
     indentation_m: Floats
-    """Peak indentation of each touch."""
     limited: np.ndarray
     """Whether the torque limit reacted first."""
 
 
 def check(case: Case) -> None:
-    """Raise :class:`CaseError` for a case that has no place to vary."""
+    """Raise :class:`CaseError` for a case without a place to vary."""
     if len(case.touch) != 1 or case.control.behavior != "reverse" or not case.link.speed_m_s:
         raise CaseError("touches anywhere need a case with one touch, behavior 'reverse' and a speed; take --places 0")
 
@@ -69,8 +67,7 @@ _GOLDEN = 1.32471795724
 
 
 def evenly(count: int, seed: int) -> Floats:
-    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others take even shares of their range in
-    random order."""
+    """(count, 6) numbers from 0 to 1: the first two fill a square evenly, the others are shuffled even shares."""
     rng = np.random.default_rng(seed)
     square = (rng.random(2) + np.outer(np.arange(count), [1 / _GOLDEN, 1 / _GOLDEN**2])) % 1
     orders = np.stack([rng.permutation(count) for _ in range(4)], axis=1)
@@ -78,14 +75,14 @@ def evenly(count: int, seed: int) -> Floats:
 
 
 def batches(case: Case, skin: Skin, ways: tuple[Latencies, ...], count: int) -> list[Batch]:
-    """``count`` touches, half of them by each seed."""
+    """Half of the touches by each seed."""
     check(case)
     return [Batch(case, skin, ways, math.ceil(count / len(SEEDS)), seed) for seed in SEEDS]
 
 
 def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
     """Peak force in N, peak indentation in m and whether the torque limit reacted first, of each touch for each way.
-    Cached by code."""
+    Cached."""
     what = dataclasses.asdict(dataclasses.replace(batch, skin=None))  # type: ignore[arg-type]
     key = f"{kept.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
     found: list[list[tuple[float, float, bool]]] = kept.kept("places", key, lambda: _touched(batch))
@@ -93,7 +90,7 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def peaks(found: list[list[list[tuple[float, float, bool]]]], way: int) -> list[Peaks]:
-    """The peaks of one way over several batches."""
+    """Peaks of one way."""
     arrays = [np.array(one[way], float) for one in found]
     return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0) for array in arrays]
 
@@ -123,7 +120,6 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
-    """A position in one of the middle cells of a side, by shares from 0 to 1."""
     span = min(SPAN, count - 1)
     if not span:
         return 0.5 * inside * pitch_mm
@@ -131,15 +127,13 @@ def _place_mm(inside: float, cell: float, count: int, pitch_mm: float) -> float:
 
 
 def _step_s(case: Case) -> float:
-    """The longest integrator step for the case."""
     period = case.control.period_s / STEP_S
     fits = abs(period - round(period)) < 1e-6 and case.motor.time_constant_s / STEPS_A_TIME_CONSTANT >= STEP_S
     return STEP_S if fits else case.run.step_s
 
 
 def measured_s(case: Case, skin: Skin, way: str) -> Latencies:
-    """Times in s from a switch to the controller's input, of :data:`INSTANTS` touches through the gateware by the way
-    ``uart`` or ``pin``."""
+    """Times in s from a switch to the controller's input over :data:`INSTANTS` touches, by ``uart`` or ``pin``."""
     key = f"{kept.made_by(__name__, skin)} {way} {dataclasses.asdict(case.usb)} {case.control.period_s}"
     found: list[float] = kept.kept("latencies", key, lambda: _measured(case, skin, way))
     return tuple(found)

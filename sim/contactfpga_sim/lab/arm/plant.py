@@ -27,17 +27,16 @@ class Forces(NamedTuple):
     """Forces in one state."""
 
     contact_n: tuple[float, ...]
-    """Force of each touch, in N."""
     indentation_m: tuple[float, ...]
     """Foam indentation at each touch, negative while apart."""
     acceleration: float
     """Angular acceleration of the joint, in rad/s2."""
     sensor_nm: float
-    """True torque between motor and arm, not limited to the sensor's range."""
+    """True torque between motor and arm, even beyond the sensor's range."""
 
 
 class Plant:
-    """The case's equations."""
+    """Equations of a case."""
 
     def __init__(self, case: Case):
         self._motor = case.motor

@@ -1,4 +1,4 @@
-"""The experiment's numbers beside the paper's: as a table, and as JSON in SI units."""
+"""The experiment's numbers beside the paper's."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ class ReportLine(NamedTuple):
     """Field of :class:`contactfpga_sim.lab.arm.run.ArmResponse`."""
     unit: str
     scale: float
-    """Factor from SI to the unit."""
     paper: float | None
     """The paper's value, in SI."""
     stated: float | None
-    """Expected value of the consistent set, in SI."""
+    """Expected of the consistent set, in SI."""
 
 
 ROWS = (
@@ -50,7 +49,7 @@ NOTES = (
 
 
 def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -> dict[str, RunRecord]:
-    """The runs compared side by side, by heading."""
+    """Runs side by side, by heading."""
     late = f"{1e3 * latency_s:g} ms"
     found = {
         late: run(case, "latency", latency_s=latency_s, skin=skin),
@@ -66,7 +65,7 @@ def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -
 
 
 def cell(row: ReportLine, outcome: ArmResponse) -> str:
-    """A number for people."""
+    """A value as a table cell."""
     value = getattr(outcome, row.field)
     return "-" if value is None else f"{row.scale * value:.{2 if row.scale * abs(value) < 100 else 1}f}"
 
@@ -78,7 +77,7 @@ def deviation(row: ReportLine, outcome: ArmResponse) -> float | None:
 
 
 def table(found: dict[str, RunRecord], paper: bool) -> list[list[str]]:
-    """Headings and lines; with ``paper``, the paper's numbers and the consistent set's come first."""
+    """Headings and lines; ``paper`` puts the paper's and consistent numbers first."""
     first = next(iter(found.values())).outcome
     lines = [["", *(["paper", "set"] if paper else []), *found]]
     if paper:
@@ -103,7 +102,7 @@ def _reasons(found: dict[str, RunRecord], paper: bool) -> list[str]:
 
 
 def as_json(found: dict[str, RunRecord], name: str) -> dict[str, Any]:
-    """All runs in SI units."""
+    """Runs in SI units."""
     first = next(iter(found.values())).outcome
     known: dict[str, Any] = {
         "case": name,
@@ -140,14 +139,14 @@ DEFENDED: dict[str, dict[str, Any]] = {
     "that, 0.1 m from the joint": {"touch": (HALFWAY | {"lever_m": 0.1},)},
     "the patch's pressure, not a point force": {"model": "hertz"},
 }
-"""Touches for the defense table, as changes to the case."""
+"""Touches of the defense table, as changes to the case."""
 
 DEFENSES = {"torque limit alone": "torque", "contact": "pin", "force threshold": "force", "both": "both"}
 DEFENSE_HEADINGS = ("touch", *(f"{name}: reacts, ms / peak, N" for name in DEFENSES))
 
 
 def defense_lines(case: Case) -> list[list[str]]:
-    """Headings, then reaction and peak force of touches by each line of defense."""
+    """Headings, then reaction and peak force of touches by line of defense."""
     lines = [list(DEFENSE_HEADINGS)]
     for name, changes in DEFENDED.items():
         cells = []

@@ -1,4 +1,4 @@
-"""One run from power-up to rest, and its result."""
+"""One run from power-up to rest."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, CourseStep, Faults,
 
 
 class PlantTransport:
-    """A :class:`contactfpga.driver.transport.Transport`: while the driver waits, arm and gateware advance."""
+    """A :class:`contactfpga.driver.transport.Transport` that advances arm and gateware while the driver waits."""
 
     live, threaded = True, False
     name = "arm://"
@@ -39,56 +39,49 @@ class PlantTransport:
 
 
 AFTER_S = 0.25e-3
-"""Time after the reaction at which the torque is read again."""
+"""Delay of the second torque reading after the reaction."""
 
 SLOW_M_S = 1e-3
-"""Speed below which a held arm counts as at rest."""
+"""Speed of an arm at rest."""
 
 WITH_UNITS = Skin(units=3, unit_sums=((1, 1, 1),), baud=6_000_000)
 """The reference Skin on three pressure units."""
 
 STAY_S = 20e-3
-"""Time at rest after which a run ends."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ArmResponse:
-    """Times in s from the touch; None: it did not happen. The reaction is the first controller sample that reverses or
-    stops the arm."""
+    """Times in s from the touch; None: it did not happen. The reaction is the first controller sample that reverses
+    or stops the arm."""
 
     closes_s: float | None
-    """The first switch closes."""
     detected_s: float | None
-    """The contact reaches the controller's input."""
+    """Arrival of the contact at the controller's input."""
     reacts_s: float | None
     reason: str
     """Reason of the reaction: ``contact``, ``torque``, ``silence``, or none."""
     positive_s: float | None
     """Time from the reaction until the arm goes back."""
     torque_before_nm: float | None
-    """True torque at the reaction."""
     torque_after_nm: float | None
     """True torque :data:`AFTER_S` after the reaction."""
     force_before_n: float | None
-    """Force at the reaction."""
     peak_force_n: float
     peak_torque_nm: float
-    """Largest magnitude of the torque."""
     peak_indentation_m: float
     bottomed: bool
-    """Whether the foam was pressed flat."""
     resolved_s: float | None
-    """Time from which all switches stay open."""
+    """Time from which switches stay open."""
     rest_s: float | None
-    """Time from which the arm stays at rest."""
     reversals: int
     zones: int
-    """The most zones that the host reported at once."""
+    """Most zones that the host reported at once."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RunRecord:
-    """A run."""
+    """Record of a run."""
 
     outcome: ArmResponse
     course: np.ndarray
@@ -111,9 +104,8 @@ def run(
     """Let the arm run into the touched things.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: by
-    default the reference Skin, with units if the way needs them; ``to_peak``: end once the force has fallen to half of
-    its peak after the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its
-    gateware.
+    default the reference Skin, with units if needed; ``to_peak``: end once the force has fallen to half its peak after
+    the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")
@@ -149,7 +141,6 @@ def _on_sheet(case: Case, skin: Skin) -> None:
 
 
 def _host(world: World) -> None:
-    """The host's program: reports each frame's number of zones."""
     with driver.Board(PlantTransport(world)) as board:
         board.greet(world.case.run.lead_s)
         while not _over(world) and not _host_dead(world):
@@ -216,7 +207,6 @@ def _outcome(world: World) -> ArmResponse:
 
 
 def _until_back(course: np.ndarray, start: int | None) -> float | None:
-    """Time from step ``start`` until the speed is 0, interpolated between steps."""
     if start is None:
         return None
     speed, time = course["speed_rad_s"], course["time_s"]

@@ -1,4 +1,4 @@
-"""The points of the charts: many short runs, in pieces for any executor."""
+"""Points of the charts: many short runs for any executor."""
 
 from __future__ import annotations
 
@@ -23,17 +23,16 @@ STEP_S = 25e-6
 """Integrator step for runs without gateware; halving it changes no result by more than 1 %."""
 
 ENDS_S, ENDS_M = 60e-3, 4e-3
-"""An arm has retreated by this time plus the time for this distance."""
+"""An arm has retreated after this time plus the time for this distance."""
 
 RESOLUTION_M = 0.02e-3
-"""Resolution of a thickness."""
 
 THINNEST_M, THICKEST_M = 0.05e-3, 40e-3
 
 
 @dataclasses.dataclass(frozen=True)
 class SweepTask:
-    """A run; or, with ``thickness``, the search for the thinnest foam that is not pressed flat."""
+    """A run, or with ``thickness`` the search for the thinnest foam that is not pressed flat."""
 
     case: Case
     way: str = "latency"
@@ -47,7 +46,6 @@ class SweepPoint:
 
     peak_force_n: float
     force_before_n: float
-    """Force at the reaction."""
     peak_indentation_m: float
     closes_s: float
     takes_s: float
@@ -56,7 +54,7 @@ class SweepPoint:
 
 
 def work(task: SweepTask) -> dict[str, float]:
-    """The fields of the task's :class:`SweepPoint`. Cached by code."""
+    """Fields of the task's :class:`SweepPoint`, cached by code."""
     key = f"{kept.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
     return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
 
@@ -67,7 +65,7 @@ def sweep(
     step: Callable[[str, int], None] = lambda name, of: None,
     so_far: dict[SweepTask, SweepPoint] | None = None,
 ) -> list[SweepPoint]:
-    """The tasks' points in order. After each, ``so_far`` holds it, and ``step(name, number of all)`` is called."""
+    """The tasks' points in order. Each enters ``so_far``, then ``step(name, number of all)`` is called."""
     found = {} if so_far is None else so_far
     futures = {executor.submit(work, task): task for task in tasks}
     for future in as_completed(futures):
@@ -96,8 +94,6 @@ def _number(value: float | None) -> float:
 
 
 def _thinnest(task: SweepTask) -> SweepPoint:
-    """The smallest thickness at which the foam is not pressed flat."""
-
     def at(thickness_m: float) -> tuple[SweepPoint, bool]:
         point = _point(dataclasses.replace(task, case=task.case.but(foam={"thickness_m": thickness_m})))
         return point, point.peak_indentation_m <= thickness_m
@@ -117,7 +113,7 @@ def _thinnest(task: SweepTask) -> SweepPoint:
 
 
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
-    """The longest time in s from a switch to the controller's input by each way, for one zone."""
+    """Longest time in s from a switch to the controller's input, by way, for one zone."""
     usb = case.usb
     scan = skin.derived.max_frame_slots * skin.derived.row_clocks / skin.clock_hz
     wire = latency_s(skin)
@@ -130,13 +126,13 @@ def unlimited(case: Case) -> Case:
 
 
 def closing_n(case: Case) -> float:
-    """The force that closes a switch directly below it."""
+    """Force that closes a switch directly below it."""
     return float(force_n(case.switch.switch, 0.0, case.foam.thickness_m))  # type: ignore[arg-type]
 
 
 def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
-    """The highest speed up to which no force exceeds the limit, interpolated. NaN if the slowest is too fast, or the
-    fastest is still safe."""
+    """Highest speed up to which no force exceeds the limit, interpolated; NaN if the slowest exceeds or the fastest
+    is safe."""
     worst = np.maximum.accumulate(forces)
     above = np.flatnonzero(worst > limit_n)
     if not worst[0] <= limit_n or not len(above):
@@ -147,7 +143,7 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
 
 
 def naive_speed(case: Case, limit_n: float, latency: float) -> float:
-    """(delta(limit) - delta(closing)) / latency, the speed that reaches the limit at the reaction. It is not safe: the
-    arm still presses on."""
+    """(delta(limit) - delta(closing)) / latency, which reaches the limit at the reaction; unsafe, as the arm still
+    presses on."""
     depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
     return max(0.0, depth[0] - depth[1]) / latency

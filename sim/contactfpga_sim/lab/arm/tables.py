@@ -1,4 +1,4 @@
-"""Writes docs/arm.md's tables and pictures."""
+"""Tables and pictures of docs/arm.md."""
 
 from __future__ import annotations
 
@@ -29,13 +29,11 @@ class ArmRuns(NamedTuple):
     plan: pictures.Plan
     points: dict[SweepTask, SweepPoint]
     columns: dict[str, RunRecord]
-    """The paper's experiment by way to the controller."""
     anywhere: dict[anywhere.Geometry, anywhere.Found]
-    """Touches anywhere, by geometry."""
 
 
 def compute() -> ArmRuns:
-    """Run all simulations of the page."""
+    """Run the page's simulations."""
     case = Case.load("paper")
     plan = pictures.plan(case)
     with executor() as workers, progress() as step:
@@ -45,7 +43,7 @@ def compute() -> ArmRuns:
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
-    """The page's runs, and force, speed and thickness against latency."""
+    """The runs, and force, speed and thickness over latency."""
     charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
     return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
 
@@ -55,7 +53,6 @@ class Failure(NamedTuple):
 
     name: str
     changes: dict[str, Any]
-    """Changes to the case ``paper``."""
     way: str = "uart"
     faults: Faults = Faults()
 
@@ -81,17 +78,17 @@ FAILURES = (
 
 
 def matters_text(found: ArmRuns) -> str:
-    """A sentence on the most important change."""
+    """A sentence on the best change."""
     return anywhere.matters(found.anywhere)
 
 
 def places_table(found: ArmRuns) -> str:
-    """Peak force over touches anywhere, by geometry."""
+    """Peak forces by geometry."""
     return writer.table_of(anywhere.geometry_lines(found.anywhere))
 
 
 def effects_table(found: ArmRuns) -> str:
-    """Reduction of the mean peak force by each part of the sheet, changed alone."""
+    """Reduction of peak force by each part."""
     return writer.table_of(anywhere.effect_lines(found.anywhere))
 
 
@@ -101,7 +98,7 @@ def set_table(found: ArmRuns) -> str:
 
 
 def failure_table() -> str:
-    """Results of each of :data:`FAILURES`."""
+    """Results of runs with faults."""
     lines = [["", "way", "reacts, ms", "because of", "peak force, N", "indentation, mm", "reversals", "at rest, ms"]]
     for failure in FAILURES:
         found = run(Case.load("paper").but(**failure.changes), failure.way, faults=failure.faults).outcome
@@ -114,17 +111,17 @@ def failure_table() -> str:
 
 
 def push_table() -> str:
-    """Pushes up to the fastest that the arm yields to, and one faster."""
+    """Pushes up to the fastest yielded to, and one faster."""
     return writer.table_of(report.push_lines(comply.pushes(Case.load("push"))[1]))
 
 
 def defense_table() -> str:
-    """Peak force by each line of defense."""
+    """Peak force by line of defense."""
     return writer.table_of(report.defense_lines(Case.load("paper")))
 
 
 def step_table() -> str:
-    """Results at 6 ms and by UART over integrator steps, and the largest change by halving."""
+    """Results over integrator steps, and the largest change by halving."""
     lines = [["step, us", "way", "closes, ms", "torque before, Nm", "peak force, N", "at rest, ms", "largest change"]]
     for way in ("latency", "uart"):
         before: list[float] | None = None
@@ -139,7 +136,7 @@ def step_table() -> str:
 
 
 def sheet_table(found: ArmRuns) -> str:
-    """Time from the switch to the controller in the gateware's own runs, and its cost."""
+    """Time from switch to controller in the gateware's runs, and its cost."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
     bounds = sweep.bounds_s(Case.load("paper"), pictures.Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):
@@ -152,7 +149,7 @@ def sheet_table(found: ArmRuns) -> str:
 
 
 def speed_table(found: ArmRuns) -> str:
-    """Safe arm speed by peak force and, in brackets, by the force at the reaction."""
+    """Safe speed by peak force; in brackets by force at the reaction."""
     lines = [["force limit, N", *found.plan.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
     for limit in LIMITS_N:
         cells = []

@@ -1,4 +1,4 @@
-"""Arm, sheet and gateware side by side in simulated time, with switches and units under the cover and the USB chip."""
+"""Arm, sheet, gateware and USB chip in lockstep in simulated time."""
 
 from __future__ import annotations
 
@@ -24,16 +24,15 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3
 _PATCH_M = 1e-3
-"""Patch radius for models that do not use it."""
 
 _FINE = 1.1
-"""Ratio of the forces at which a wide patch is computed; between them, the pressure per newton is linear."""
+"""Ratio of forces at which a wide patch is computed; in between, pressure per newton is linear."""
 
 _LEAST_N = 0.01
 
 
 class Switches:
-    """The (rows, columns) switches of a sheet under the case's cover."""
+    """The (rows, columns) switches under the cover."""
 
     def __init__(self, case: Case, skin: Skin):
         pitches = (skin.pitch_x_mm * _MM, skin.pitch_y_mm * _MM)
@@ -49,7 +48,7 @@ class Switches:
         self._bounces_until = -np.inf
 
     def forces_n(self, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) force in N on each switch from the touches' forces."""
+        """(rows, columns) N on each switch."""
         found = np.zeros(self._made.shape)
         for touch, force in zip(self._touches, forces_n):
             if force > 0:
@@ -57,8 +56,7 @@ class Switches:
         return found
 
     def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) bool: the switches closed at a moment; moments must not go back. Unchanged results are the
-        same array."""
+        """(rows, columns) bool closed switches; moments must not go back. Unchanged results are the same array."""
         if any(forces_n) or self._any:
             made = self._cells.closed_by(self.forces_n(forces_n), self._made)
             changed = made != self._made
@@ -82,7 +80,6 @@ class Switches:
         return found
 
     def _per_newton(self, touch: Touch, force_n: float) -> np.ndarray:
-        """(rows, columns) share of each newton of this touch."""
         if self._cells.cover.model == "point":  # where it does not depend on the force
             return pressed(self._cells, touch.x_mm, touch.y_mm, _PATCH_M)
         place = max(0.0, math.log(force_n / _LEAST_N) / math.log(_FINE))
@@ -95,7 +92,7 @@ class Switches:
 
 @functools.lru_cache(maxsize=2048)
 def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarray:
-    """(rows, columns) share of a force that reaches each switch, from a round patch of this radius on the cover."""
+    """(rows, columns) share of a force on each switch, from a round patch on the cover."""
     part = Ellipse(radius_m, radius_m, x_mm * _MM, y_mm * _MM)
     return cells.forces_n([Load((part,), 1.0)])
 
@@ -103,7 +100,6 @@ def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarr
 THRESHOLD_N = 2.0
 """Threshold of the whole push; noise of the sum is 0.09 N."""
 GAIN_N = 0.02
-"""Newtons per step of the converter."""
 ZERO = 1000
 SIGMA_N = 0.05
 RING_MM = 75.0
@@ -113,7 +109,7 @@ FIRST_NUMBER = 129 * 128 + 1
 
 
 class UnitsUnderSheet:
-    """Three units at the corners of a triangle around the sheet's middle, under a weightless bumper."""
+    """Three units in a triangle under a weightless bumper."""
 
     def __init__(self, case: Case, skin: Skin):
         turn = np.radians([90, 210, 330])
@@ -125,7 +121,6 @@ class UnitsUnderSheet:
         self._skin = skin
 
     def readings(self, forces_n: Sequence[float]) -> list[int]:
-        """Readings of all units under these touch forces."""
         loads = self._shares @ np.maximum(forces_n, 0.0) + SIGMA_N / GAIN_N * self._rng.standard_normal(3)
         found: list[int] = np.clip(np.rint(ZERO + loads), 0, 4095).astype(int).tolist()
         return found
@@ -141,9 +136,8 @@ class UnitsUnderSheet:
 
 
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
-"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;
-zones over UART and the host; none, leaving the torque limit; the pin of a board with pressure units alone; the pin of a
-board with both."""
+"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the ``contact`` pin;
+zones over UART and host; none but the torque limit; the pin with pressure units alone; the pin with both."""
 
 PINS = ("pin", "force", "both")
 UNITS = ("force", "both")
@@ -154,11 +148,10 @@ class Faults:
     """Injected faults, in s from the touch; None: no fault."""
 
     board_dies_s: float | None = None
-    """Time from which the board's pins are frozen."""
+    """Time from which the board's pins freeze."""
     host_dies_s: float | None = None
-    """Time from which the host's program is silent."""
     noise_s: tuple[float, float] | None = None
-    """Interval in which every byte (by its stop bit) has its lowest bit inverted."""
+    """Interval in which each byte (by its stop bit) has its lowest bit inverted."""
 
 
 class CourseStep(NamedTuple):
@@ -170,13 +163,9 @@ class CourseStep(NamedTuple):
     current_a: float
     sensor_nm: float
     force_n: float
-    """Total force of all touches."""
     indentation_m: float
-    """The deepest indentation."""
     closed: bool
-    """Whether any switch is closed."""
     contact: bool
-    """Whether the controller knows of the contact."""
 
 
 class World:
@@ -188,11 +177,10 @@ class World:
         self.controller = Controller(case)
         self.course: list[CourseStep] = []
         self.heard: list[tuple[float, int]] = []
-        """Host reports: time of arrival at the controller, and number of zones."""
+        """Host reports: arrival at the controller, zones."""
         self.detected_s: float | None = None
-        """Time at which the first contact reached the controller's input."""
+        """Arrival of the first contact at the controller's input."""
         self.peak_n = 0.0
-        """The largest force so far."""
         self._way, self._latency_s = way, latency_s
         self._plant = Plant(case)
         self._switches = Switches(case, skin)
@@ -215,7 +203,6 @@ class World:
         self._ticks = round(case.control.period_s / case.run.step_s)
 
     def clock(self) -> float:
-        """Seconds since power-up."""
         return self._number * self.case.run.step_s
 
     @property
@@ -224,18 +211,17 @@ class World:
         return self.clock() - self.case.run.lead_s
 
     def delivered(self) -> bytes:
-        """Bytes that reached the host's program since the last call."""
+        """Bytes that reached the host since the last call."""
         data, self._bytes = self._bytes, b""
         return data
 
     def send(self, data: bytes) -> None:
-        """Bytes from the host to the board."""
         if self._board is not None and not self._dead():
             self._catch_up()
             self._board.send(data)
 
     def say(self, zones: int) -> None:
-        """Report the number of zones to the controller, after the host's delay."""
+        """Report zones to the controller, after the host's delay."""
         at = self.time_s + self.case.usb.host_s
         self.heard.append((at, zones))
         self._changes.append((at, zones > 0))
@@ -269,7 +255,6 @@ class World:
         self._host_frame()
 
     def close(self) -> None:
-        """Free the board."""
         if self._board is not None:
             self._board.close()
 
@@ -292,20 +277,17 @@ class World:
             self._board.press(cells)
 
     def _load(self, forces_n: Sequence[float]) -> None:
-        """Apply the forces to the units, which change with every step."""
         if self._under is not None and self._board is not None and not self._dead():
             self._catch_up()
             self._board.load(self._under.readings(forces_n))
 
     def _learn(self, now: float) -> None:
-        """Move what arrived by now into the controller's input; a pin is read at its samples."""
         while self._changes and self._changes[0][0] <= now + 1e-9:
             at, self._level = self._changes.popleft()
             if self._level and self.detected_s is None:
                 self.detected_s = at
 
     def _catch_up(self) -> None:
-        """Run the board to the plant's time on demand, unless it is dead."""
         board, lead, hz = self._board, self.case.run.lead_s, self._clock_hz
         if board is None:
             return

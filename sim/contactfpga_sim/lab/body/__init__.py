@@ -1,1 +1,1 @@
-"""Simulations for docs/body.md of links, registration and folds."""
+"""Simulated links, registration and folds for docs/body.md."""

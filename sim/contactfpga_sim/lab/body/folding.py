@@ -1,5 +1,4 @@
-"""A cover that folds at a joint and presses switches: the share of folds that is marked, and of touches marked by
-mistake."""
+"""A cover that folds at a joint and presses switches: shares of folds and touches marked."""
 
 from __future__ import annotations
 
@@ -17,15 +16,15 @@ from contactfpga_sim.model.scenes.scene import Contact, Scene
 SKIN = Skin(report="cells")
 BEGINS_RAD, RANGE_RAD = 0.6, 2.0
 OFF_RAD = 0.01
-"""Standard deviation of the reported angle from the one at which the cover folds."""
+"""Standard deviation of the reported angle."""
 FLICKER = 0.3
-"""Chance that a cell at the fold's rim is open."""
+"""Chance that a cell at a fold's rim is open."""
 FINGER_MM = 9.0
 
 
 def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray:
-    """(rows, columns) bool: from 0.6 rad on, a crease across rows 0 to 3 that grows with the angle. Without ``rng``:
-    all cells it can press."""
+    """(rows, columns) bool crease across rows 0 to 3, from 0.6 rad on, growing with the angle. Without ``rng``: all
+    cells it can press."""
     cells = np.zeros((SKIN.rows, SKIN.columns), bool)
     if rng is not None:
         angle_rad += OFF_RAD * rng.standard_normal()
@@ -43,37 +42,37 @@ def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray
 
 
 def touch(x_mm: float, y_mm: float) -> np.ndarray:
-    """The cells that a finger presses."""
+    """Cells under a finger."""
     disc = Contact(shape=contacts.disc(FINGER_MM), x_mm=x_mm, y_mm=y_mm, force_n=10.0)
     return np.asarray(Scene((disc,)).pressed(0.0, SKIN), bool)
 
 
 def frame_of(cells: np.ndarray, skin: Skin = SKIN) -> Zones:
-    """A frame of pressed cells, of a board with ``report = "cells"``."""
+    """A frame of cells from a board with ``report = "cells"``."""
     frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells, None)
     return Zones(frame, skin.sheet, 0)
 
 
 def learned(sweeps: int, rng: np.random.Generator, frames: int = 400) -> Folds:
-    """Folds learned over ``sweeps`` of the joint's range, there and back."""
+    """Folds learned over ``sweeps`` of the joint, there and back."""
     angles = np.tile(np.linspace(0, RANGE_RAD, frames), sweeps)
     return learn("joint", ((angle, frame_of(fold(angle, rng))) for angle in angles.tolist()))
 
 
 @dataclasses.dataclass(frozen=True)
 class Rates:
-    """Shares from 0 to 1."""
+    """Shares of zones and touches, from 0 to 1."""
 
     folds: float
-    """Share of fold-only zones that are marked, as they should be."""
+    """Fold-only zones marked, as they should be."""
     apart: float
-    """Share of separate touches marked by mistake while the cover is folded."""
+    """Separate touches marked by mistake while the cover is folded."""
     joined: float
-    """Share of touches joined to the fold's zone that are marked by mistake."""
+    """Touches joined to the fold's zone, marked by mistake."""
     within: float
-    """Share of touches marked whose cells the fold can all press, so that no switch can distinguish them."""
+    """Touches marked whose cells the fold can all press: no switch can tell."""
     straight: float
-    """Share of touches anywhere marked by mistake with the joint straight."""
+    """Touches marked by mistake with the joint straight."""
 
 
 def rates(sweeps: int, count: int = 400, seed: int = 1) -> Rates:

@@ -1,4 +1,4 @@
-"""Status of a link whose board is unplugged, muted or exchanged: time until noticed and until restored."""
+"""Status of a link whose board is unplugged, muted or exchanged."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BEFORE_S = 0.05
 
 
 class Socket:
-    """A port in simulated time at which boards are exchanged."""
+    """A simulated port at which boards are exchanged."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -33,7 +33,6 @@ class Socket:
         self._random = np.random.default_rng(1)
 
     def plug(self, skin: Skin = SKIN) -> None:
-        """Connect a freshly powered board."""
         self.flash(skin)
         self.plugs += 1
 
@@ -43,18 +42,16 @@ class Socket:
         self._held.clear()
 
     def unplug(self) -> None:
-        """Remove the board."""
         self.board = None
         self.plugs += 1
 
     def opened(self, plan: Plan) -> contactfpga.Board:
-        """Open the port, as a reader does."""
         if self.board is None:
             raise contactfpga.PortNotFound("no such port")
         return contactfpga.open(HeldPort(self), plan.skin, timeout=0.2)
 
     def pass_(self, seconds: float) -> bytes:
-        """Let this time pass; returns what arrived."""
+        """Let time pass; return the bytes that arrived."""
         assert self.board is not None
         before = self.board.clock()
         data = self.board.read(seconds)
@@ -78,7 +75,6 @@ class HeldPort:
             raise contactfpga.PortLost("the port is gone")
 
     def read(self, seconds: float) -> bytes:
-        """Bytes that arrive within this time."""
         self._check()
         until = self._socket.now + seconds
         while not (data := self._socket.pass_(max(1e-6, until - self._socket.now))) and self._socket.now < until:
@@ -86,13 +82,11 @@ class HeldPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """To the board."""
         self._check()
         if self._socket.board is not None:
             self._socket.board.write(data)
 
     def clock(self) -> float:
-        """Simulated seconds."""
         return self._socket.now
 
     def close(self) -> None:
@@ -101,7 +95,7 @@ class HeldPort:
 
 @dataclasses.dataclass(frozen=True)
 class Outage:
-    """A fault, its end, and the expected status in between."""
+    """A fault, its end, and the expected status."""
 
     name: str
     begin: Callable[[Socket], object]
@@ -129,20 +123,17 @@ OUTAGES = (
 
 @dataclasses.dataclass(frozen=True)
 class OutageTimes:
-    """Statuses and times that the body reported."""
+    """Statuses and times reported by the body."""
 
     statuses: tuple[str, ...]
-    """Statuses in order."""
     noticed_s: float
-    """Time from the fault to the status that reports it."""
     back_s: float
-    """Time from the fault's end to ok."""
     stale: int
-    """Looks at which an old frame passed for a new one, beyond the link's ``late_s``."""
+    """Looks at which an old frame passed for new beyond ``late_s``."""
 
 
 def play(outage: Outage, folder: Path) -> OutageTimes:
-    """Run the outage; ``folder`` gets the Skin's file. Raises RuntimeError if the body never reports it."""
+    """Run an outage with the Skin's file in ``folder``. Raises RuntimeError if never reported."""
     (folder / "skin.toml").write_text(SKIN.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
     socket = Socket()
@@ -167,7 +158,7 @@ def play(outage: Outage, folder: Path) -> OutageTimes:
 def _until(
     reader: LinkReader, socket: Socket, status: str, seen: list[str], fresh_until_s: float = float("inf")
 ) -> int:
-    """Advance until the link has this status; returns how often it was ok for too long."""
+    """Advance until this status; return how often the link was ok for too long."""
     end_s, stale = socket.now + LONGEST_S, 0
     while (found := reader.state().status) != status:
         if not seen or seen[-1] != found:

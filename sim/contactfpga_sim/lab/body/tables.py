@@ -1,4 +1,4 @@
-"""Registration by pressing a few points, and the tables and pictures of docs/body.md."""
+"""Registration by pressing points; tables and pictures of docs/body.md."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from contactfpga_sim.model.scenes.scene import Contact, Scene, scene
 FINGER_MM = 9.0
 MARGIN_MM = 15.0
 PLACED_MM = 1.0
-"""Standard deviation of the finger's position, along each of two directions."""
+"""Standard deviation of the finger, by axis."""
 SKINS = {
     "plane, 16x16, 10 mm": Skin(),
     "cylinder, radius 45 mm": Skin(surface="cylinder", radius_mm=45.0, pitch_x_mm=17.0),
@@ -37,24 +37,20 @@ SKINS = {
 
 @dataclasses.dataclass(frozen=True)
 class RegistrationErrors:
-    """Errors over many registrations."""
+    """RMS errors over many registrations."""
 
     refused: float
-    """Share of registrations refused."""
     wrong: float
-    """Share of the accepted with the wrong mounting."""
+    """Share of accepted ones with the wrong mounting."""
     middle_mm: float
-    """RMS error of the sheet's middle."""
     turned_deg: float
-    """RMS error of its angles."""
     residual_mm: float
-    """RMS of the reported residual."""
 
 
 def placement_errors(
     skin: Skin, points: int, folder: Path, *, normals: bool, count: int = 200, seed: int = 1
 ) -> RegistrationErrors:
-    """Errors over random poses, mountings and points, with an imprecise finger."""
+    """Errors over random poses, mountings and points."""
     (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
     rng = np.random.default_rng(seed)
@@ -78,7 +74,6 @@ def placement_errors(
 
 
 def _pressed(true: Plan, rng: np.random.Generator, normals: bool) -> Press:
-    """A random point of the link, and the zone that pressing it makes."""
     skin = true.skin
     wide, high = (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm
     while True:
@@ -146,7 +141,7 @@ def folds_table() -> str:
 
 
 def folds_sample() -> str:
-    """The first row of :func:`folds_table`."""
+    """First row of :func:`folds_table`."""
     return writer.line(_folds(SWEEPS[0]))
 
 
@@ -157,7 +152,7 @@ def _folds(sweeps: int) -> tuple[str, ...]:
 
 
 def draw(folder: Path) -> Path:
-    """The example's robot from the front and from the side, with its sheets and contacts."""
+    """The example's robot from two sides, with sheets and contacts."""
     import matplotlib
 
     body = Body.load(examples() / "robot.toml")
@@ -194,7 +189,7 @@ def draw(folder: Path) -> Path:
 
 
 def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> np.ndarray:
-    """Draw a sheet; the places of its cells, (cells, 3) in m."""
+    """Draw a sheet; return its (cells, 3) places in m."""
     skin = plan.skin
     x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
     cells = np.array([pose.apply(np.array(plan.place(*place)[0])) for place in zip(x.ravel(), y.ravel())])

@@ -1,1 +1,1 @@
-"""Memory and code of the C header on microcontrollers."""
+"""Needs of the C header on microcontrollers."""

@@ -1,4 +1,4 @@
-"""Measures the C header's needs on microcontrollers, and writes them into its page."""
+"""Bytes that the C header needs on microcontrollers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHEETS = {
     "any sheet": LONGEST_PACKET,
 }
 HELLO_BYTES = 120
-"""The longest hello of today's boards, with a name of 32 bytes."""
+"""Longest hello of today's boards, with a name of 32 bytes."""
 
 USES = {
     "read zones and pressure units": """
@@ -43,7 +43,7 @@ size_t tell(uint32_t number, uint8_t what, uint8_t unit, uint32_t steps, uint8_t
 
 
 def sizes_table() -> str:
-    """Bytes of code by core, and of memory by sheet."""
+    """Bytes of code by core, of memory by sheet."""
     uses = ["".join(list(USES.values())[: count + 1]) for count in range(len(USES))]
     rows = [["bytes of code (`-Os`)", *CORES]]
     for name, code in zip(USES, uses, strict=True):

@@ -1,1 +1,1 @@
-"""Speed against accuracy: cost and benefit of each method and setting, on scenes with a known truth."""
+"""Speed against accuracy of each method and setting, on scenes with a known truth."""

@@ -1,4 +1,4 @@
-"""Walls and rivals in the chart: limits that no method passes, and other kinds of sensors."""
+"""Limits that no method passes, and rival sensors, for the chart."""
 
 from __future__ import annotations
 
@@ -19,27 +19,25 @@ from contactfpga_sim.lab.covers import COVERS
 from contactfpga_sim.model.scenes.families import touches
 
 PITCH_MM = 6.4
-"""Pitch of the tiles under which rivals are drawn."""
+"""Pitch of the rivals' tiles."""
 
 TOUCHES = 50
-"""Most touches per family for a rival's point; a page has a table instead."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RivalMethod:
-    """A modeled rival, which is not one of the chart's methods."""
+    """A modeled rival, not one of the chart's methods."""
 
     name: str
     family: str
     touch_us: Quantile
-    """Median from the first touch of the foam, as for the methods' points."""
+    """Median time from the foam's first touch."""
     errors: dict[str, Interval]
-    """By metric, against the contacts."""
 
 
 def least_mm(task: Task) -> Interval | None:
-    """Lower bound in mm of the mean barycenter error of any method on this task's cells; None for several contacts, or
-    if none is felt."""
+    """Lower bound in mm of any method's mean barycenter error on these cells; None for several contacts, or none
+    felt."""
     if task.family not in floor.ONE:
         return None
     try:
@@ -55,7 +53,7 @@ def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
 
 
 def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
-    """Each rival on each family, under tiles of :data:`PITCH_MM`; drawn with the word "model"."""
+    """Each rival on each family, under tiles of :data:`PITCH_MM`."""
     lines, cover = round(EXTENT_MM / PITCH_MM), COVERS["tiles"](PITCH_MM)
     skin = Skin(rows=lines, columns=lines, pitch_x_mm=PITCH_MM, pitch_y_mm=PITCH_MM, connectivity=4)
     found = []
@@ -69,7 +67,7 @@ def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
 
 
 def bits_us(points: Sequence[Point]) -> float:
-    """Microseconds of the bits of the points' shortest frame, at the most common baud rate."""
+    """Microseconds of the shortest frame's bits, at the most common baud rate."""
     bauds = [point.task.skin.baud for point in points]
     usual = max(dict.fromkeys(bauds), key=bauds.count)
     return min(point.times.lower_bound_us for point in points if point.task.skin.baud == usual)

@@ -1,4 +1,4 @@
-"""The points of the chart: every method on every family of scenes, in pieces for any executor."""
+"""Points of the chart: every method on every family, for any executor."""
 
 from __future__ import annotations
 
@@ -23,16 +23,13 @@ from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
-"""Families of the chart by default."""
 
 PIECE = 100
-"""Placements per piece of work."""
 
 TIMED = 200
-"""Placements that are also timed, each as one touch."""
+"""Placements timed as touches."""
 
 DEVICE = sizes.UP5K
-"""Device of the LUT4 counts and clocks."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,24 +39,21 @@ class Task:
     method: str
     skin: Skin
     cover: Cover | None
-    """None: a bare sheet."""
     family: str
     count: int
-    """Placements."""
     seed: int
     checked: int = 2
-    """Touches that also go through the gateware."""
+    """Touches also through the gateware."""
 
 
 KINDS = ("total", "labeller", "sensing")
-"""Errors: of the method's zones against the contacts; of these zones against the connected pieces of the cells; of
-these pieces against the contacts."""
+"""Errors: zones against contacts, zones against connected cells, connected cells against contacts."""
 
 Found = dict[str, dict[str, list[float]]]
 """A value per scene, by kind and metric."""
 
 Look = tuple[np.ndarray, list[errors.Blob]]
-"""(R, C) bool pressed cells, and the true contacts."""
+"""(R, C) bool pressed cells, and true contacts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,14 +62,13 @@ class Point:
 
     task: Task
     errors: dict[str, dict[str, Interval]]
-    """By kind and metric."""
     times: Times
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
-    """Labelling time on this host, if it labels; it varies between runs."""
+    """Labelling time on this host, if it labels."""
     least_mm: Interval | None = None
-    """Lower bound of any method's mean barycenter error on these cells, if computed."""
+    """Lower bound of any method's mean barycenter error here."""
 
 
 def study(
@@ -85,11 +78,10 @@ def study(
     step: Callable[[str, int], None] = lambda name, of: None,
     so_far: dict[Task, Point] | None = None,
 ) -> list[Point]:
-    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece. A point enters
-    ``so_far`` once its errors and times are known, before its size.
+    """Work out all tasks; ``step(kind of work, pieces of that kind)`` follows each piece. A point enters ``so_far``
+    once its errors and times are known, before its size.
 
-    Results of the same code come from the cache. ``executor`` is a process pool's or one with its interface, for
-    instance Dask's.
+    Results are cached by code. ``executor`` is a process pool's or alike, such as Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
     parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {
@@ -135,7 +127,7 @@ def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
 
 
 def accuracy(task: Task, first: int) -> Found:
-    """Errors by kind and metric of one piece of a task's placements, once all forces have risen."""
+    """Errors by kind and metric of one piece, once all forces have risen."""
 
     def new() -> Found:
         scenes = _touches(task, first)
@@ -158,12 +150,12 @@ def _touches(task: Task, first: int) -> list[Scene]:
 
 
 def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    """The pressed cells and contacts of a scene at an instant."""
+    """Pressed cells and contacts of a scene at an instant."""
     return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
 
 
 def compared(looks: Iterable[Look], skin: Skin) -> Found:
-    """Errors of a Skin's zones on these looks."""
+    """Errors of a Skin's zones on looks."""
     found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
     for cells, there in looks:
         for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):
@@ -189,7 +181,7 @@ def _key(task: Task, kind: str, number: int) -> str:
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:
-    """Indexes of the Pareto-optimal (time, error) points, by rising time."""
+    """Indexes of Pareto-optimal (time, error) points, by rising time."""
     order = sorted(
         (time, error, index) for index, (time, error) in enumerate(points) if np.isfinite([time, error]).all()
     )
@@ -202,17 +194,17 @@ def front(points: Iterable[tuple[float, float]]) -> list[int]:
 
 
 def reached_us(point: Point) -> float:
-    """Median from the first touch of the foam to the zones at the host, with host labelling if needed."""
+    """Median time from the foam's first touch to the zones at the host, labelling included."""
     return point.times.touch_median_us.value + point.host_us
 
 
 def covered(task: Task) -> bool:
-    """Whether forces count: true for all but the bare sheet."""
+    """Whether forces count: all but the bare sheet."""
     return not times.at_once(task.cover)
 
 
 def to_build(points: Sequence[Point]) -> str:
-    """The covered method with the smallest mean share of miscounted scenes over the families; the first of equals."""
+    """The covered method with the least mean share of miscounted scenes; the first of equals."""
     shares: dict[str, list[float]] = {}
     for point in points:
         if covered(point.task):

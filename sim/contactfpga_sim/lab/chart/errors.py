@@ -1,4 +1,4 @@
-"""Distance of a method's zones from the contacts, and from the pressed cells."""
+"""Distances of a method's zones from contacts and from pressed cells."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from contactfpga_sim.model.golden.frame import barycenter
 from contactfpga_sim.model.scenes.truth import Truth
 
 Z95 = 1.959963984540054
-"""Half width of the 95 % interval in standard deviations."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,23 +29,21 @@ class Blob:
 
 @dataclasses.dataclass(frozen=True)
 class Errors:
-    """Errors of one scene, found against true."""
+    """Errors of the blobs found in a scene."""
 
     miscounted: bool
-    """Whether the number found is wrong."""
     missed: float
-    """Share of the true ones without a partner."""
     barycenter_mm: float
     """Mean distance of matched pairs; NaN without pairs."""
     area: float
-    """Mean area difference of matched pairs over the true area; NaN without pairs."""
+    """Mean area difference over the true area; NaN without pairs."""
 
 
 METRICS = tuple(field.name for field in dataclasses.fields(Errors))
 
 
 def errors(found: Sequence[Blob], there: Sequence[Blob]) -> Errors:
-    """Errors under the pairing with the smallest sum of distances."""
+    """Errors for the pairing with the least sum of distances."""
     pairs = _pairs(found, there)
     distances = [math.dist((one.x_mm, one.y_mm), (other.x_mm, other.y_mm)) for one, other in pairs]
     areas = [abs(one.area_mm2 - other.area_mm2) / other.area_mm2 for one, other in pairs]
@@ -72,12 +69,12 @@ def contacts(truth: Truth) -> list[Blob]:
 
 
 def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
-    """The connected pieces of (R, C) bool cells, by the Skin's connectivity."""
+    """Connected pieces of (R, C) bool cells, by the Skin's connectivity."""
     return [_blob(moments, skin) for moments in zones(cells, skin.connectivity)]
 
 
 def method_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
-    """Zones by the Skin's labeller, or by the host with ``report = "cells"``; rounded if the board divides."""
+    """Zones by the labeller, or the host's with ``report = "cells"``; rounded if the board divides."""
     if skin.report == "cells":
         return exact_zones(cells, skin)
     work = label.labelling(cells, skin.connectivity, skin.labeller)
@@ -92,7 +89,7 @@ def _blob(moments: tuple[int, int, int], skin: Skin) -> Blob:
 
 
 def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
-    """A zone with the barycenter rounded as a board with ``report = "barycenter"`` sends it."""
+    """A zone rounded as a board with ``report = "barycenter"`` sends it."""
     area, *sums = moments
     x, y = (barycenter(total, area, skin.barycenter_bits) / 2**skin.barycenter_bits for total in sums)
     return Blob(area * skin.pitch_x_mm * skin.pitch_y_mm, x * skin.pitch_x_mm, y * skin.pitch_y_mm)
@@ -109,7 +106,7 @@ class Interval:
 
 
 def interval(values: Sequence[float]) -> Interval:
-    """Interval of the values without NaN: normal approximation, or Wilson's if all are shares 0 or 1."""
+    """Interval of values without NaN: normal, or Wilson's for shares 0 or 1."""
     known = np.array([value for value in values if not math.isnan(value)], float)
     n = len(known)
     if not n:
@@ -130,13 +127,13 @@ class Quantile:
     value: float
     low: float
     high: float
-    """Upper end; infinite if there are too few values."""
+    """Upper end of the interval; infinite if there are too few values."""
     count: int
 
 
 def quantile(values: Sequence[float], share: float) -> Quantile:
-    """The least value that at least this share of values does not exceed; infinite values count. The interval is by
-    ranks (binomial), valid for any distribution."""
+    """Least value that at least this share does not exceed; infinite values count. The interval is by ranks
+    (binomial), for any distribution."""
     ordered = sorted(values)
     n = len(ordered)
     if not n:

@@ -1,11 +1,9 @@
-"""The least mean barycenter error of any method that sees only the closed cells.
+"""The least mean barycenter error of any method that sees only closed cells.
 
-Scenes of one contact are drawn at random, away from the edge. Scenes with the same cells, up to moves, mirrors and
-turns, cannot be distinguished: the best estimate is their geometric median. Its mean distance is the floor. Finite
-samples give two estimates: a median judged on its own scenes is optimistic, so the floor is above; a median judged on
-other scenes is a usable method, so the floor is below.
-
-The methods know the spread of closing forces, not each switch's own.
+Each scene has one contact away from the edge. Scenes with the same cells, up to moves, mirrors and turns, are
+indistinguishable: the best estimate is their geometric median, and its mean distance is the floor. A median judged on
+its own scenes is optimistic, a lower bound; one judged on other scenes is a usable method, an upper bound. Methods know
+the spread of closing forces, not each switch's own.
 """
 
 from __future__ import annotations
@@ -29,19 +27,18 @@ ONE = ("finger", "bumper")
 """Families of one contact that are symmetric under turns and mirrors."""
 
 INNER = 12
-"""Side in pitches of the square that holds the contacts."""
+"""Side in pitches of the contacts' square."""
 
 FOLDS = 10
-"""Folds of cross-validation: each tenth is judged by medians of the other nine."""
 
 DOUBT = 4.0
 """Weight, in scenes, of the barycenter in a median for other scenes."""
 
 ROUNDS = 40
-"""Rounds of Weiszfeld's iteration for a median."""
+"""Rounds of Weiszfeld's iteration."""
 
 LEAST = 1e-6
-"""Distance in pitches below which a scene's pull on its median stops growing."""
+"""Distance in pitches below which a median's pull stops growing."""
 
 _MIRRORED = [np.diag(signs) for signs in ((1, 1), (-1, 1), (1, -1), (-1, -1))]
 _TURNED = _MIRRORED + [turn[::-1] for turn in _MIRRORED]
@@ -49,37 +46,33 @@ _TURNED = _MIRRORED + [turn[::-1] for turn in _MIRRORED]
 
 @dataclasses.dataclass(frozen=True)
 class Floor:
-    """Limits of methods on a family of scenes; distances in mm, over scenes in which a switch closed."""
+    """Limits on a family of scenes, in mm, over scenes with a closed switch."""
 
     felt: Interval
-    """Share of scenes in which a switch closed."""
+    """Share of scenes with a closed switch."""
     barycenter_mm: Interval
-    """Error of the barycenter of the connected cells."""
     lower_mm: Interval
-    """Statistical lower bound of the floor."""
     upper_mm: Interval
-    """Statistical upper bound of the floor."""
     table_mm: Interval
-    """Error of a :class:`PlaceTable` made of other scenes, from area and sums alone."""
+    """Error of a :class:`PlaceTable` of other scenes, from area and sums."""
     patterns: int
-    """Number of distinct patterns."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """n scenes in which a switch closed, in all T turns and mirrors."""
+    """n scenes with a closed switch, in all T turns and mirrors."""
 
     offsets: np.ndarray
-    """(n, T, 2) from the barycenter of the closed cells to the contact's, in pitches."""
+    """(n, T, 2) from the barycenter of closed cells to the contact's, in pitches."""
     patterns: np.ndarray
     """(n, T) int pattern numbers."""
     moments: np.ndarray
-    """(n, T, 3) int: area, and remainders of the column and row sums after division by it."""
+    """(n, T, 3) int: area, and column and row sums modulo the area."""
 
 
 def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> Floor:
-    """The floor of ``count`` scenes of a family, one of :data:`ONE`, under a cover, None for a bare sheet. Only pitch
-    and connectivity of the Skin count. Raises ValueError."""
+    """Floor of ``count`` scenes of a family in :data:`ONE`, by the Skin's pitch and connectivity; cover None is a
+    bare sheet. Raises ValueError."""
     sheet, scenes = inner(family, skin, count, seed, **options)
     pitch = np.array([skin.pitch_x_mm, skin.pitch_y_mm])
     cells = [scene.pressed(scene.settled_s, sheet, cover) for scene in scenes]
@@ -102,7 +95,7 @@ def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, *
 
 
 def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> PlaceTable:
-    """The table of the ``count`` scenes of :func:`floor`, by which a host places zones of one contact."""
+    """The table of :func:`floor`'s scenes, by which a host places zones."""
     sheet, scenes = inner(family, skin, count, seed, **options)
     cells = [(scene, scene.pressed(scene.settled_s, sheet, cover)) for scene in scenes]
     found = seen([(scene, one) for scene, one in cells if one.any()], sheet)
@@ -114,7 +107,7 @@ def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: 
 
 
 def inner(family: str, skin: Skin, count: int, seed: int, **options: Any) -> tuple[Skin, list[Scene]]:
-    """Scenes of one contact away from the edge, and a sheet of the Skin's pitch for them."""
+    """Scenes of one contact away from the edge, and a sheet for them."""
     if family not in ONE:
         raise ValueError(f"family {family!r} has no floor here; take one of {', '.join(ONE)}")
     contacts = [scene.contacts[0] for scene in placements(family, count, seed, skin, **options)]
@@ -135,7 +128,7 @@ def _moved(contact: Contact, x_mm: float, y_mm: float) -> Scene:
 
 
 def seen(felt: Sequence[tuple[Scene, np.ndarray]], skin: Skin) -> Seen:
-    """Observations of scenes and their (R, C) bool cells, some closed in each."""
+    """Observations of scenes with (R, C) bool cells, some closed in each."""
     turns = np.array(_TURNED if skin.pitch_x_mm == skin.pitch_y_mm else _MIRRORED)
     pitch = np.array([skin.pitch_x_mm, skin.pitch_y_mm])
     offsets, patterns, moments = [], [], []
@@ -154,19 +147,19 @@ def seen(felt: Sequence[tuple[Scene, np.ndarray]], skin: Skin) -> Seen:
 
 
 def _pattern(at: np.ndarray) -> bytes:
-    """A key of (n, 2) int cells that ignores position and order."""
+    """Key of (n, 2) int cells that ignores position and order."""
     moved = at - at.min(axis=0)
     return np.sort(moved[:, 0] * 1000 + moved[:, 1]).tobytes()
 
 
 def numbered(values: np.ndarray) -> np.ndarray:
-    """(n, T) int: the number of each distinct one of (n, T, k) values."""
+    """(n, T) int number of each distinct value of (n, T, k)."""
     _, numbers = np.unique(values.reshape(-1, values.shape[-1]), axis=0, return_inverse=True)
     return np.reshape(numbers, values.shape[:-1])
 
 
 def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, folds: int) -> Interval:
-    """Distances of scenes from their number's median, with several folds from other folds' medians."""
+    """Distances from a number's median, with several folds from other folds'."""
     places, found = offsets * pitch_mm, np.zeros(len(offsets))
     count = int(numbers.max()) + 1
     if folds == 1:
@@ -181,14 +174,14 @@ def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, f
 
 
 def _learned(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count, 2) medians of (n, T, 2) places by (n, T) numbers, shrunk to the barycenter."""
+    """(count, 2) medians of (n, T, 2) places by (n, T) number, shrunk to the barycenter."""
     scenes = np.bincount(numbers.ravel(), minlength=count) / numbers.shape[1]
     medians = geometric_medians(places.reshape(-1, 2), numbers.ravel(), count)
     return medians * (scenes / (scenes + DOUBT))[:, None]
 
 
 def geometric_medians(places: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count, 2) geometric medians (Weiszfeld) of the (n, 2) places by number; 0 for a number without places."""
+    """(count, 2) geometric medians (Weiszfeld) of (n, 2) places by number; 0 if unused."""
     weights = np.ones(len(places))
     medians = np.zeros((count, 2))
     for _ in range(ROUNDS):

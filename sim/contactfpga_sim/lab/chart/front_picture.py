@@ -1,7 +1,7 @@
-"""The README's picture: covers, pitches and closing forces, for one family of scenes.
+"""The README's picture: covers, pitches and closing forces.
 
-The family is `fingers`: two to five fingertips anywhere on 160 mm by 160 mm, where cover and pitch matter.
-Labellers, reports and rates that change neither time nor count by more than a mark's size are left to the table.
+The family `fingers` has two to five fingertips anywhere on 160 mm by 160 mm. Labellers, reports and rates that change
+little are in the table.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ FAMILY = "fingers"
 
 
 Spot = tuple[float, float]
-"""Of words, in points from their mark."""
+"""Offset of words from their mark, in points."""
 
 
 class Row(NamedTuple):
-    """Methods that differ in one thing."""
+    """Methods that differ in one setting."""
 
     color: str
     mark: str
     methods: dict[str, str]
-    """By what is written at their marks."""
+    """Methods by the words at their marks."""
     spot: Spot = (8, 0)
     others: dict[tuple[str, str], Spot | None] = {}  # noqa: RUF012 - it is not changed
-    """By words and error, where others lie at the usual spot; None: no words there."""
+    """Offsets by words and error in place of ``spot``; None: no words."""
 
 
 ROWS = {
@@ -82,14 +82,14 @@ ROWS = {
         style.GRAY, "v", {f"{pitch} mm": f"run, {pitch} mm, bare" for pitch in ("10", "6.4")}
     ),
 }
-"""By the name in the legend."""
+"""Rows by name in the legend."""
 
 TICKS_US = {100: "0.1", 1000: "1", 10_000: "10", 100_000: "100"}
 ENDS_US = (80.0, 130_000.0)
 
 
 class Panel(NamedTuple):
-    """An error on its axis."""
+    """An error and its axis."""
 
     name: str
     label: str
@@ -105,13 +105,13 @@ PANELS = (
 
 
 def save(points: Sequence[Point], path: Path) -> Path:
-    """Draw the points of :data:`FAMILY`; what to build goes by all families. The same points give the same file."""
+    """Draw the points of :data:`FAMILY`; equal points give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture(points), path)
 
 
 def picture(points: Sequence[Point]) -> Figure:
-    """Scenes miscounted, and the error of the barycenter, over the time from the first touch of the foam."""
+    """Miscounts and barycenter error over time from the foam's first touch."""
     figure = style.new(5.2)
     method = to_build(points)
     some = {point.task.method: point for point in points if point.task.family == FAMILY}

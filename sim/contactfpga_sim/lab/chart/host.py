@@ -1,7 +1,4 @@
-"""Zones of a frame of cells labelled on the host with OpenCV's connected components.
-
-Times depend on the machine that makes the chart.
-"""
+"""Zones labelled on the host with OpenCV's connected components."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ FRAMES, REPEATS = 20, 50
 
 
 def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, float, float]]:
-    """Area, x and y of each zone of (R, C) bool ``cells``, in cells."""
+    """Area, x and y of each zone of (R, C) bool cells."""
     _, _, found, centroids = cv2.connectedComponentsWithStats(cells.view(np.uint8), connectivity=connectivity)
     return [
         (int(area), float(x), float(y)) for area, (x, y) in zip(found[1:, cv2.CC_STAT_AREA], centroids[1:], strict=True)
@@ -28,7 +25,7 @@ def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, float, float]
 
 
 def label_us(frames: Sequence[np.ndarray], connectivity: int) -> float:
-    """Microseconds of :func:`zones` per frame: the median over frames of the median of many calls."""
+    """Microseconds of :func:`zones`: the median over frames of the median of calls."""
     return statistics.median(statistics.median(_once(cells, connectivity) for _ in range(REPEATS)) for cells in frames)
 
 
@@ -39,7 +36,7 @@ def _once(cells: np.ndarray, connectivity: int) -> float:
 
 
 def timed(point: Point) -> Point:
-    """The point with the host's time, if the host labels."""
+    """The point with the host's labelling time, if any."""
     task = point.task
     if task.skin.report != "cells":
         return point

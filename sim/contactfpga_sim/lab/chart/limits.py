@@ -1,4 +1,4 @@
-"""Tables for the chart's page: the least error of any method, and other ways to read a sheet."""
+"""The chart page's tables of the least error and of rivals."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from contactfpga_sim.model.scenes.families import touches
 
 PITCHES_MM = (5.0, 6.4, 8.0, 10.0)
 SCENES = 4000
-"""Scenes for each floor."""
 
 KNOWN_MM = 7.0
-"""Radius of the finger whose size is known."""
+"""Radius of a finger of known size."""
 
 CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "finger": ("finger", {}, tuple(COVERS)),
@@ -33,11 +32,10 @@ CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     ),
     "bumper": ("bumper", {}, ("bare", "tiles")),
 }
-"""By name: family, its options, and covers."""
+"""Family, options and covers by name."""
 
 RIVAL_PITCHES_MM = (6.4, 10.0)
 TOUCHES = 300
-"""Touches for each rival."""
 
 
 def floor_table() -> str:
@@ -82,7 +80,7 @@ def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
 
 
 def rivals_table() -> str:
-    """Each rival at two pitches of tiles, for several fingers."""
+    """Rivals at two pitches of tiles, for several fingers."""
     head = (
         "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
         "assumes",

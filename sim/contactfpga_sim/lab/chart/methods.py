@@ -1,4 +1,4 @@
-"""The methods and settings that the chart compares, all on sheets of one extent."""
+"""Methods and settings of the chart, on sheets of one extent."""
 
 from __future__ import annotations
 
@@ -14,16 +14,15 @@ EXTENT_MM = 160.0
 """Width and height of every sheet."""
 
 PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
-"""Pitches, first the one that compares methods."""
+"""Pitches; the first compares methods."""
 
 PITCH_MM = PITCHES_MM[0]
 
 THRESHOLDS_N = (0.2, 0.6, 1.0)
-"""Closing forces of switches, besides the 0.4 N of :data:`contactfpga_sim.lab.covers.DOME`."""
+"""Closing forces besides :data:`contactfpga_sim.lab.covers.DOME`'s 0.4 N."""
 
 MOST_ZONES = 32
-"""Zones per frame of every method, enough for all scenes here. More would need longer row times for `run` and the
-divider on the finest sheets."""
+"""Zones per frame, enough here; more would need longer row times on the finest sheets."""
 
 
 class Method(NamedTuple):
@@ -31,18 +30,18 @@ class Method(NamedTuple):
 
     skin: Skin
     cover: Cover | None
-    """None: a bare sheet, where a switch closes at any force if its middle is under a contact."""
+    """Cover; None is a bare sheet, whose switches close at any force if their middles are under a contact."""
 
 
 def sheet(pitch_mm: float, **settings: Any) -> Skin:
-    """A square sheet of :data:`EXTENT_MM`, 4-connected by default."""
+    """A square sheet of :data:`EXTENT_MM`, by default 4-connected."""
     lines = round(EXTENT_MM / pitch_mm)
     given: dict[str, Any] = {"connectivity": 4, "zone_capacity": MOST_ZONES} | settings
     return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **given)
 
 
 def under(cover: str, name: str, pitch_mm: float, more: str = "", **settings: Any) -> dict[str, Method]:
-    """One method: ``name`` at a pitch under a cover, one of :data:`contactfpga_sim.lab.covers.COVERS`."""
+    """One method: ``name`` at a pitch under one of :data:`contactfpga_sim.lab.covers.COVERS`."""
     whole = f"{name}, {pitch_mm:g} mm, {cover}" + (f", {more}" if more else "")
     return {whole: Method(sheet(pitch_mm, **settings), COVERS[cover](pitch_mm))}
 
@@ -67,7 +66,6 @@ def _methods() -> dict[str, Method]:
 
 
 def _settings() -> dict[str, Method]:
-    """Other ways to label, scan and send, under tiles at :data:`PITCH_MM`."""
     debounced: dict[str, Any] = {"debounce": "sym_defer_pk", "debounce_press_us": 500.0, "debounce_release_us": 500.0}
     ways: list[tuple[str, str, dict[str, Any]]] = [
         ("run", "8-connected", {"connectivity": 8}),
@@ -84,7 +82,6 @@ def _settings() -> dict[str, Method]:
 
 
 def _reversal() -> dict[str, Method]:
-    """Line reversal, at 24 MHz and 12 Mbaud."""
     fast: dict[str, Any] = {
         "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
         "clock_hz": 24_000_000, "baud": 12_000_000,
@@ -98,4 +95,4 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
-"""By name, the plainest first; each has gateware, and its time is from that gateware's golden model."""
+"""Methods by name, the plainest first."""

@@ -1,4 +1,4 @@
-"""The chart's numbers as CSV, a line per point."""
+"""The chart's numbers as CSV."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from contactfpga_sim.lab.chart.times import Times
 
 QUANTILES = ("touch_median_us", "touch_q95_us", "electric_median_us", "electric_q95_us")
 ENDS = ("", "_low", "_high", "_count")
-"""Suffixes of the fields of an interval."""
 ERRORS = tuple(f"{kind}_{name}" for kind in KINDS for name in METRICS)
 SINGLE = ("bytes", "lower_bound_us", "host_us", "luts", "fmax_mhz")
 FIELDS = (
@@ -28,7 +27,7 @@ FIELDS = (
 
 
 def command(point: Point) -> str:
-    """The command that computes this point alone."""
+    """Command that computes this point alone."""
     task = point.task
     return (
         f'contactfpga study chart --method "{task.method}" --family {task.family} --placements {task.count} '
@@ -37,7 +36,7 @@ def command(point: Point) -> str:
 
 
 def write(points: Iterable[Point], path: Path) -> None:
-    """Times in us and errors, each with its 95 % interval, LUT4 and clock on the UP5K."""
+    """A line per point: times in us and errors with intervals, LUT4 and clock on the UP5K."""
     with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, FIELDS, lineterminator="\n")
         table.writeheader()
@@ -73,7 +72,7 @@ def _fields(name: str, found: Interval | Quantile, form: str) -> dict[str, objec
 
 
 def read(path: Path, methods: Mapping[str, Method] = METHODS) -> list[Point]:
-    """The rounded points that :func:`write` wrote; ``methods``: by name."""
+    """The rounded points of :func:`write`."""
     with open(path, newline="", encoding="utf-8") as file:
         return [_point(line, methods) for line in csv.DictReader(file)]
 

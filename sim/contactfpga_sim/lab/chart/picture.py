@@ -1,4 +1,4 @@
-"""The chart as small multiples: a row of panels per family, a column per error."""
+"""The chart: a row of panels per family, a column per error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.covers import COVERS
 
 MARKERS = "sv^oDp"
-"""Markers by pitch, the finest first."""
 
 COLORS = {
     "tiles": style.BLUE,
@@ -31,26 +30,24 @@ COLORS = {
     "other covers": style.PURPLE,
     "model": style.GREEN,
 }
-"""Colors by cover, and of the rivals."""
 
 MISSED = 0.05
-"""Share of missed contacts from which a mark is hollow: its barycenter error is of the found ones only."""
+"""Share of missed contacts that makes a mark hollow: its barycenter error is of found ones."""
 
 LINEAR = 0.01
-"""Limit between the linear scale, which shows 0, and the logarithmic one."""
+"""End of the linear scale, which shows 0, before the logarithmic one."""
 
 SMALL: dict[str, Any] = {"fontsize": style.SMALL}
 
 
 class Metric(NamedTuple):
-    """An error, and how its axis looks."""
+    """An error and its axis."""
 
     name: str
     label: str
     scale: dict[str, Any]
     ticks: tuple[float, ...]
     ends: tuple[float, float]
-    """Ends of the axis, extended if a point is beyond."""
     show: Callable[[float], str]
 
 
@@ -63,10 +60,9 @@ TIMES_US = {
     20_000: "20 ms",
     100_000: "100 ms",
 }
-"""Ticks."""
 
 NEVER_US = 500_000.0
-"""Where a median that is never felt is drawn."""
+"""Place of a median that is never felt."""
 
 ENDS_US = (40.0, 800_000.0)
 ALONG = "first touch of the foam to last byte, median"
@@ -85,7 +81,7 @@ METRICS = (
 
 
 def save(points: Sequence[Point], folder: Path, rivals: Sequence[RivalMethod] = ()) -> None:
-    """``chart.png`` and ``chart.svg`` in a folder; the same points give the same files."""
+    """Write ``chart.png`` and ``chart.svg``; equal points give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = picture(points, rivals)
         for suffix in ("png", "svg"):
@@ -93,7 +89,7 @@ def save(points: Sequence[Point], folder: Path, rivals: Sequence[RivalMethod] = 
 
 
 def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figure:
-    """All points, a row of panels for each family."""
+    """All points, a row per family."""
     families = list(dict.fromkeys(point.task.family for point in points))
     figure = style.new(2.2 * len(families) + 1.3)
     panels = figure.subplots(len(families), len(METRICS), sharex=True, sharey="col", squeeze=False)
@@ -106,7 +102,7 @@ def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figu
 
 
 def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[RivalMethod]) -> None:
-    """One error of one family, on axes that hold all points."""
+    """One error of one family."""
     _axes(panel, points, metric)
     panel.set_xlabel(ALONG)
     some = [point for point in points if point.task.family == family]
@@ -125,12 +121,12 @@ def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rival
 
 
 def error(point: Point, name: str) -> float:
-    """Mean error of the method's zones against the contacts."""
+    """Mean error of the method's zones against contacts."""
     return point.errors["total"][name].mean
 
 
 def cover_of(method: str) -> str:
-    """The key of :data:`COLORS` for a method's name."""
+    """Key of :data:`COLORS` for a method's name."""
     return next((name for name in COVERS if name in method.split(", ")), "other covers")
 
 
@@ -140,7 +136,7 @@ def hollow(point: Point) -> bool:
 
 
 def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
-    """Axis ends, extended to hold all values."""
+    """Axis ends, extended to all values."""
     finite = [value for value in values if math.isfinite(value)]
     least, most = min(finite, default=usual[0]), max(finite, default=usual[1])
     return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)
@@ -157,7 +153,6 @@ def _along(us: float) -> float:
 
 
 def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
-    """Set the axes alike for all families."""
     never = any(math.isinf(reached_us(point)) for point in points)
     ticks = TIMES_US | ({NEVER_US: "never"} if never else {})
     panel.set_xscale("log")
@@ -177,7 +172,6 @@ def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
 
 
 def _walls(panel: Any, metric: Metric, some: Sequence[Point], method: str) -> None:
-    """Draw the bits' time and the least error on the best cells."""
     wall: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.4, "linestyle": style.DASHES[1], "zorder": 2}
     if math.isfinite(least := bits_us(some)):
         panel.axvline(least, **wall)

@@ -1,8 +1,5 @@
-"""Other sensors as models under the same mechanics: no real device was measured.
-
-Each sees the same scenes through the same cover. Readings of analog elements, microcontroller times and part costs are
-assumptions, named here.
-"""
+"""Models of other sensors under the same mechanics. No device was measured: readings of analog elements,
+microcontroller times and part costs are assumptions."""
 
 from __future__ import annotations
 
@@ -24,29 +21,27 @@ from contactfpga_sim.model.scenes.scene import Scene
 
 Random = np.random.Generator
 Readings = Callable[[Scene, float, Skin, Cover | None, Random], np.ndarray]
-"""(R, C) readings of a scene at a time in s, above 0 where an element is touched."""
+"""(R, C) readings at a time in s, above 0 where touched."""
 
 STRIPS = 4
 """Groups of rows, each read at the middle of its time."""
 
 HALVINGS = 14
-"""Bisections of the rise time to find the first touched element."""
 
 # ---- an analog array
 
 BITS = 8
 FULL_N = 10.0
-"""Force on an element at full scale."""
 NOISE_COUNTS = 1.0
-"""Standard deviation of a reading, in converter steps."""
+"""Standard deviation in converter steps."""
 CROSSTALK = 0.01
-"""Share of an element's force that each of its four neighbors reads."""
+"""Share of a force read by each of four neighbors."""
 GAIN_SPREAD = 0.05
 """Relative standard deviation of calibrated gains."""
 THRESHOLD_N = 0.4
-"""Force from which an element is touched: the closing force of the studies' domes."""
+"""Force that touches an element, the closing force of the studies' domes."""
 HEAD_BYTES = 4
-"""Header of an array's frame, before a byte per element."""
+"""Header of an array's frame, which has a byte per element."""
 
 # ---- a microcontroller: 64 pins, about 50 of them for lines; USB is full speed
 
@@ -56,7 +51,7 @@ ROW_CYCLES = 60
 CELL_CYCLES = 15
 """Cycles to store and label a cell in software."""
 SEND_CYCLES = 500
-"""Cycles to make a frame and hand it to the UART or USB peripheral, which sends during the next scan."""
+"""Cycles to make a frame for UART or USB, which send during the next scan."""
 USB_SLOT_US, USB_BIT_US = 1000.0, 1 / 12
 
 # ---- rough prices of parts in USD, boards and the elements themselves not counted: assumed, no offers
@@ -67,18 +62,16 @@ DIODE_USD, AMPLIFIER_USD = 0.02, 0.8
 
 @dataclasses.dataclass(frozen=True)
 class Pace:
-    """Times in us of a method on a sheet; scans repeat, and the newest ready one is sent."""
+    """Times in us; scans repeat, and the newest ready one is sent."""
 
     scan_us: float
-    """From the first row to the last, evenly spread."""
+    """Time from first row to last, evenly spread."""
     work_us: float
     """Time from a scan's end until its frame is ready."""
     loop_us: float
-    """Scan period."""
     wire_us: float
-    """Time of a frame on the wire."""
     slot_us: float = 0.0
-    """Interval between instants for sending; 0: any."""
+    """Interval of sending instants; 0: any."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,29 +79,26 @@ class Rival:
     """A model of another kind of sensor."""
 
     note: str
-    """Assumptions of the model."""
     readings: Readings
     pace: Callable[[Skin], Pace]
     cost_usd: Callable[[Skin], float]
-    """Rough cost of parts."""
 
     def wires(self, skin: Skin) -> int:
-        """Number of the sheet's lines."""
+        """Lines of the sheet."""
         return skin.rows + skin.columns
 
     def zones(self, scene: Scene, skin: Skin, cover: Cover | None) -> list[Blob]:
-        """Zones found once all forces have risen; the scene seeds the noise."""
+        """Zones once all forces have risen; the scene seeds the noise."""
         rng = np.random.default_rng(zlib.crc32(repr(scene).encode()))
         return _blobs(self.readings(scene, scene.settled_s, skin, cover, rng), skin)
 
     def errors(self, scene: Scene, skin: Skin, cover: Cover | None) -> errors.Errors:
-        """Errors against the contacts at that time."""
         there = errors.contacts(scene.truth(scene.settled_s, skin))
         return errors.errors(self.zones(scene, skin, cover), there)
 
     def time_us(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
-        """Time from the first touch of the foam, at 0 s of a scene with rising forces, to the last byte of the first
-        frame that reports a contact; infinite if none does. ``rng`` draws the scan's phase."""
+        """Time from the foam's first touch, at 0 s of a scene with rising forces, to the last byte of the first
+        frame with a contact; infinite if none. ``rng`` draws the scan's phase."""
         first_s = self._first_s(scene, skin, cover, rng)
         if not math.isfinite(first_s):
             return math.inf
@@ -145,7 +135,6 @@ class Rival:
     def _scanned(
         self, scene: Scene, begin_us: float, scan_us: float, skin: Skin, cover: Cover | None, rng: Random
     ) -> np.ndarray:
-        """(R, C) readings of a scan from ``begin_us``."""
         found = np.zeros((skin.rows, skin.columns))
         for number, rows in enumerate(np.array_split(np.arange(skin.rows), STRIPS)):
             seconds = (begin_us + (number + 0.5) / STRIPS * scan_us) * 1e-6
@@ -155,7 +144,6 @@ class Rival:
 
 
 def _blobs(readings: np.ndarray, skin: Skin) -> list[Blob]:
-    """Connected pieces of touched elements, with barycenters weighted by the readings."""
     numbers = labels.label(readings > 0, skin.connectivity).ravel()
     count = int(numbers.max(initial=0))
     rows, columns = (axis.ravel() for axis in np.indices(readings.shape))
@@ -167,7 +155,7 @@ def _blobs(readings: np.ndarray, skin: Skin) -> list[Blob]:
 
 
 def switches(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
-    """1 for a closed switch. A bare sheet knows no force: all contacts close at the touch."""
+    """1 for a closed switch. On a bare sheet, all contacts close at the touch."""
     bare = cover is None or cover.model == "patch"
     return scene.pressed(scene.settled_s if bare else seconds, skin, cover).astype(float)
 
@@ -175,7 +163,7 @@ def switches(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng:
 def analog(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: Random) -> np.ndarray:
     """Converter steps of each element, 0 below the threshold.
 
-    An element takes the force of a switch's face or cap, and is rigid. On a bare sheet the elements are adjacent.
+    A rigid element takes the force of a switch's face or cap. On a bare sheet elements are adjacent.
     """
     taken = cells_of(_elements(skin, cover), skin.rows, skin.columns, skin.pitch_x_mm * 1e-3, skin.pitch_y_mm * 1e-3)
     forces = taken.forces_n(scene.loads(seconds)) * _gains(skin.rows, skin.columns)
@@ -199,7 +187,6 @@ def _gains(rows: int, columns: int) -> np.ndarray:
 
 
 def _array_pace(rate_hz: float, skin: Skin) -> Pace:
-    """Pace of an array; a slow wire lowers the frame rate."""
     wire = 10e6 * (HEAD_BYTES + skin.rows * skin.columns) / skin.baud
     return Pace(1e6 / rate_hz, 0.0, max(1e6 / rate_hz, wire), wire)
 
@@ -222,7 +209,6 @@ def _mcu_usd(skin: Skin) -> float:
 
 
 def _cells_pace(skin: Skin) -> Pace:
-    """Pace of a board that sends plain rows; the host labels after the last byte."""
     sent = skin.replace(report="cells")
     derived = sent.derived
     scan = 1e6 * derived.frame_clocks / sent.clock_hz
@@ -234,7 +220,7 @@ def _cells_usd(skin: Skin) -> float:
 
 
 def frame_bytes(skin: Skin, items: int) -> int:
-    """Bytes of a frame with this many items in our protocol, which a microcontroller may use as well."""
+    """Bytes of a frame with this many items in our protocol."""
     plain = items * skin.derived.item_bytes + skin.derived.trailer_bytes
     return plain + math.ceil(plain / 254) + CHECK_BYTES + 1
 
@@ -267,4 +253,3 @@ RIVALS: dict[str, Rival] = {
         _cells_usd,
     ),
 }
-"""By name."""

@@ -1,7 +1,5 @@
-"""Times by the golden model, a sample also by the gateware.
-
-From the touch to the last byte of its complete frame; for a constant scene, frame time and frame rate.
-"""
+"""Times by the golden model, a sample also by the gateware: from a touch to its complete frame's last byte; frame
+time and rate of a constant scene."""
 
 from __future__ import annotations
 
@@ -21,17 +19,15 @@ from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 
 FRAMES = 12
-"""Frames that measure the rate."""
 
 WARM_US = 1500.0
-"""Time after power-up by which the first hello is sent and the link works."""
+"""Time after power-up by which the link works."""
 
 
 def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
-    """Clocks from a frame's first row time to the end of its last byte, with nothing else on the wire.
+    """Clocks from a frame's first row time to its last byte, with nothing else on the wire.
 
-    ``cells``: (R, C) bool, pressed from the start; ``size``: bytes of their frame, which the keep-alive sends
-    unchanged.
+    ``cells``: (R, C) bool, pressed from the start; ``size``: bytes of their frame, which the keep-alive repeats.
     """
     if skin.derived.scan.waits:
         return _asked_clocks(skin, cells)
@@ -45,7 +41,7 @@ def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
 
 
 def _asked_clocks(skin: Skin, cells: np.ndarray) -> int:
-    """:func:`frame_clocks` for a requested frame of a waiting scan."""
+    """:func:`frame_clocks` of a requested frame of a waiting scan."""
     quiet = skin.replace(send="on_change")
     asked = round(WARM_US * skin.clock_hz / 1e6)
     received = requests([asked], skin.derived.bit_clocks)
@@ -59,20 +55,18 @@ def _asked_clocks(skin: Skin, cells: np.ndarray) -> int:
 
 
 def frames_per_second(skin: Skin, cells: np.ndarray, size: int) -> float:
-    """Frames of ``size`` bytes per second while (R, C) bool ``cells`` are pressed."""
+    """Frames of ``size`` bytes per second with (R, C) bool ``cells`` pressed."""
     held = _held(skin.replace(send="always"), cells, (FRAMES + 4) * _longest(skin, size))
     ends = [got.last for got in held][-FRAMES - 1 :]
     return (len(ends) - 1) * skin.clock_hz / (ends[-1] - ends[0])
 
 
 def _longest(skin: Skin, size: int) -> int:
-    """Most clocks of a frame, scan and wire."""
     derived = skin.derived
     return derived.frame_clocks + 10 * derived.bit_clocks * size
 
 
 def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[ReceivedFrame]:
-    """Frames of a board with ``cells`` pressed from the start, after hello and debounce."""
     debounce_us = skin.debounce_press_us if skin.debounce != "none" else 0.0
     settled = round(max(debounce_us, WARM_US) * skin.clock_hz / 1e6)
     trace = predict(skin, Timeline([(0, cells, None)]), settled + clocks)
@@ -80,29 +74,25 @@ def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[ReceivedFrame]:
 
 
 STEADY = 12
-"""Scenes that are also measured while constant."""
 
 MOST_SCANS = 4000
-"""Most scans until a touch is reported."""
 
 GOLDEN = 0.6180339887498949
-"""Golden ratio: its multiples sample a scan evenly, whatever their number."""
+"""Golden ratio, whose multiples sample a scan evenly."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Speed:
-    """Times in us."""
+    """Times of a method, in us."""
 
     median_us: float
     worst_us: float
     bound_us: float
-    """Median lower bound of scans that visit touched rows alone: (A + 1) row times, and the frame's bits."""
+    """Median bound of scans of touched rows alone: (A + 1) row times, and the frame's bits."""
     bytes: float
-    """Median number of bytes of the frame."""
     frame_us: float
     """Median time from a frame's first row time to its last byte, for a constant scene."""
     frames_per_s: float
-    """Median frame rate of a constant scene."""
 
 
 def touch_cycle(skin: Skin, share: float) -> int:
@@ -112,11 +102,10 @@ def touch_cycle(skin: Skin, share: float) -> int:
 
 
 def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> tuple[int, int]:
-    """Clocks from the touch to the end of the first frame with all these (R, C) bool cells, which close at once after
+    """Clocks from a touch to the end of the first frame with all these (R, C) bool cells, which close at once after
     ``share`` of a scan; and the frame's bytes.
 
-    With ``check`` the compiled gateware must agree, else :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is
-    raised.
+    With ``check`` the compiled gateware must agree, else :class:`~contactfpga_sim.verify.cosim.compare.Mismatch`.
     """
     whole = int(cells.sum())
     return _until(skin, [(0, cells)], share, lambda frame: frame.cells == whole, check)
@@ -125,8 +114,8 @@ def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> t
 def first_report(
     skin: Skin, pieces: Sequence[tuple[int, np.ndarray]], share: float, check: bool = False
 ) -> tuple[int, int]:
-    """Clocks to the end of the first frame with any cell, and its bytes. ``pieces``: (clocks after the touch, rising
-    from 0, (R, C) bool closed cells); ``check`` as in :func:`touch`."""
+    """Clocks to the end of the first frame with any cell, and its bytes. ``pieces``: (rising clocks after the touch,
+    (R, C) bool closed cells); ``check`` as in :func:`touch`."""
     return _until(skin, pieces, share, lambda frame: frame.cells > 0, check)
 
 
@@ -149,10 +138,9 @@ def _until(
 
 
 def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
-    """Speed over the touches of (R, C) bool frames, each at another phase of the scan.
+    """Speed over touches of (R, C) bool frames, each at another phase.
 
-    The first ``checked`` also go through the compiled gateware; raises
-    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` if it differs.
+    The first ``checked`` also go through the gateware, as in :func:`touch`.
     """
     derived = skin.derived
     us = skin.clock_hz / 1e6

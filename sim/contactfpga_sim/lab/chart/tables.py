@@ -1,4 +1,4 @@
-"""The tables of the chart's page."""
+"""Tables of the chart's page."""
 
 from __future__ import annotations
 
@@ -16,16 +16,14 @@ from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
 
 NUMBERS = Path("docs/chart/chart.csv")
-"""File of the numbers of the page's chart."""
 
 PLACEMENTS = 400
-"""Scenes per point."""
 
 SHEETS = (16, 32, 64)
 
 
 def compute() -> list[Point]:
-    """Every point of the chart, from its CSV file."""
+    """The chart's points, by way of its CSV file."""
     tasks = [
         Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
     ]
@@ -50,12 +48,10 @@ HEAD = (
     "barycenter of found",
     "area of found",
 )
-"""Headings of a point's cells."""
 
 
 def front_table(points: list[Point]) -> str:
-    """The methods to build over all families; then per family the covered methods that are Pareto-optimal in time and
-    miscounted scenes."""
+    """Methods to build, then per family the covered methods that are Pareto-optimal in time and miscounts."""
     lines = []
     method = to_build(points)
     for family in dict.fromkeys(point.task.family for point in points):
@@ -78,7 +74,7 @@ def methods_table(points: list[Point]) -> str:
 
 
 def families_table(points: list[Point]) -> str:
-    """Miscounted scenes and missed contacts by family; methods with equal cells and results share a line."""
+    """Miscounts and missed contacts by family; equal methods share a line."""
     families = list(dict.fromkeys(point.task.family for point in points))
     by = {(point.task.method, point.task.family): point for point in points}
     lines: dict[object, str] = {}
@@ -96,7 +92,6 @@ def _name(point: Point, build: str) -> str:
 
 
 def _cells(point: Point) -> tuple[str, ...]:
-    """Cells under :data:`HEAD`."""
     found, times = point.errors["total"], point.times
     electric = [f"{one.value + point.host_us:.0f}" for one in (times.electric_median_us, times.electric_q95_us)]
     touch = " / ".join(_ms(one.value + point.host_us) for one in (times.touch_median_us, times.touch_q95_us))
@@ -122,7 +117,7 @@ def _percent(share: Interval) -> str:
 
 
 def host_table() -> str:
-    """Board zones against host-labelled cells: by sheet and number of touches."""
+    """Board zones against host-labelled cells, by sheet and touches."""
     head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
     lines = []
     for size in SHEETS:
@@ -136,7 +131,6 @@ def host_table() -> str:
 
 
 def _later(skin: Skin, count: int) -> float:
-    """Microseconds by which the board's zones of this many contacts are later than the host's."""
     cells = _contacts(skin, count)
     return _frame(skin, cells)[0] - _frame(skin.replace(report="cells"), cells)[0] - host.label_us([cells], 8)
 
@@ -152,7 +146,6 @@ def _rival_line(skin: Skin, count: int) -> str:
 
 
 def _contacts(skin: Skin, count: int) -> np.ndarray:
-    """(R, C) bool: isolated switches, spread over the sheet."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     rows, columns = (skin.rows + 1) // 2, (skin.columns + 1) // 2
     chosen = np.linspace(0, rows * columns - 1, count).round().astype(int)
@@ -161,6 +154,6 @@ def _contacts(skin: Skin, count: int) -> np.ndarray:
 
 
 def _frame(skin: Skin, cells: np.ndarray) -> tuple[float, int]:
-    """Time in us from a frame's first row time to its last byte, and its bytes."""
+    """Microseconds from first row time to last byte, and bytes."""
     _, size = speed.touch(skin, cells, 0.5)
     return speed.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size

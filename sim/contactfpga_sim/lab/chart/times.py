@@ -1,7 +1,6 @@
-"""From the first touch of the foam to the last byte of the first frame that reports a contact.
+"""Times from the foam's first touch to the last byte of the first frame that reports a contact.
 
-Mechanics: switches close as the force rises. Electronics: the golden model from the first closed switch on, at a random
-phase of the scan.
+Switches close as force rises; from the first closed one on, the golden model counts, at a random phase of the scan.
 """
 
 from __future__ import annotations
@@ -20,16 +19,15 @@ from contactfpga_sim.lab.chart.errors import Interval, Quantile
 from contactfpga_sim.model.scenes.scene import Scene
 
 HALVINGS = 14
-"""Bisections of the rise time to find the first closed switch: to 12 us for 200 ms."""
+"""Bisections of the rise time: to 12 us for 200 ms."""
 
 LOOKS_S = (0.0, 1e-4, 2e-4, 4e-4, 8e-4)
-"""Times after the first closed switch at which closed cells are sampled."""
+"""Sampling times after the first closed switch."""
 
 Closing = tuple[float, list[tuple[float, np.ndarray]]]
-"""Time in s of the first closed switch after the touch, and (R, C) bool cells by seconds after it."""
+"""Seconds from touch to first closed switch, and (R, C) bool cells by seconds after it."""
 
 Raw = dict[str, list[float]]
-"""A value per touch, by name of a time."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,21 +35,19 @@ class Times:
     """Times of a method's touches, in us."""
 
     touch_median_us: Quantile
-    """From the first touch of the foam; an unreported touch counts as infinite."""
+    """Time from the foam's first touch; unreported touches count as infinite."""
     touch_q95_us: Quantile
     electric_median_us: Quantile
-    """From the first closed switch, over touches that close one."""
+    """Time from the first closed switch, over touches that close one."""
     electric_q95_us: Quantile
     not_felt: Interval
     """Share of touches that close no switch."""
     bytes: float
-    """Median bytes of the first frame."""
     lower_bound_us: float
-    """Time of these bytes' bits."""
 
 
 def at_once(cover: Cover | None) -> bool:
-    """Whether this is a bare sheet: without force, all of a contact closes at the touch."""
+    """Whether all of a contact closes at the touch: on a bare sheet, without force."""
     return cover is None or cover.model == "patch"
 
 
@@ -75,8 +71,8 @@ def closing(scene: Scene, skin: Skin, cover: Cover | None) -> Closing | None:
 
 
 def measured(scenes: Sequence[Scene], skin: Skin, cover: Cover | None, first: int, checked: int) -> Raw:
-    """Times of touches numbered from ``first`` on; those below ``checked`` also go through the compiled gateware, which
-    must agree in every clock, else :class:`contactfpga_sim.verify.cosim.compare.Mismatch` is raised."""
+    """Times of touches from number ``first``; for those below ``checked`` the compiled gateware must agree in every
+    clock, else :class:`~contactfpga_sim.verify.cosim.compare.Mismatch`."""
     found: Raw = {"touch": [], "electric": [], "bytes": []}
     for number, scene in enumerate(scenes, first):
         values = (math.inf, math.nan, math.nan)

@@ -1,4 +1,4 @@
-"""Cost of mechanics and of electronics: a line per method, for one family."""
+"""Cost of mechanics and electronics by method, for one family."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ PARTS = {
     "from the first closed switch": style.ORANGE,
     "from the first touch of the foam": style.BLUE,
 }
-"""What each line shows, by color."""
 
 
 TITLE = f"{FAMILY}, to the last byte of the first frame with a contact: median, and a line to the 95 % quantile"
 
 
 def save(points: Sequence[Point], path: Path) -> Path:
-    """Draw the points of one family; the same points give the same file."""
+    """Draw one family's points; equal points give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture([point for point in points if point.task.family == FAMILY]), path)
 

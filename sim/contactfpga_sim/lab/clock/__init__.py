@@ -1,1 +1,1 @@
-"""Board time on the host's clock, over simulated transports."""
+"""Board time on the host's clock."""

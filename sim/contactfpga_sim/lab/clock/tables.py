@@ -1,4 +1,4 @@
-"""Board time on the host's clock, over simulated transports: the fit's errors, and the table of docs/clock.md."""
+"""Board time on the host's clock over simulated transports, for docs/clock.md."""
 
 from __future__ import annotations
 
@@ -13,33 +13,30 @@ from contactfpga.driver.clock import ClockFit
 from contactfpga_sim.lab import writer
 
 SECONDS, SEEDS = 60.0, 8
-"""Device time of each run, and number of runs."""
 WANDER_PPM, WANDER_S = 1.0, 60.0
-"""Swing of a crystal's rate with temperature, and its period."""
+"""Swing of a crystal's rate with temperature, and period."""
 SENT_S = 150e-6
-"""From the sample of a frame's first row to its last byte on the wire, WIRE_S of it for its bytes."""
+"""Time from the sample of the first row to the last byte, with WIRE_S for bytes."""
 WIRE_S = 57e-6
 REQUEST_S, SCAN_S = 30e-6, 100e-6
-"""Time of a request on the wire, and its longest wait for the next scan."""
+"""Request on the wire, and longest wait for a scan."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Path:
-    """Path of bytes from the wire to the program."""
+    """Way of bytes from the wire to the program."""
 
     title: str
     tick_s: float
     """Delivery period to the program."""
     out_tick_s: float
-    """Delivery period of requests to the board."""
+    """Delivery period to the board."""
     jitter_s: float
-    """Mean delay of the host, exponentially distributed."""
+    """Mean host delay, exponentially distributed."""
     rate_hz: float = 1000.0
-    """Frames per second."""
     asked_s: float = 1.0
-    """Interval of requests."""
     stall: float = 0.0
-    """Share of frames delayed by another 20 ms because the host is busy."""
+    """Share of frames 20 ms late because the host is busy."""
 
 
 PATHS = {
@@ -54,18 +51,18 @@ PATHS = {
 
 
 class Moment(NamedTuple):
-    """One frame."""
+    """One frame on its way."""
 
     time_us: int
     arrived_s: float
     sampled_s: float
     """True sample time on the host's clock."""
     asked_s: float | None
-    """Sending time of the request that it answers first."""
+    """Sending time of the request it answers first."""
 
 
 class FrameTimes(NamedTuple):
-    """Fitted times of frames, and the truth."""
+    """Fitted and true times of frames."""
 
     found_s: np.ndarray
     sigma_s: np.ndarray
@@ -74,12 +71,11 @@ class FrameTimes(NamedTuple):
 
     @property
     def errors_s(self) -> np.ndarray:
-        """Error of each frame."""
         return self.found_s - self.sampled_s
 
 
 def moments(path: Path, ppm: float, seed: int, seconds: float = SECONDS) -> Iterator[Moment]:
-    """Frames of a board whose clock is off by ``ppm``, as they arrive."""
+    """Frames of a board whose clock is off by ``ppm``."""
     rng = random.Random(seed)
     base_s, phase_s = rng.uniform(0, 1000), rng.uniform(0, path.tick_s)
     device_s = np.arange(1 / path.rate_hz, seconds, 1 / path.rate_hz)
@@ -111,22 +107,20 @@ def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTime
 
 
 class Accuracy(NamedTuple):
-    """Errors over all runs of a path, without each first second; times in s."""
+    """Errors over all runs of a path, without each first second."""
 
     late_s: float
-    """Mean delay from sample to arrival."""
     error_s: float
     """Median magnitude of the error."""
     worst_s: float
-    """99 % of errors are at most this."""
+    """99 % quantile of the error."""
     sigma_s: float
-    """Median stated uncertainty."""
     within: float
     """Share of errors within two stated uncertainties."""
 
 
 def accuracy(path: Path, seeds: int = SEEDS, seconds: float = SECONDS) -> Accuracy:
-    """Accuracy over clocks that are off by -80 to 80 ppm."""
+    """Accuracy over clocks off by -80 to 80 ppm."""
     runs = []
     for seed in range(seeds):
         ppm = -80 + 160 * seed / max(1, seeds - 1)
@@ -160,5 +154,5 @@ def accuracy_table(names: Iterable[str] = PATHS) -> str:
 
 
 def slow_sample() -> str:
-    """One row of :func:`accuracy_table`."""
+    """A row of :func:`accuracy_table`."""
     return accuracy_table(("slow",)).splitlines()[-1]

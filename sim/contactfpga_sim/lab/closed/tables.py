@@ -1,4 +1,4 @@
-"""Measures the cost of joining zones over the seam of a closed sheet, and writes it into docs/labelling.md."""
+"""Cost of zones over the seam of a closed sheet, for docs/labelling.md."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contactfpga_sim.model.golden import volume
 
 CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]
 COLUMNS = 8
-"""Columns of the sheet whose every last two rows are tried."""
+"""Columns whose last two rows are all tried."""
 AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": True}
 
 
@@ -26,7 +26,7 @@ def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> 
 
 
 def clocks_table() -> str:
-    """The time of the last record over every pair of last rows, and bounds."""
+    """Time of the last record over all last rows, and bounds."""
     head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
     bounds = [f"bound of {lines} columns" for lines in size.SIZES]
     rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))
@@ -43,12 +43,12 @@ def size_table() -> str:
 
 
 def names(labeller: Labeller, connectivity: int) -> tuple[str, str]:
-    """The first cells of a line."""
+    """First cells of a line."""
     return f"`{labeller.title}`", str(connectivity)
 
 
 def worst(labeller: Labeller, connectivity: int) -> list[str]:
-    """Most clocks from the last row to the last record over all last two rows, of an open and a closed sheet."""
+    """Most clocks from the last row to the last record over all last two rows, open and closed."""
     cells = 2 * COLUMNS
     numbers = np.arange(1 << cells)[:, None] >> np.arange(cells) & 1
     frames = numbers.astype(bool).reshape(-1, 2, COLUMNS)
@@ -57,18 +57,18 @@ def worst(labeller: Labeller, connectivity: int) -> list[str]:
 
 
 def most(labeller: Labeller, connectivity: int) -> list[str]:
-    """Bound for every closed sheet: the end mark is a clock later."""
+    """Bound for every closed sheet, whose end mark is a clock later."""
     skins = (skin_of(lines, connectivity, labeller, True) for lines in size.SIZES)
     return [str(skin.derived.label_clocks - 1) for skin in skins]
 
 
 def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:
-    """LUT4 on an iCE40UP5K of an open and a closed sheet."""
+    """LUT4 on an iCE40UP5K, open and closed."""
     skins = (skin_of(lines, connectivity, labeller, closed) for closed in (False, True))
     return [f"{size.luts(functools.partial(labeller.load_gateware(), skin), sizes.UP5K):,}" for skin in skins]
 
 
 def clocks_sample() -> str:
-    """One row of :func:`clocks_table`."""
+    """First row of :func:`clocks_table`."""
     labeller = LABELLERS["run"]
     return writer.line((*names(labeller, 8), *worst(labeller, 8), *most(labeller, 8)))

@@ -1,7 +1,4 @@
-"""Light fingers on each arrangement of foam on switches: tables and picture of the cover's first part.
-
-Switch force, finger and sheet are fixed; foam, faces and caps differ.
-"""
+"""Light fingers on foam over switches, for docs/cover.md: foam, faces and caps differ."""
 
 from __future__ import annotations
 
@@ -25,16 +22,13 @@ from contactfpga_sim.lab.cover.elements import FoamOnCaps
 PITCHES_MM = (10.0, 6.4)
 FORCES_N = (1.0, 0.4)
 LINES = 16
-"""Rows and columns of the sheet."""
 
 PLACES = 1000
-"""Places of the finger."""
 
 PROUD_MM = 0.5
-"""Height of caps above their surroundings, into which foam may sag."""
+"""Height of proud caps, into which foam may sag."""
 
 FLUSH = 0.8
-"""Side of a flush cap over the pitch."""
 
 
 def _flush_face(pitch_mm: float, force_n: float) -> Cover:
@@ -71,14 +65,14 @@ KINDS = {
 
 
 def felt_table() -> str:
-    """Smallest felt finger forces, by pitch, kind of cover and switch force."""
+    """Smallest felt forces, by pitch, cover and switch."""
     head = ["pitch", "what the foam presses", "one switch takes, least"]
     head += [f"{force:g} N switch: {what}" for force in FORCES_N for what in ("50 %", "99 %", "worst")]
     return writer.table_of([head, *(_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS))])
 
 
 def felt_sample() -> str:
-    """The fastest line of :func:`felt_table`."""
+    """Fastest line of :func:`felt_table`."""
     return writer.line(_row(PITCHES_MM[-1], list(KINDS)[-1]))
 
 
@@ -98,11 +92,11 @@ def _newtons(force: Force | NoSolution) -> str:
 THICKNESSES_MM, SIDES_MM = (2.0, 5.0), (4.0, 6.0, 8.0, 9.0)
 SOFT_N_MM = covers.DOME.force_n / (1e3 * covers.DOME.travel_m)
 PLACES_MM = ((45.0, 45.0), (40.0, 45.0), (40.0, 40.0), (42.0, 43.0))
-"""On a cap, between two, between four and aside, from the corner of 8x8 caps at 10 mm pitch."""
+"""Places on a cap, between two, between four and aside, from the corner of 8x8 caps at 10 mm."""
 
 
 def elements_table() -> str:
-    """Deviation of the largest switch force from the boundary elements', at the worst of four places."""
+    """Deviation of the largest switch force from boundary elements, at the worst place."""
     head = ["foam", "cap, pitch 10 mm", "flush, rigid", "proud, rigid", f"proud, on {SOFT_N_MM:g} N/mm"]
     rows = [head]
     for thickness, side in itertools.product(THICKNESSES_MM, SIDES_MM):
@@ -115,7 +109,6 @@ def elements_table() -> str:
 
 
 def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> float:
-    """The error with the largest magnitude."""
     foam = FoamOnCaps(thickness_mm, side_mm, stiffness=stiffness, proud=proud)
     switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
     cells = Cells(
@@ -133,7 +126,7 @@ def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> 
 
 
 def sagging_n(cover: Cover, pitch_m: float, proud_m: float = PROUD_MM * 1e-3) -> float:
-    """The finger's force in N at which foam sags by ``proud_m`` midway between two caps.
+    """Force in N of the finger at which foam sags by ``proud_m`` midway between two caps.
 
     A strip clamped at both caps (Timoshenko) under the finger's mean pressure: w/p = 6/5 g^2/(8 G h) + (1 - nu^2)
     g^4/(32 E h^3).
@@ -165,7 +158,7 @@ _SHORT = ("flush face", "flush cap", "proud button", "proud caps, whole foam", "
 
 
 def draw(path: Path) -> Path:
-    """Cross sections of three covers, and the felt force along the diagonal between switches."""
+    """Cross sections of covers, and felt force along the diagonal."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(4.4)
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
@@ -175,7 +168,6 @@ def draw(path: Path) -> Path:
 
 
 def _sections(place: Any) -> None:
-    """Three stacked sketches; lengths in mm, widened upward."""
     for number, (name, proud, cut) in enumerate(
         (
             ("flush: the base carries most", False, False),
@@ -228,7 +220,6 @@ def _diagonal(place: Any) -> None:
 
 
 def _felt_along(cover: Cover, pitch_mm: float, along_mm: np.ndarray) -> Iterator[float]:
-    """Felt forces in N with the finger this far from a switch along the diagonal."""
     cells = Cells(cover, 10, 10, pitch_mm * 1e-3, pitch_mm * 1e-3)
     for away in along_mm:
         place = 4 * pitch_mm * 1e-3 + away * 1e-3 / math.sqrt(2)

@@ -12,14 +12,13 @@ import numpy as np
 from contactfpga.design.cover.numerics import Floats
 
 STEP = 0.5
-"""Side of an element."""
 
 
 class FoamOnCaps:
     """A layer of ``thickness`` over ``count`` by ``count`` square caps of ``side``, ``pitch`` apart.
 
-    ``stiffness``: N/mm of the switch under each cap; inf: rigid. ``proud``: the foam hangs free between the caps; else
-    it is on a rigid base there.
+    ``stiffness``: N/mm of the switch under each cap; inf: rigid. ``proud``: the foam hangs free between caps; else it
+    is on a rigid base.
     """
 
     def __init__(
@@ -63,8 +62,7 @@ class FoamOnCaps:
         return np.asarray(total, float).reshape(self.count, self.count)
 
     def _solved(self, pressure: Floats) -> Floats:
-        """The pressure below, by conjugate gradients: supported elements move together, except for yielding
-        switches."""
+        """The pressure below, by conjugate gradients."""
         below = np.where(self.held, pressure.sum() / self.held.sum(), 0.0)
         rest = self._free(self._moves(pressure, below) - self._given(below))
         step, size = rest.copy(), (rest**2).sum()
@@ -84,7 +82,6 @@ class FoamOnCaps:
         return np.where(self.held, moved - moved[self.held].mean(), 0.0)
 
     def _moves(self, above: Floats, below: Floats) -> Floats:
-        """Displacement of the lower face, downward."""
         top, bottom = np.fft.fft2(above), np.fft.fft2(below)
         return np.fft.ifft2(self.opposite * (top - bottom) / 2 - self.equal * (top + bottom) / 2).real
 

@@ -1,7 +1,4 @@
-"""Speed against accuracy of the cover's formulas.
-
-Times are of this machine. Failing rules are only here.
-"""
+"""Speed against accuracy of the cover's formulas, with rules that fail. Times are of this machine."""
 
 from __future__ import annotations
 
@@ -21,10 +18,10 @@ from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import LADDER, Model, PaddedSheet
 
 FLOOR = 1e-13
-"""Errors below this are the reference's own, and are written as "less than"."""
+"""Errors below this are the reference's own."""
 
 STALLED = 200_000
-"""Steps after which Euler's method is abandoned."""
+"""Steps after which Euler's method gives up."""
 
 
 class Blow(NamedTuple):
@@ -108,7 +105,7 @@ def _off_factored(share: float) -> Rule:
 
 
 def _euler(step_share: float) -> Rule:
-    """Explicit time steps on v = sqrt(v^2(delta)), which never start from rest."""
+    """Explicit steps on v = sqrt(v^2(delta)), which never start from rest."""
 
     def rule(blow: Blow) -> float:
         depth, step, count, end = 0.0, step_share * blow.depth_m / max(blow.speed_m_s, 0.1), 0, blow.depth_m
@@ -172,13 +169,13 @@ FAILING: dict[str, Rule] = {
 
 
 def relative_errors(rule: Rule) -> list[float]:
-    """Relative error of a rule for each of :data:`BLOWS`; NaN without a result."""
+    """Relative errors of a rule over :data:`BLOWS`; NaN without a result."""
     with np.errstate(all="ignore"):
         return [rule(blow) / _adaptive(blow) - 1 for blow in BLOWS]
 
 
 def seconds(call: Callable[[], object], repeats: int = 5) -> float:
-    """The shortest of several runs, each long enough to time."""
+    """Shortest of several runs."""
     call()
     count, took = 1, 0.0
     while took < 2e-3:
@@ -207,7 +204,7 @@ BALLS = {"R* = 2 mm, E* = 1 MPa": Ball(2e-3, 1e6), "R* = 0.1 mm, E* = 10 MPa": B
 
 
 def sense_errors(model: Model, ball: Ball) -> list[float]:
-    """Relative error of a model's closing force at each of :data:`PLACES`."""
+    """Relative errors of a model's closing force over :data:`PLACES`."""
     sheet = PaddedSheet(SWITCH, THICKNESS_M, ball)
     found = []
     for ratio in PLACES:

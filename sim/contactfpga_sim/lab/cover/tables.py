@@ -1,4 +1,4 @@
-"""The tables and pictures of docs/cover.md and docs/paper.md."""
+"""Tables and pictures of docs/cover.md and docs/paper.md."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ def _rule_table(rules: dict[str, formulas.Rule]) -> str:
 
 
 def sense_table() -> str:
-    """Sensitivity models: error against the reference, and time."""
+    """Sensitivity models: error and time."""
     study = formulas
     rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES), "time"]]
     for model in study.LADDER:
@@ -245,7 +245,7 @@ def sense_table() -> str:
 
 
 def paper_table() -> str:
-    """Printed value, our value, and verdict."""
+    """Printed value, our value, verdict."""
     lines = [(row.printed, row.ours, row.verdict) for row in rows()]
     return writer.table_of([("paper says", "we get", "verdict"), *lines])
 
@@ -284,7 +284,7 @@ def foam_table() -> str:
 
 
 def rules_table() -> str:
-    """Peak-force rules: error against the exact one, and time."""
+    """Peak-force rules: error and time."""
     return _rule_table(formulas.RULES)
 
 
@@ -294,5 +294,5 @@ def failing_table() -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The pictures of the command's answer, and that of the caps."""
+    """Pictures of the answer and the caps."""
     return [caps.draw(folder / "cover-caps.svg"), *drawing.draw(folder, "svg")]

@@ -1,1 +1,1 @@
-"""Explanatory diagrams: the parts, the skin, a touch, the wiring, and a packet."""
+"""Explanatory diagrams."""

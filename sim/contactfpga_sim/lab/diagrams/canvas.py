@@ -20,7 +20,7 @@ TINTS = {
 
 
 class Canvas:
-    """A diagram of the page's width and this height. Create it under :data:`contactfpga.picture_style.SETTINGS`."""
+    """A diagram of the page's width, created under :data:`contactfpga.picture_style.SETTINGS`."""
 
     def __init__(self, height_px: float):
         self.figure = style.new(height_px / 96)
@@ -34,26 +34,23 @@ class Canvas:
         self.axes.text(x, y, words, **{"va": "center", "fontsize": style.NORMAL, "color": style.INK} | how)
 
     def small(self, x: float, y: float, words: str, **how: Any) -> None:
-        """Draw secondary words."""
         self.text(x, y, words, **{"fontsize": style.SMALL, "color": style.SOFT} | how)
 
     def box(self, x: float, y: float, w: float, h: float, color: str, **how: Any) -> None:
-        """Draw a rectangle with its upper left corner at (x, y), tinted in a palette color."""
+        """Draw a rectangle from (x, y) down, in a tint."""
         from matplotlib.patches import Rectangle
 
         look: dict[str, Any] = {"fc": TINTS.get(color, color), "ec": color, "lw": 1} | how
         self.axes.add_patch(Rectangle((x, y), w, h, **look))
 
     def area(self, points: Sequence[tuple[float, float]], color: str, **how: Any) -> None:
-        """Draw a filled polygon."""
         self.axes.fill(*zip(*points, strict=True), **{"fc": color, "ec": "none", "lw": 0.8} | how)
 
     def line(self, *points: tuple[float, float], color: str = style.SOFT, **how: Any) -> None:
-        """Draw a line through points."""
         self.axes.plot(*zip(*points, strict=True), **{"color": color, "lw": 1, "solid_capstyle": "round"} | how)
 
     def arrow(self, *points: tuple[float, float], color: str = style.SOFT, both: bool = False) -> None:
-        """Draw a line through points with an arrowhead at its end, or at both."""
+        """Draw a line with an arrowhead at its end, or at both."""
         self.line(*points, color=color, lw=1.6, solid_capstyle="butt")
         ends = [(points[-2], points[-1])] + ([(points[1], points[0])] if both else [])
         for start, end in ends:
@@ -62,5 +59,4 @@ class Canvas:
             )
 
     def save(self, path: Path) -> Path:
-        """Write the diagram."""
         return style.save(self.figure, path)

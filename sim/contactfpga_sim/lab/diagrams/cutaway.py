@@ -1,4 +1,4 @@
-"""A cutaway of the starter kit's skin to scale, with lengths of its Skin file, parts and caps."""
+"""A cutaway of the starter kit's skin, to scale."""
 
 from __future__ import annotations
 
@@ -17,15 +17,13 @@ PX_PER_MM = 17.0
 CELLS = 4
 LEFT = 62.0
 TOP = 190.0
-"""Top of the foam, px."""
 DIODE_HEIGHT_MM = 1.0
 """Height of a SOD-323 above its board."""
 SKIN_COLOR = "#e8c4a8"
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Write the picture. A fingertip as wide as in docs/cover.md closes two switches; the foam's own compression is
-    omitted."""
+    """A fingertip as wide as in docs/cover.md closes two switches; the foam does not compress."""
     canvas = Canvas(404)
     cover = load_cover(kit.skin_path)
     assert cover is not None
@@ -60,7 +58,6 @@ def draw(kit: Kit, path: Path) -> Path:
 
 
 def _cell(canvas: Canvas, x: float, sunk: float, side: float, tops: dict[str, float], plunger: float) -> None:
-    """Draw foam tile, cap, dome and diode around x."""
     half, inner, dome = (PX_PER_MM * mm / 2 for mm in (side, plunger, DOME.part.width))
     canvas.box(x - half, tops["foam"] + sunk, 2 * half, tops["plate"] - tops["foam"], style.ORANGE, lw=0.8)
     canvas.box(x - half, tops["plate"] + sunk, 2 * half, tops["plunger"] - tops["plate"], style.BLUE, lw=0.8)
@@ -73,7 +70,6 @@ def _cell(canvas: Canvas, x: float, sunk: float, side: float, tops: dict[str, fl
 
 
 def _finger(canvas: Canvas, x: float) -> None:
-    """Draw a fingertip resting on the foam with its whole width."""
     half, sunk = 1e3 * WIDTH_M * PX_PER_MM / 2, DOME.travel_mm * PX_PER_MM
     out = half + 22
     points = [(x - out, 34), (x - out, 118), (x - half - 8, TOP - 22), (x - half + 14, TOP + sunk - 1)]
@@ -84,7 +80,6 @@ def _finger(canvas: Canvas, x: float) -> None:
 
 
 def _lengths(canvas: Canvas, tops: dict[str, float], bottom: float, width: float, pitch: float, side: float) -> None:
-    """Draw pitch and cap side above the sheet, and total height."""
     first, step, half = LEFT + 0.5 * pitch * PX_PER_MM, pitch * PX_PER_MM, side * PX_PER_MM / 2
     low = bottom + 66
     for x in (first, first + step):
@@ -107,7 +102,6 @@ def _lengths(canvas: Canvas, tops: dict[str, float], bottom: float, width: float
 def _names(
     canvas: Canvas, kit: Kit, tops: dict[str, float], bottom: float, width: float, heights: dict[str, float]
 ) -> None:
-    """Label each layer at its right."""
     right, words = LEFT + width, LEFT + width + 24
     named = [
         (tops["foam"] + 8, TOP - 36, f"foam of {heights['foam']:g} mm,", "cut between the caps"),

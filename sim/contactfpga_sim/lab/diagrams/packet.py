@@ -1,4 +1,4 @@
-"""A map of a packet: the bytes of a frame with one zone, their bits, and the fields of a hello."""
+"""A map of a packet: a frame's bytes and bits, and a hello's fields."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 LEFT, RIGHT = 16.0, 704.0
 HEIGHT = 34.0
 BITS = 32
-"""Bits in a line of bit fields."""
 
 
 class Field(NamedTuple):
@@ -29,7 +28,7 @@ class Field(NamedTuple):
 
 
 def draw(skin: Skin, path: Path) -> Path:
-    """Write the picture of the frames of a Skin that reports moments, and of its hello."""
+    """Draw the frames of a Skin that reports moments, and its hello."""
     canvas, widths = Canvas(624), Widths(skin.sheet)
     canvas.text(LEFT, 18, f"Frame with one zone, {skin.rows}x{skin.columns} switches: bytes in the order sent")
     whole = list(_frame(widths))
@@ -106,7 +105,6 @@ NAMES = {getattr(hello, name): name.lower() for name in _TYPES}
 
 
 def _hello(skin: Skin) -> Iterator[Field]:
-    """The fields of a hello, read from its bytes."""
     packet = hello.encode_hello(skin).strip(b"\0")
     data = cobs_decode(packet[:-CHECK_BYTES])[:-1]
     while data:

@@ -1,4 +1,4 @@
-"""Draws the diagrams into the folder of the pictures."""
+"""Draws the diagrams of the pages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contactfpga_sim.lab.diagrams import cutaway, packet, together, touch, wires
 
 
 def draw(folder: Path) -> list[Path]:
-    """Draw all diagrams; those of a kit show the starter kit."""
+    """Draw all diagrams into the pictures' folder."""
     kit = kits.kit("starter")
     with matplotlib.rc_context(style.SETTINGS):
         return [

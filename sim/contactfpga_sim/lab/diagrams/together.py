@@ -1,4 +1,4 @@
-"""The parts of the starter kit, with the time of each arrow since the switch closed."""
+"""Parts of the starter kit, with times since the switch closed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 from contactfpga_sim.lab.finger.stages import ASSUMED_HOST_US
 
 SKIN, BOARD, HOST = (16, 184), (272, 146), (560, 144)
-"""Left end and width of each column, px."""
+"""Left end and width, px."""
 CELLS = 9
-"""Switches in the drawn row."""
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Write the picture."""
+    """Draw the kit's skin, board and host."""
     canvas = Canvas(346)
     _skin(canvas, kit)
     _boxes(canvas, kit)
@@ -28,7 +27,6 @@ def draw(kit: Kit, path: Path) -> Path:
 
 
 def _skin(canvas: Canvas, kit: Kit) -> None:
-    """Finger, foam, switches and link, stacked."""
     left, width = SKIN
     step = width / CELLS
     canvas.text(left, 22, "robot with a skin", fontweight="bold")
@@ -67,7 +65,6 @@ def _boxes(canvas: Canvas, kit: Kit) -> None:
 
 
 def _times(canvas: Canvas, kit: Kit) -> None:
-    """Arrows between the columns, with the kit's predicted times."""
     skin, said = kit.skin, predictions.load(kit)
     times = skin.derived
 

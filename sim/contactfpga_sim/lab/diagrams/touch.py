@@ -1,4 +1,4 @@
-"""One touch of each kit as a timing diagram: raster scan and line reversal, from the gateware's simulation."""
+"""A touch of each kit as a timing diagram, from the gateware's simulation."""
 
 from __future__ import annotations
 
@@ -17,15 +17,13 @@ LANES = ("row is driven", "zone is found", "byte on the line", "contact")
 ROW, ZONE, BYTE, CONTACT = range(len(LANES))
 TOUCHED, OTHER = style.VERMILLION, style.SKY
 HALF = 0.3
-"""Half a bar's height; lanes are 1 apart."""
 BYTE_BITS = 10
-"""Bits of a byte on the line, with start and stop."""
 BEFORE_OFFER = 2
-"""Clocks from the last one that drives a row to its handover (docs/timing.md)."""
+"""Clocks from a row's last one to its handover (docs/timing.md)."""
 
 
 def draw(path: Path) -> Path:
-    """Write the picture: a panel per kit, and between them one row of the raster scan."""
+    """A panel per kit, and one row of the raster scan between them."""
     figure = style.new(6.6)
     raster, slot, reversal = figure.subplots(3, 1, height_ratios=(4, 2.4, 4))
     starter, fast = (kits.kit(name).skin for name in ("starter", "fast"))
@@ -37,7 +35,6 @@ def draw(path: Path) -> Path:
 
 
 def _touch(axes: Any, skin: Skin, title: str) -> None:
-    """One touch, from just before the switch closes to the last byte of its frame."""
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as work:
         touch = wave.simulate(skin, wave.finger(skin), Path(work) / "touch.vcd")
 
@@ -61,7 +58,7 @@ def _touch(axes: Any, skin: Skin, title: str) -> None:
 
 
 def _bars(skin: Skin, touch: wave.SimulatedTouch) -> Iterator[tuple[int, float, float, str]]:
-    """Lane, first clock, number of clocks and color of each bar."""
+    """Lane, first clock, clocks and color of bars."""
     trace, times = touch.trace, skin.derived
     for cycle, cells, _ in trace.rows:
         first = cycle - BEFORE_OFFER - times.settle_clocks
@@ -80,7 +77,6 @@ def _bars(skin: Skin, touch: wave.SimulatedTouch) -> Iterator[tuple[int, float, 
 
 
 def _slot(axes: Any, skin: Skin) -> None:
-    """One row of a raster scan with precharge, and the beginning of the next."""
     times = skin.derived
     row = times.settle_clocks + times.release_clocks
     driven, released, next_row, one = (

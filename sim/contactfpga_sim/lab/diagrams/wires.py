@@ -1,4 +1,4 @@
-"""The wiring of the starter kit: pins of the board to pins of the sheet."""
+"""Wiring of the starter kit: pins of board and sheet."""
 
 from __future__ import annotations
 
@@ -16,26 +16,23 @@ from contactfpga_sim.lab.diagrams.canvas import Canvas
 STEP = 16.0
 TOP = 62.0
 BOARD_X, SHEET_X = 214.0, 470.0
-"""Wire ends at the board and at the sheet, px."""
 PIN = 26.0
-"""Width of a pin's box."""
 POWER = {"5": GND, "6": SUPPLY, "11": GND, "12": SUPPLY}
-"""Power pins of every PMOD connector (docs/boards.md)."""
+"""Power pins of a PMOD connector (docs/boards.md)."""
 RAILS = {GND: style.BLACK, SUPPLY: style.VERMILLION}
 OUT = style.GREEN
 COLORS = style.BLUE, style.PURPLE, style.BROWN
-"""Wire colors of each connector of the board."""
 
 
 class Pin(NamedTuple):
-    """A pin of a connector with its wire."""
+    """A pin of a connector and its wire."""
 
     number: str
     wire: str
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Write the picture of the table that ``contactfpga build --wiring`` prints."""
+    """Draw the table of ``contactfpga build --wiring``."""
     circuit = load_circuit(kit.skin_path)
     assert circuit is not None
     board = _board(kit)
@@ -62,7 +59,6 @@ def draw(kit: Kit, path: Path) -> Path:
 
 
 def _board(kit: Kit) -> dict[str, list[Pin]]:
-    """The pins of each connector of the board, in numerical order."""
     used: dict[str, dict[str, str]] = {name: {} for name in kit.board.connectors}
     for one in wiring.wires(kit.board, kit.skin):
         connector, _, number = one.pin.partition(":")
@@ -75,7 +71,6 @@ def _board(kit: Kit) -> dict[str, list[Pin]]:
 
 
 def _sheet(kit: Kit) -> dict[str, list[Pin]]:
-    """The pins of each connector of the sheet, by its layout."""
     layout = lay_out(kit.skin, load_circuit(kit.skin_path))
     plugs = [one for one in layout.drawing.placed if one.reference.startswith("J")]
     return {one.reference: [Pin(pin, net) for pin, net in one.nets.items()] for one in plugs}
@@ -89,7 +84,6 @@ def _connectors(
     leads: dict[str, str],
     colors: dict[str, str],
 ) -> dict[str, list[tuple[float, float]]]:
-    """Draw pins below one another; returns the end of each wire."""
     found: dict[str, list[tuple[float, float]]] = {}
     y = TOP
     for name, pins in connectors.items():
@@ -115,13 +109,11 @@ def _words(wire: str, leads: dict[str, str]) -> str:
 
 
 def _colors(board: dict[str, list[Pin]]) -> dict[str, str]:
-    """Color of each wire."""
     colors = {pin.wire: COLORS[place % len(COLORS)] for place, pins in enumerate(board.values()) for pin in pins}
     return colors | RAILS | {"": style.GRAY, "contact": OUT, "alive": OUT}
 
 
 def _wire(canvas: Canvas, start: tuple[float, float], end: tuple[float, float], color: str) -> None:
-    """Draw a curve that leaves and arrives horizontally."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Curve
 
@@ -131,7 +123,6 @@ def _wire(canvas: Canvas, start: tuple[float, float], end: tuple[float, float], 
 
 
 def _outputs(canvas: Canvas, ends: dict[str, list[tuple[float, float]]], leads: dict[str, str]) -> None:
-    """Draw wires that do not lead to the sheet, labeled with their destination."""
     for wire in ("contact", "alive"):
         ((x, y),) = ends[wire]
         canvas.arrow((x, y), (x + 22, y), color=OUT)

@@ -1,1 +1,1 @@
-"""Where methods fail: one parameter per study, moved until something breaks, on the compiled gateware."""
+"""One parameter per study, moved until a method fails on the compiled gateware."""

@@ -1,4 +1,4 @@
-"""All studies, in the order of the page."""
+"""All knobs, in the page's order."""
 
 from __future__ import annotations
 
@@ -32,4 +32,4 @@ KNOBS = {
         line.CLOCK,
     )
 }
-"""Every knob by its name."""
+"""Knobs by name."""

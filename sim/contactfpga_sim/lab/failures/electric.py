@@ -1,4 +1,4 @@
-"""Knobs of the sheet's wiring: slow columns, weak switches, missing diodes, broken and stuck lines."""
+"""Knobs of the sheet's wiring."""
 
 from __future__ import annotations
 
@@ -58,7 +58,6 @@ LAZY_CIRCUIT = WEAKLY.replace(line_ohm=2000.0)
 
 
 def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> list[tuple[int, int]]:
-    """Random places of fingers of 2x2 cells, at least ``free`` cells apart."""
     spots: list[tuple[int, int]] = []
     while len(spots) < count:
         row, column = map(int, rng.integers(0, (skin.rows - 1, skin.columns - 1)))
@@ -68,7 +67,6 @@ def _apart(rng: np.random.Generator, skin: Skin, count: int, free: int = 1) -> l
 
 
 def _slow(skin: Skin, circuit: Circuit, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Two fingers without common rows or columns, on slow lines."""
     found = []
     with Rig(skin) as rig:
         rig.board.settle(*lines_of(circuit, skin, most=2))
@@ -118,12 +116,11 @@ SETTLE = Knob(
 
 
 def bare(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Three fingers at corners of rectangles; one loses its switches' diodes one by one."""
+    """Outcomes of three fingers at corners of rectangles, one of which loses its diodes one by one."""
     return [_bare(skin, int(count), _rectangle(rng, skin)[:3], rng) for _ in range(draws)]
 
 
 def _rectangle(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
-    """Rectangle corners that leave a row and column between the 2x2 fingers on them."""
     (y, x), (v, u) = _crossed(rng, skin)
     return [(y, x), (y, u), (v, x), (v, u)]
 
@@ -150,7 +147,6 @@ def _bare(skin: Skin, count: int, spots: list[tuple[int, int]], rng: np.random.G
 
 
 def _still(skin: Skin, read: np.ndarray) -> Zones:
-    """The frame of a sheet with these constant readings, with its guard lines if any."""
     if not skin.guard:
         return still(skin, read)
     return still(skin, read[:-1, :-1], wiring.missed(read))
@@ -200,7 +196,6 @@ def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
 
 
 def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of zones that do not match the contacts."""
     placed = [_apart(rng, BARE, int(count)) for _ in range(draws)]
     cells = [finger(BARE, *spots) for spots in placed]
     truths = [[finger(BARE, spot) for spot in spots] for spots in placed]
@@ -208,7 +203,7 @@ def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outco
 
 
 def _scattered_cells(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of misread cells; reported if each is marked."""
+    """Outcomes of misread cells; a fault is reported if each is marked."""
     cells = [finger(BARE, *_apart(rng, BARE, int(count))) for _ in range(draws)]
     return [_marked(zones, each) for zones, each in zip(_frames(BARE_CELLS, cells), cells)]
 
@@ -244,7 +239,7 @@ GHOST = Knob(
 
 
 PATIENT, PATIENT_GUARDED = (skin.replace(settle_us=5.0) for skin in (REVERSAL, REVERSAL_GUARDED))
-"""Skins whose columns allow the time that weak switches need."""
+"""Skins with time for weak switches."""
 
 
 def _switch(skin: Skin, kiloohm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
@@ -290,7 +285,6 @@ DIODES_REVERSAL = dataclasses.replace(
 
 
 def _broken(skin: Skin, line: str, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes with broken lines anywhere under a contact."""
     found = []
     for _ in range(draws):
         top, left = map(int, rng.integers(0, (skin.rows - 6, skin.columns - 6)))
@@ -336,7 +330,6 @@ MASKED = REFERENCE.replace(mask=((2, 3), (12, 2), (5, 12)))
 
 
 def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes with switches stuck away from the finger, masked ones first."""
     found = []
     for _ in range(draws):
         touch, beside = _finger_anywhere(rng, skin)
@@ -350,7 +343,7 @@ def _stuck(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> li
 
 
 def _finger_anywhere(rng: np.random.Generator, skin: Skin) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, columns) bool each: a finger clear of the mask, and its cells with their neighbors."""
+    """(rows, columns) bool each: a finger clear of the mask, and its cells with neighbors."""
     while True:
         ((row, column),) = _apart(rng, skin, 1)
         touch, beside = finger(skin, (row, column)), np.zeros((skin.rows, skin.columns), bool)

@@ -1,4 +1,4 @@
-"""A knob (parameter), results at its values, and where they become wrong."""
+"""Knobs: parameters, with results at their values."""
 
 from __future__ import annotations
 
@@ -8,27 +8,24 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 Place = tuple[float, float]
-"""Column and row, in cells."""
+"""Column and row in cells."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result at one value of the knob."""
+    """Result at one value of a knob."""
 
     right: bool
-    """Whether the result is correct."""
     told: tuple[str, ...] = ()
-    """Flags, counters and errors that reported a fault."""
+    """Flags, counters and errors."""
     what: str = ""
-    """The result in a few words."""
     amount: float = 0.0
-    """The number that the picture shows."""
+    """Number in the picture."""
     cells: np.ndarray | None = None
-    """(rows, columns) bool pressed cells for the drawing."""
+    """(rows, columns) bool, to draw."""
     zones: tuple[Place, ...] = ()
-    """Reported barycenters for the drawing."""
     rate: str = ""
-    """The share of correct draws with its interval, if there were several."""
+    """Share of correct draws, if several."""
 
     @property
     def verdict(self) -> str:
@@ -38,34 +35,30 @@ class Outcome:
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One quantity that is moved until something breaks."""
+    """A quantity that is moved until something breaks."""
 
     name: str
-    """Name of its picture's file."""
     title: str
     axis: str
-    """The moved quantity, with its unit."""
+    """The quantity with its unit."""
     amount: str
     """Meaning of :attr:`Outcome.amount`."""
     values: tuple[float, ...]
-    """Values in the order of the sweep."""
     runs: Mapping[str, Callable[[float], Outcome]]
-    """Outcome at a value, for each compared method or setting."""
+    """Outcome at a value, by method or setting."""
     helps: str
-    """The remedy."""
     format: str = "{:,g}"
-    """Format of a value."""
     unnoticed: str = ""
-    """Why nothing reports the fault when :func:`Outcome.verdict` is ``silent``."""
+    """Why nothing reports a ``silent`` fault."""
     closed: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Break points by closed form, for the methods that have one."""
+    """Break points by closed form, by method."""
     closed_form: str = ""
     """The closed form in words."""
 
     def sweep(
         self, step: Callable[[], None] = lambda: None, so_far: dict[str, Sweep] | None = None
     ) -> dict[str, Sweep]:
-        """Outcomes of every value and method. After each, ``so_far`` holds it, and ``step()`` is called."""
+        """Outcomes of all values and methods. Each enters ``so_far``, then ``step()`` is called."""
         found = {} if so_far is None else so_far
         for name, run in self.runs.items():
             found[name] = Sweep(self.values, tuple(map(run, self.values)))
@@ -75,39 +68,37 @@ class Knob:
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """Outcomes at all values of a knob, for one method."""
+    """Outcomes of one method at all values of a knob."""
 
     values: tuple[float, ...]
     outcomes: tuple[Outcome, ...]
 
     @property
     def broken(self) -> int | None:
-        """Index of the first wrong value; None if there is none."""
+        """Index of the first wrong value, or None."""
         return next((index for index, outcome in enumerate(self.outcomes) if not outcome.right), None)
 
     @property
     def breaks_at(self) -> float | None:
-        """The first wrong value."""
         return None if self.broken is None else self.values[self.broken]
 
     @property
     def holds_until(self) -> float | None:
-        """The last value up to which all are right; None if the first is wrong."""
+        """Last value up to which all are right, or None."""
         last = len(self.values) if self.broken is None else self.broken
         return self.values[last - 1] if last else None
 
     @property
     def warns_at(self) -> float | None:
-        """The first value with a warning, if all is still right there."""
+        """First value with a warning, if still right."""
         first = next((index for index, outcome in enumerate(self.outcomes) if outcome.told), None)
         return self.values[first] if first is not None and self.outcomes[first].right else None
 
     @property
     def silent_at(self) -> float | None:
-        """The first value that is wrong and unreported."""
+        """The first ``silent`` value."""
         return next((value for value, outcome in zip(self.values, self.outcomes) if outcome.verdict == "silent"), None)
 
     @property
     def verdicts(self) -> tuple[str, ...]:
-        """:attr:`Outcome.verdict` at each value."""
         return tuple(outcome.verdict for outcome in self.outcomes)

@@ -1,6 +1,6 @@
-"""A knob as a picture: the share of right draws at each value, and the sheet before and at the first break.
+"""A knob as a picture: the share of right draws by value, and the sheet before and at the first break.
 
-Hand-written, so that the same numbers always make the same file.
+Hand-written SVG: equal numbers make equal files.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from contactfpga_sim.lab.failures.rated import Rated
 from contactfpga_sim.lab.failures.rig import plural
 
 LETTER = 7.5
-"""Width of a letter or digit, in pixels."""
 
 
 class Span(NamedTuple):
-    """The pixels of a value on the axis: halfway to its neighbors."""
+    """Pixels of a value on the axis: halfway to its neighbors."""
 
     start: float
     middle: float
@@ -33,10 +32,8 @@ class Span(NamedTuple):
 
 
 def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span], str]:
-    """The values' places in sweep order, and a note on the scale.
-
-    Evenly spaced or negative values are linear; others logarithmic, with a first 0 set apart.
-    """
+    """The values' places in sweep order, and a note on the scale: linear if evenly spaced or negative, else
+    logarithmic, with a first 0 set apart."""
     steps = np.diff(values)
     if np.allclose(steps, steps[0]) or min(values[1:]) <= 0:
         places, scale = np.array(values, float), ""
@@ -53,7 +50,7 @@ def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span
 
 
 def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
-    """Indexes of the labeled values: at even steps if evenly spaced, else all with room."""
+    """Labeled values: even steps if evenly spaced, else all with room."""
     wide = [span.end - span.start for span in spans]
     if np.allclose(wide, wide[0]):
         choices = [list(range(0, len(words), step)) for step in (1, 2, 4, 5, 10, 20, len(words))]
@@ -62,7 +59,6 @@ def shown(words: Sequence[str], spans: Sequence[Span]) -> list[int]:
 
 
 def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int]) -> list[int]:
-    """The chosen indexes that are not too close to the one before."""
     found, end = [], -math.inf
     for index in chosen:
         half = LETTER * len(words[index]) / 2
@@ -74,26 +70,22 @@ def _with_room(words: Sequence[str], spans: Sequence[Span], chosen: Sequence[int
 
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
 TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}
-"""Height of a bar, which repeats its color's meaning."""
 
 WORDS = {"right": "right", "warned": "right, warned", "told": "wrong, reported", "silent": "wrong, not noticed"}
-"""Below the first bar of each kind."""
 
 NAME, LEFT, TOP, HIGH = 16, 190, 66, 44
-"""Where a method's name and its chart begin, and the height of the chart, in pixels."""
+"""Left ends of names and charts, a chart's top and height, in pixels."""
 
 BESIDE, ALONE = 274, 510
-"""Width of the charts beside two sheets, and without."""
+"""Width of charts with and without sheets."""
 
 STEP = 96
-"""From one method's chart to the next one's, with bars and their words."""
 
 SIDE, SHEETS = 104, (488, 604)
-"""Size of a sheet, and where each begins."""
 
 
 def svg(knob: Knob, methods: Mapping[str, Sweep]) -> str:
-    """The whole picture. Methods of which the same came out at all values share a chart."""
+    """The picture; methods with equal outcomes share a chart."""
     charts = _alike(methods)
     method, sheets = _sheets(knob, methods)
     spans, scale = placed(knob.values, LEFT, BESIDE if sheets else ALONE)
@@ -126,13 +118,13 @@ SOFT = f'fill="{style.SOFT}"'
 
 
 def _level(knob: Knob) -> float | None:
-    """The share from which on a value holds, if one does for all methods."""
+    """Share from which a value holds, if one does for all methods."""
     levels = {run.level for run in knob.runs.values() if isinstance(run, Rated)}
     return levels.pop() if len(levels) == 1 else None
 
 
 def _alike(methods: Mapping[str, Sweep]) -> list[tuple[list[str], tuple[Outcome, ...]]]:
-    """Names of methods with what came out, together those of which the same share is right and is told."""
+    """Methods with equal shares and reports, together."""
     found: dict[Any, tuple[list[str], tuple[Outcome, ...]]] = {}
     for name, sweep in methods.items():
         key = tuple((outcome.amount, _kind(outcome)) for outcome in sweep.outcomes)
@@ -147,7 +139,6 @@ def _text(x: float, y: float, words: str, style: str = "") -> str:
 def _chart(
     names: Sequence[str], outcomes: Sequence[Outcome], spans: Sequence[Span], level: float | None, top: float
 ) -> list[str]:
-    """The share of each value as a step, from 0 at the bottom to all at the top."""
     left, right = spans[0].start, spans[-1].end
     parts = []
     for number, line in enumerate(textwrap.wrap(_kept_together("; ".join(names)), 20)):
@@ -171,12 +162,11 @@ def _chart(
 
 
 def _kept_together(words: str) -> str:
-    """The same with a number and its unit on one line."""
+    """Words with each number and its unit on one line."""
     return re.sub(r"(?<=\d) (?=\S)", "\N{NO-BREAK SPACE}", words)
 
 
 def _strip(outcomes: Sequence[Outcome], spans: Sequence[Span], top: float) -> list[str]:
-    """A bar for each value, and what it says below the first of each kind."""
     y, parts, said, end = top + HIGH + 6, [], set(), -math.inf
     kinds = list(map(_kind, outcomes))
     for span, kind in zip(spans, kinds, strict=True):
@@ -206,7 +196,7 @@ def _kind(outcome: Outcome) -> str:
 
 
 def _sheets(knob: Knob, methods: Mapping[str, Sweep]) -> tuple[str, list[tuple[str, Outcome]]]:
-    """The first method that fails, and its outcomes at the two values around the break."""
+    """The first method that fails, and its outcomes around the break."""
     for method, sweep in methods.items():
         if sweep.broken is None or not sweep.broken or sweep.outcomes[sweep.broken].cells is None:
             continue

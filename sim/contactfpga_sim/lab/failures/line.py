@@ -1,4 +1,4 @@
-"""Knobs of the line and its ends: differing baud rates, noise, another clock, a slow host."""
+"""Knobs of the line and its ends."""
 
 from __future__ import annotations
 
@@ -32,15 +32,14 @@ class Line:
 
     skin: Skin
     edges: np.ndarray
-    """(n,) float: clocks at which the level changes; it begins high."""
+    """(n,) float: clocks of level changes; the level begins high."""
     end: float
-    """Recorded clocks."""
     frames: tuple[bytes, ...]
-    """Every sent packet without its delimiter, in order."""
+    """Sent packets in order, without delimiters."""
 
     @classmethod
     def record(cls, skin: Skin, scans: int, seed: int) -> Line:
-        """Record a board whose sheet shows other random fingers in each scan."""
+        """Record a board under new random fingers in each scan."""
         rng = np.random.default_rng(seed)
         with Rig(skin, capture=("line",)) as rig:
             rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), hello_clocks(skin))
@@ -59,7 +58,7 @@ class Line:
             return cls(skin, edges, float(rig.board.cycle), tuple(packets))
 
     def noisy(self, rate_hz: float, seed: int) -> Line:
-        """The line with this many pulses per second that invert the level for half a bit to two bits."""
+        """The line with ``rate_hz`` pulses per second that invert it for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
         bit = self.skin.derived.bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)
@@ -67,8 +66,8 @@ class Line:
         return dataclasses.replace(self, edges=np.sort(np.concatenate([self.edges, starts, starts + lengths])))
 
     def read(self, bit_clocks: float, phase: float = 0.0) -> bytes:
-        """The bytes that a UART reads if its bits last this many board clocks, without those that lack a stop bit.
-        ``phase`` (0 to 1) delays its sampling by part of a sample."""
+        """Bytes that a UART reads at ``bit_clocks`` clocks per bit, without those that lack a stop bit. ``phase`` (0
+        to 1) delays sampling by part of a sample."""
         tick = bit_clocks / OVERSAMPLING
         data, now, last = bytearray(), 0.0, self.end + 12 * self.skin.derived.bit_clocks
         offsets = tick * (OVERSAMPLING * np.arange(10) + OVERSAMPLING // 2)
@@ -101,13 +100,11 @@ class HostDecoding:
     """The host's reading of a line."""
 
     sent: int
-    """Frames sent."""
     arrived: int
     """Frames that arrived unchanged."""
     wrong: int
-    """Frames that arrived but were never sent."""
+    """Arrived frames that were never sent."""
     told: tuple[str, ...]
-    """Nonzero counters, and errors."""
 
 
 def heard(line: Line, data: bytes, greeted: bytes = b"") -> HostDecoding:
@@ -131,7 +128,7 @@ def _decoded(data: bytes) -> tuple[list[str], Conversation]:
 
 
 def _sent(zones: Zones) -> dict[str, object]:
-    """A frame as sent, without the flags and board time that the host adds from earlier frames."""
+    """A frame without what the host adds from earlier frames."""
     own = {name: value for name, value in zones.to_dict().items() if not name.startswith("host_")}
     return own | {"flags": sorted(zones.frame.flags)}
 
@@ -139,7 +136,7 @@ def _sent(zones: Zones) -> dict[str, object]:
 SKIN = REFERENCE
 SCAN_MS = 1000 * SKIN.derived.frame_clocks / SKIN.clock_hz
 ZONE_BYTES = 13 + 4
-"""Bytes of a frame with one zone; each further zone needs 4."""
+"""Bytes of a frame with one zone; further zones need 4 each."""
 FEW_FRAMES = 20
 RECORDED = 200
 """Recorded lines of :data:`FEW_FRAMES` to draw from."""
@@ -147,12 +144,12 @@ RECORDED = 200
 
 @functools.cache
 def recorded(scans: int, seed: int) -> Line:
-    """A recorded line, to be decoded in several ways."""
+    """A cached recorded line."""
     return Line.record(SKIN, scans, seed)
 
 
 def _of_line(found: HostDecoding) -> Outcome:
-    """Right if every frame arrives; an unsent frame is worse than a lost one, and silent."""
+    """Right if every frame arrives; an unsent one is worse than a lost one, and silent."""
     missing = found.sent - found.arrived
     what = f"{missing} of {found.sent} frames do not arrive"
     if found.wrong:
@@ -161,7 +158,6 @@ def _of_line(found: HostDecoding) -> Outcome:
 
 
 def _lines(bit_clocks: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of short random lines at a host with this bit length."""
     lines = [recorded(FEW_FRAMES, int(seed)) for seed in rng.integers(0, RECORDED, count)]
     found = [(line, line.read(bit_clocks, float(phase))) for line, phase in zip(lines, rng.random(count))]
     return [_of_line(heard(line, data)) for line, data in found]
@@ -172,7 +168,6 @@ def _baud(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> l
 
 
 def _send(rig: Rig, byte: int, bit: float) -> None:
-    """Send a byte to the board's receive pin, with this many board clocks per bit."""
     bits = [0, *(byte >> index & 1 for index in range(8)), 1]
     ends = [round(bit * (index + 1)) for index in range(10)]
     for start, end, level in zip([0, *ends], ends, bits):
@@ -182,14 +177,13 @@ def _send(rig: Rig, byte: int, bit: float) -> None:
 
 
 def _number(rng: np.random.Generator) -> int:
-    """A random number for a request."""
     while not protocol.may_number(number := int(rng.integers(1 << protocol.DIGIT_BITS * protocol.HEARD_DIGITS))):
         pass
     return number
 
 
 def _asked(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of requests at the host's rate and any time: does a frame answer?"""
+    """Outcomes of requests at any time: does a frame answer?"""
     bit = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
     found = []
     with Rig(SKIN) as rig:
@@ -224,7 +218,7 @@ BAUD = Knob(
 
 
 def _noise(rate_hz: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """One outcome per frame. The port was opened before the noise began."""
+    """One outcome per frame; the port was opened before the noise."""
     line = recorded(count + 10, int(rng.integers(RECORDED)))
     data = line.noisy(rate_hz, int(rng.integers(1 << 32))).read(SKIN.derived.bit_clocks)
     found = heard(line, data, greeted=protocol.encode_hello(SKIN))
@@ -249,7 +243,6 @@ NOISE = Knob(
 
 
 def _clock(per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes with a fast board crystal: short bits and short microseconds."""
     faster = 1 + per_cent / 100
     told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
     times = Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off")
@@ -260,7 +253,7 @@ DOCTOR_S = 10.0
 """Duration of `contactfpga doctor --seconds 10`."""
 
 CLOCK_PER_CENT = 0.1
-"""Largest error of times that count as right."""
+"""Largest time error that counts as right."""
 
 CLOCK = Knob(
     name="clock",
@@ -278,11 +271,11 @@ CLOCK = Knob(
 
 
 TTY_BYTES = 4095
-"""Linux's buffer of an unread serial port; bytes beyond it are dropped."""
+"""Linux's buffer of an unread serial port; further bytes are dropped."""
 
 
 class SlowHost:
-    """A virtual board behind an operating system's buffer; time passes while the host is busy."""
+    """A virtual board with an operating system's buffer, whose time passes while the host works."""
 
     live, threaded = True, False
     name = "the slow host"
@@ -292,7 +285,6 @@ class SlowHost:
         self._waiting: deque[int] = deque()
 
     def work(self, seconds: float) -> None:
-        """Keep the host busy for this time."""
         end = self._board.clock() + seconds
         while (left := end - self._board.clock()) > 1e-6:
             self._keep(self._board.read(min(left, 1e-4)))
@@ -318,7 +310,6 @@ class SlowHost:
 
 
 def _slow_host(milliseconds: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of cycles in which the driver reads all, then the host works."""
     transport = SlowHost()
     scan_us = SKIN.derived.frame_clocks / SKIN.derived.clocks_per_us
     found = []
@@ -357,7 +348,6 @@ MAX_AGE_S = 0.005
 
 @functools.cache
 def _silence(max_age_s: float | None, phase: float) -> tuple[str, float]:
-    """Error and delay when a board stops at this phase while a program reads its newest frame."""
     transport = DyingBoard()
     with Driver(transport) as board:
         board.greet(1.0)
@@ -383,7 +373,6 @@ def _told_late(max_age_s: float | None, milliseconds: float, rng: np.random.Gene
 
 
 PHASES = 32
-"""Phases of a scan at which a board stops."""
 
 SILENCE = Knob(
     name="silence",

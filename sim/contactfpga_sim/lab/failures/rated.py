@@ -1,4 +1,4 @@
-"""How often a method is right at a value of a knob, by a sequential test."""
+"""How often a method is right, by a sequential test."""
 
 from __future__ import annotations
 
@@ -12,33 +12,32 @@ from contactfpga_sim.lab.failures.knob import Outcome
 from contactfpga_sim.lab.flips.campaign import wilson
 
 LEVEL = 0.95
-"""The share that must be right for a value to hold."""
+"""Share that must be right for a value to hold."""
 LOOKS = (30, 120, 480, 1920)
-"""Draws after which the interval is tested. At least 120, all right, are needed to show :data:`LEVEL`."""
+"""Draws before each test. At least 120, all right, show :data:`LEVEL`."""
 Z = 2.5
-"""z of Wilson's interval at one test, so that it holds at all four with 95 %."""
+"""z of Wilson's interval at each of four tests, for 95 % overall."""
 
 SHARE = "share of draws that are right"
 """Meaning of :attr:`contactfpga_sim.lab.failures.knob.Outcome.amount` here."""
 
 Draws = Callable[[float, np.random.Generator, int], Sequence[Outcome]]
-"""The outcomes of a number of draws, as a function of the knob's value, random numbers and that number."""
+"""Outcomes by value, random numbers and draws."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rate:
-    """A share of right draws, with its interval."""
+    """A share of right draws and its interval."""
 
     right: int
     of: int
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The interval's ends."""
         return wilson(self.right, self.of, Z)
 
     def reaches(self, level: float) -> bool | None:
-        """Whether the share reaches this level; None while the interval contains the level."""
+        """Whether the share reaches this level; None while the interval contains it."""
         low, high = self.interval
         return True if low >= level else False if high < level else None
 
@@ -49,10 +48,10 @@ class Rate:
 
 @dataclasses.dataclass(frozen=True)
 class Rated:
-    """A knob's method, tried in as many draws as the decision needs.
+    """A knob's method in as many draws as the decision needs.
 
-    A value holds if the interval is above the level; it fails if the interval is below, or still contains the level
-    after ``most`` draws. All values share a seed.
+    A value holds if the interval is above the level; it fails if below, or still undecided after ``most`` draws. All
+    values share a seed.
     """
 
     draws: Draws
@@ -60,11 +59,11 @@ class Rated:
     most: int = LOOKS[-1]
     level: float = LEVEL
     telling: float = 1.0
-    """The share of wrong draws that must be reported, else the fault counts as unnoticed."""
+    """Share of wrong draws that must be reported, else the fault is unnoticed."""
 
     def __call__(self, value: float) -> Outcome:
-        """The rate at a value. Words and sheet are of a right draw if the value holds, else of a wrong one, unreported
-        if possible."""
+        """The rate at a value. Words and sheet are of a right draw if it holds, else of a wrong one, unreported if
+        possible."""
         rng = np.random.default_rng(self.seed)
         found: list[Outcome] = []
         for look in LOOKS:
@@ -77,8 +76,8 @@ class Rated:
 
 
 def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:
-    """One outcome of all draws: the reports of half the draws if the value holds; else of the wrong ones, if at least
-    ``telling``."""
+    """One outcome of all draws, with the reports of half the draws if the value holds, else of a share ``telling``
+    of wrong ones."""
     wrong = [one for one in found if not one.right]
     each = [{re.sub(r"\d+", "N", word) for word in one.told} for one in (found if holds else wrong)]
     told = set().union(*each) if holds or sum(map(bool, each)) >= telling * len(each) else set()

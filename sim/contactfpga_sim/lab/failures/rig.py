@@ -1,4 +1,4 @@
-"""A compiled board with the host's receiver on its line, in simulated time."""
+"""A compiled board with the host's receiver, in simulated time."""
 
 from __future__ import annotations
 
@@ -16,18 +16,16 @@ from contactfpga_sim.model.sheet.wiring import LineCuts
 
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)
-"""The sheet with guard lines, and their pins."""
 REVERSAL = REFERENCE.replace(scan="reversal", precharge_us=0.25, settle_us=0.5, release_us=0.05)
 REVERSAL_GUARDED = REVERSAL.replace(guard=True)
 
 HELLO_BYTES = len(protocol.encode_hello(REFERENCE.replace(surface="cylinder", radius_mm=100.0, name=32 * "n")))
-"""Largest hello on the wire."""
 
 FRAME_BYTES = 28
-"""Bytes of a frame of few zones; a scan that waits for the wire may be shorter."""
+"""Bytes of a frame of few zones; a waiting scan may be shorter."""
 
 HELD_SCANS = 5
-"""Scans that a frame is held, so that it reaches the host even if a hello intervenes."""
+"""Scans that hold a frame, to outlast a hello."""
 
 
 class Rig:
@@ -52,25 +50,24 @@ class Rig:
 
 
 def hello_clocks(skin: Skin) -> int:
-    """Scans whose frames the hello at power-up may displace, in clocks."""
+    """Clocks of scans that the hello at power-up may displace."""
     scan = skin.derived.frame_clocks
     return scan * (math.ceil(HELLO_BYTES * 10 * skin.derived.bit_clocks / scan) + 2)
 
 
 def held_clocks(skin: Skin) -> int:
-    """Clocks that a frame is held: whole scans, lest the last frame be torn, plus some frames' time on the line."""
+    """Clocks of a held frame: whole scans, lest the last be torn, plus some frames on the line."""
     scan = skin.derived.frame_clocks
     return HELD_SCANS * scan * math.ceil(10 * FRAME_BYTES * skin.derived.bit_clocks / scan)
 
 
 def still(skin: Skin, cells: np.ndarray, cuts: LineCuts | None = None) -> Zones:
-    """The frame of a constantly pressed sheet with cut lines."""
+    """Frame of a constantly pressed sheet with cut lines."""
     return seen(skin, cells[None], cuts)[0]
 
 
 def seen(skin: Skin, frames: np.ndarray, cuts: LineCuts | None = None) -> list[Zones]:
-    """The host's frame for each of (n, rows, columns) bool frames of few zones, each pressed for some whole scans: the
-    last frame of each."""
+    """Last frame at the host for each of (n, rows, columns) bool frames of few zones."""
     with Rig(skin) as rig:
         if cuts is not None:
             rig.board.cut(cuts.rows, cuts.columns)
@@ -93,12 +90,12 @@ def moments(cells: np.ndarray) -> tuple[int, int, int]:
 
 
 def reported(zones: Zones) -> list[tuple[int, int, int]]:
-    """The moments of a frame's zones, in order."""
+    """Moments of a frame's zones, in order."""
     return sorted((area, x, y) for area, x, y in zones.frame.moments.tolist())
 
 
 def places(zones: Zones) -> tuple[Place, ...]:
-    """The barycenters of a frame's zones, in cells."""
+    """Barycenters of a frame's zones, in cells."""
     return tuple((x / area, y / area) for area, x, y in sorted(zones.frame.moments.tolist(), key=_place))
 
 

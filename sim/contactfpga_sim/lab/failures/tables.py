@@ -1,4 +1,4 @@
-"""The table in docs/failures.md."""
+"""Tables and pictures of docs/failures.md."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ HEAD = (
 
 
 def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row for each method of each knob, by the knob's name."""
+    """A row per knob and method."""
     return writer.table(HEAD, [line for name, methods in sweeps.items() for line in rows(KNOBS[name], methods)])
 
 
 def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> list[str]:
-    """A knob's lines; what they have in common is said in the first one. ``pictured``: the page has its picture."""
+    """A knob's lines, common cells in the first. ``pictured``: the page has its picture."""
     title = f"[{knob.title}](#{knob.name})" if pictured else knob.title
     lines = []
     for number, (method, sweep) in enumerate(methods.items()):
@@ -53,7 +53,7 @@ def _rate(outcome: Outcome) -> str:
 
 
 def says(knob: Knob, sweep: Sweep) -> str:
-    """What tells the user at the break, before it, and whether something passes unnoticed later."""
+    """Reports at the break and before, and whether anything later is unnoticed."""
     assert sweep.broken is not None
     told = sweep.outcomes[sweep.broken].told
     parts = [", ".join(f"`{word}`" for word in told) if told else "**not noticed**"]
@@ -73,7 +73,7 @@ CLOSED = ("knob", "closed form", "value")
 
 
 def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row for each knob that has a closed form: in words, and as values."""
+    """A row per knob with a closed form: words and values."""
     lines = []
     for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
         values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
@@ -85,7 +85,7 @@ UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
 def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row for each knob in which something wrong passes unnoticed, with the reason."""
+    """A row per knob with an unnoticed fault, and the reason."""
     lines = []
     for name, methods in sweeps.items():
         where = [method for method, found in methods.items() if found.silent_at is not None]
@@ -104,29 +104,28 @@ SAID = {
     "host": "No picture: beyond the limit, frames are lost and counted.",
     "silence": "No picture: the newest frame is as old as the silence is long.",
 }
-"""In place of a picture that would repeat another one, or a sentence."""
 
 
 def pictures() -> str:
-    """A heading for each knob, and a picture or what is said in its place."""
+    """A heading per knob, and its picture or a sentence."""
     return headed(KNOBS, "failures", SAID)
 
 
 def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> str:
-    """A heading for each knob, and its picture in a folder of ``docs/images``, or what is said in its place."""
+    """A heading per knob, and a picture from a folder of ``docs/images``, or a sentence."""
     shown = {name: f"![{knob.title}](images/{folder}/{name}.svg)" for name, knob in knobs.items()} | dict(said)
     return "\n".join(f"### `{name}`\n\n{what}\n" for name, what in shown.items())
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
-    """Every knob moved until something breaks."""
+    """Move every knob until something breaks."""
     sweeps: dict[str, dict[str, Sweep]] = {}
     sweep_all(list(KNOBS), sweeps)
     return sweeps
 
 
 def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None:
-    """Turn the knobs one after another; each is in ``sweeps`` as soon as it is done."""
+    """Sweep the knobs in turn; each enters ``sweeps`` when done."""
     runs = sum(len(KNOBS[name].runs) for name in names)
     with progress() as step:
         for name in names:
@@ -134,7 +133,7 @@ def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None
 
 
 def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """A picture for each knob."""
+    """A picture per knob."""
     drawn = []
     for name, methods in sweeps.items():
         drawn.append(folder / f"{name}.svg")
@@ -143,6 +142,6 @@ def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
 
 
 def draw_for_page(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """The same in a folder of their own among the pictures of the pages, without those that :data:`SAID` replaces."""
+    """Pictures in their own folder, without those that :data:`SAID` replaces."""
     (folder / "failures").mkdir(exist_ok=True)
     return draw(folder / "failures", {name: methods for name, methods in sweeps.items() if name not in SAID})

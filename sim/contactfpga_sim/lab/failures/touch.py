@@ -1,8 +1,7 @@
-"""Knobs of touch: close contacts, a light one, a moving one, bouncing switches, a winding arm, crossing shadows, too
-many zones.
+"""Knobs of touch.
 
-Fingers press a bare sheet, on which a switch closes under the middle of a contact whatever its force, and the starter
-kit's sheet with its cover.
+Fingers press a bare sheet, whose switches close under a contact's middle whatever its force, and the starter kit's
+covered sheet.
 """
 
 from __future__ import annotations
@@ -41,28 +40,25 @@ COVER = load_cover(STARTER.skin_path)
 
 
 def _middle(pitch_mm: float, rng: np.random.Generator) -> np.ndarray:
-    """Any place of a pitch near the middle of the sheet, in mm."""
     return pitch_mm * rng.uniform(7, 8, 2)
 
 
 def _pair(
     gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator, force_n: float | None = None
 ) -> Scene:
-    """Two fingers around :func:`_middle`, at any angle, each with this force."""
     x, y = _middle(pitch_mm, rng)
     forces = {} if force_n is None else {"force_n": force_n}
     return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180), **forces))
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius; the gateware does not depend on the pitch."""
+    """Outcomes of two fingers; the gateware does not depend on the pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
 
 
 def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers of 8 mm radius with this force each, on the starter kit's sheet."""
     skin = STARTER.skin
     scenes = (_pair(gap_mm, 8.0, skin.pitch_x_mm, rng, force_n) for _ in range(count))
     cells = np.array([scene.pressed(0.0, skin, COVER) for scene in scenes])
@@ -70,7 +66,6 @@ def _closing_covered(force_n: float, gap_mm: float, rng: np.random.Generator, co
 
 
 def _counted(zones: Zones, cells: np.ndarray, there: int) -> Outcome:
-    """Right if there are as many zones as contacts."""
     what = f"{plural(len(zones), 'zone')} of {plural(there, 'contact')}"
     return Outcome(len(zones) == there, faults(zones), what, cells=cells, zones=places(zones))
 
@@ -102,7 +97,6 @@ CLOSING = Knob(
 
 
 def _light(radius_mm: float, force_n: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """One finger anywhere near the middle of the starter kit's sheet."""
     skin, cells = STARTER.skin, []
     for _ in range(count):
         x, y = _middle(skin.pitch_x_mm, rng)
@@ -123,15 +117,14 @@ LIGHT = Knob(
 )
 
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
-"""Directions of motion: along columns and rows, both ways."""
+"""Directions along columns and rows, both ways."""
 
 FIRST, LAST = 2.0, 13.0
 """Start and end of a moving finger, in pitches."""
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame with the largest error of its zone at its time, for a finger of 10 N that starts at any phase;
-    infinite without exactly one zone."""
+    """The frame with the largest error, for a finger of 10 N from any phase; infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -186,14 +179,13 @@ BOUNCING = Skin(rows=4, columns=4, baud=6_000_000)
 
 
 def debounced(method: str) -> Skin:
-    """A sheet whose debounce times are :data:`DEBOUNCE_SCANS` scans."""
+    """A sheet with debounce times of :data:`DEBOUNCE_SCANS` scans."""
     scan_us = BOUNCING.derived.frame_clocks / BOUNCING.derived.clocks_per_us
     times = {"debounce_press_us": DEBOUNCE_SCANS * scan_us, "debounce_release_us": DEBOUNCE_SCANS * scan_us}
     return BOUNCING.replace(debounce=method, **times)
 
 
 def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
-    """Touches that the host sees when a switch closes, opens and closes again."""
     rest, touch = np.zeros((2, 1, skin.rows, skin.columns), bool)
     touch[0, 2, 1] = True
     clocks = skin.derived.clocks_per_us
@@ -208,7 +200,6 @@ def _touches(skin: Skin, closed_us: float, open_us: float, phase: int) -> int:
 
 
 def _bounce(skin: Skin, open_us: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of a switch that closes at any phase for 30 to 300 us, then opens and closes again."""
     closed_us, phases = np.geomspace(30, 300, 100), rng.integers(0, skin.derived.frame_clocks, count)
     counts = [
         _touches(skin, closed, open_us, int(phase)) for closed, phase in zip(rng.choice(closed_us, count), phases)
@@ -239,7 +230,7 @@ SKINS = {name: REFERENCE.replace(labeller=name) for name in LABELLERS}
 
 
 def arm(size: int, quarters: int) -> np.ndarray:
-    """(size, size) bool: an arm one cell wide that winds inward, a free cell between its turns."""
+    """(size, size) bool: an arm one cell wide that winds inward with a free cell between turns."""
     cells = np.zeros((size, size), bool)
     y, x, (dy, dx) = 0, 0, (0, 1)
     cells[y, x] = True
@@ -252,7 +243,6 @@ def arm(size: int, quarters: int) -> np.ndarray:
 
 
 def _winding(skin: Skin, quarters: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of the winding arm, turned and mirrored at random."""
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)
@@ -310,7 +300,6 @@ CROSSING = Knob(
 
 
 def _many(skin: Skin, count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of isolated single cells."""
     cells = np.zeros((draws, skin.rows // 2, skin.columns // 2), bool)
     for each in cells:
         each.flat[rng.choice(each.size, int(count), replace=False)] = True

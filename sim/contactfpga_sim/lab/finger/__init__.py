@@ -1,1 +1,1 @@
-"""From a finger on the sheet to the code that acts on it, stage by stage."""
+"""Times from a finger on the sheet to the code that acts, by stage."""

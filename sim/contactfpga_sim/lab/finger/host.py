@@ -1,8 +1,7 @@
 """The host's share of a touch, measured: the driver reads a board on a pseudo-terminal.
 
-A process of its own is the board and its USB bridge: it runs the compiled gateware, answers requests, and writes each
-packet when the bridge would deliver it. This program opens the port and waits for frames. Writing to the
-pseudo-terminal stands for the USB controller's interrupt and the kernel's driver.
+A second process is board and USB bridge: it runs the compiled gateware, answers requests, and writes each packet when
+the bridge would. Writing to the pseudo-terminal stands for the USB controller's interrupt and the kernel's driver.
 """
 
 from __future__ import annotations
@@ -29,40 +28,34 @@ from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
 TOUCHES = 100
 
 PHASE = 0.7548776662466927
-"""Its multiples sample a bridge period evenly, whatever their number, independent of the scan."""
+"""Fraction whose multiples sample a bridge period evenly."""
 
 LEAD_US = 5_000
-"""Time before a touch from which packets are written on time; earlier ones are written at once."""
+"""Time before a touch from which packets are written on time."""
 
 SPIN_S = 300e-6
 """Possible oversleep; the rest of a wait polls the clock."""
 
 LATE_S, LATE_US = 0.5e-3, 2_000
-"""A touch is left out if a busy machine wrote a packet late by more than LATE_S in the last LATE_US before the touch's
-own: a burst would keep the driver busy as no bridge does."""
+"""A touch is left out if a busy machine wrote a packet late by more than LATE_S in the last LATE_US before it:
+bursts would keep the driver busy."""
 
 TRIES = 3
-"""Most touches played per wanted one."""
 
 WAIT_S = 10.0
-"""Timeout for a frame, far longer than needed."""
 
 TIME_MASK = (1 << 24) - 1
-"""Mask of a frame's time on the wire."""
 
 
 @dataclasses.dataclass(frozen=True)
 class HostShare:
-    """Times from the bytes at the port to the zones in user code, on one machine."""
+    """Times from bytes at the port to zones in user code, on one machine."""
 
     us: Spread
     touches: int
     left_out: int
-    """Touches left out because the machine was busy (:data:`LATE_S`)."""
     machine: str
-    """Description of the machine."""
     times: MixedTimes = dataclasses.field(repr=False, compare=False)
-    """The times in us."""
 
 
 def measured(
@@ -72,8 +65,8 @@ def measured(
     touches: int = TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> HostShare | None:
-    """The host's share over touches by these (R, C) bool contacts in turn. None without pseudo-terminals, or if the
-    machine is too busy for a single touch."""
+    """The host's share over touches by these (R, C) bool contacts in turn. None without pseudo-terminals, or on too
+    busy a machine."""
     if not hasattr(os, "openpty"):
         return None
     found: list[float] = []
@@ -102,7 +95,6 @@ def measured(
 
 
 def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
-    """Wait for a touch's frame and zones, as user code does; returns us."""
     while True:
         zones = board.next(WAIT_S)
         tuple(zones)
@@ -112,7 +104,7 @@ def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
 
 
 def machine() -> str:
-    """This machine and its Python in a few words."""
+    """This machine and its Python."""
     processor = platform.processor() or platform.machine()
     if (about := Path("/proc/cpuinfo")).exists():
         names = [line.partition(":")[2].strip() for line in about.read_text().splitlines() if "model name" in line]
@@ -123,8 +115,6 @@ def machine() -> str:
 
 
 class _Player:
-    """A player of the board and its bridge."""
-
     def __init__(self, skin: Skin, settings: BridgeSettings, contacts: Sequence[np.ndarray], touches: int):
         import tty  # no such module on Windows
 
@@ -135,15 +125,13 @@ class _Player:
         self.port = os.ttyname(self._slave)
         self.go = context.Event()
         self.written_s = context.RawArray("d", touches)
-        """Per touch, ``time.monotonic`` just before the packet with its last byte was written."""
+        """``time.monotonic`` before the packet with the last byte, by touch."""
         self.time_us = context.RawArray("q", [-1] * touches)
-        """Per touch, its frame's time on the wire."""
         self.late_s = context.RawArray("d", touches)
-        """Per touch, the largest lateness of that packet and those shortly before."""
+        """Largest lateness of recent packets, by touch."""
         self.process = context.Process(target=self._run, daemon=True)
 
     def close(self) -> None:
-        """Close the pseudo-terminal."""
         os.close(self._master)
         os.close(self._slave)
 

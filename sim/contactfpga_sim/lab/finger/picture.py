@@ -1,4 +1,4 @@
-"""A bar for each stage from a touch to user code, and the paper's time beside their sum."""
+"""A bar per stage from touch to user code, and the paper's time."""
 
 from __future__ import annotations
 
@@ -16,17 +16,16 @@ from contactfpga_sim.lab.spread import Spread
 EXACT, MEASURED, PAPER = style.BLUE, style.ORANGE, style.GRAY
 
 PALE = 0.35
-"""Share of a bar's color from the median to the worst."""
 
 
 def save(found: Finger, title: str, path: Path) -> Path:
-    """Draw the picture; the same numbers give the same file."""
+    """Draw the picture; equal numbers give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture(found, title), path)
 
 
 def picture(found: Finger, title: str) -> Figure:
-    """Stages downward in order, each alone, then the sums; times along."""
+    """Stages downward in order, then sums; times along."""
     bars = _bars(found)
     figure = style.new(0.36 * (len(bars) + 1) + 2.2)
     above, below = figure.subplots(2, 1, height_ratios=[len(bars) + 0.3, 2.6])

@@ -17,7 +17,7 @@ from contactfpga_sim.lab.spread import MEDIAN, MOST, MixedTimes, Spread, summed
 from contactfpga_sim.lab.usb import BridgeSettings, delivered
 
 PAPER_US = 6000.0
-"""The paper's time for sheet and control together, from a touch to the decision to turn back, in us."""
+"""The paper's time from a touch to the decision to turn back."""
 
 ASSUMED_HOST_US = 1e6 * Usb().host_s
 """Time from the host's USB controller to the decision, as in ``contactfpga study arm``."""
@@ -29,26 +29,24 @@ class TooFast(ContactFPGAError, ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Finger:
-    """Results of :func:`measure`. Times in us; all but ``host`` and ``user_code_us`` are exact."""
+    """Results of :func:`measure`, in us; all but ``host`` and ``user_code_us`` are exact."""
 
     board: Latency
     settings: BridgeSettings
     bridge_us: Spread
-    """From the last byte on the wire to the host's USB controller."""
+    """Time from the last byte on the wire to the host's USB controller."""
     usb_us: Spread
-    """From the touch to the host's USB controller."""
+    """Time from the touch to the host's USB controller."""
     host: HostShare | None
-    """None: not measured."""
     user_code_us: Spread | None
-    """From the touch to user code on that machine: each exact time with each measured one."""
+    """Time from the touch to user code: each exact time with each measured one."""
 
     @property
     def decision_us(self) -> Spread:
-        """From the touch to the decision, with :data:`ASSUMED_HOST_US` in place of the host's time."""
+        """Time from the touch to the decision, with :data:`ASSUMED_HOST_US` for the host."""
         return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
 
     def as_json(self) -> dict[str, Any]:
-        """All results as plain values."""
         board = dataclasses.asdict(dataclasses.replace(self.board, recorded=()))
         del board["recorded"]
         shares = self.host
@@ -79,8 +77,8 @@ def measure(
     host_touches: int = host.TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> Finger:
-    """The board's stages by :func:`contactfpga_sim.lab.latency.measure`, the bridge's over all its phases, and the
-    host's over ``host_touches``, 0 for none.
+    """The board's stages by :func:`contactfpga_sim.lab.latency.measure`, the bridge's over all phases, and the host's
+    over ``host_touches``, 0 for none.
 
     Raises ValueError for a contact that does not fit, :class:`TooFast`, and :class:`~contactfpga_sim.lab.latency.Late`.
     """

@@ -1,1 +1,1 @@
-"""The cheapest Skin that meets stated errors and a stated time on given scenes."""
+"""The cheapest Skin that meets limits of errors and time on given scenes."""

@@ -1,4 +1,4 @@
-"""The Skins to try: every method at every pitch under every cover, on sheets of one size."""
+"""Skins to try: every method, pitch and cover, on sheets of one size."""
 
 from __future__ import annotations
 
@@ -17,20 +17,19 @@ from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:
-    """The methods of a labeller; connectivity matters to exact ones."""
+    """Methods of a labeller; connectivity matters to exact ones."""
     settings = {"labeller": labeller.name, "report": "moments"}
     return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
 
 
 METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
-"""Methods to try. On-board division is not among them: it costs more LUT4 and saves only microseconds per zone."""
+"""Methods to try. On-board division costs more LUT4 and saves only microseconds per zone."""
 
 COARSEST_MM, FINEST_MM = 32.0, 4.0
-"""Range of pitches, with every whole number of columns."""
+"""Range of pitches, by whole columns."""
 
 
 SHEET = ("rows", "columns", "pitch_x_mm", "pitch_y_mm")
-"""Settings of the sheet itself."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,9 +40,7 @@ class Candidate:
     """Differences from the requested Skin, sorted by name."""
     skin: Skin | None
     refusal: str = ""
-    """Error message of Skin or Cover."""
     cover: Cover | None = None
-    """Cover through which contacts press."""
 
 
 def candidates(
@@ -55,8 +52,8 @@ def candidates(
     bauds: Sequence[int] | None = None,
     covers: Faces = BARE,
 ) -> list[Candidate]:
-    """``base`` with each pitch (x, y) near the given ones that divides the sheet, each cover, method, scan and baud
-    rate. Default ``scans``: those that fit the columns of ``base``, with or without precharge."""
+    """``base`` with each near pitch (x, y) that divides the sheet, cover, method, scan and baud rate. Default
+    ``scans``: those that fit its columns."""
     if scans is None:
         scans = [name for name, scan in SCANS.items() if not scan.waits or base.precharge_us]
     found = {}
@@ -95,10 +92,8 @@ def _candidate(base: Skin, settings: dict[str, Any], cover: Cover | None, wide: 
 
 
 def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
-    """Size of the sheet: the requested Skin's, else the sources', else the reference Skin's.
-
-    Raises ValueError if two disagree.
-    """
+    """Size of the sheet: the requested Skin's, else the sources', else the reference Skin's. Raises ValueError if
+    two disagree."""
     asked = {one: size for one in sources if (size := one.size_mm())}
     if base is not None:
         asked = {one: size for one, size in asked.items() if isinstance(one, Recorded)}
@@ -117,8 +112,8 @@ def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
 
 
 def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[float] | None) -> list[Size]:
-    """Pitches (x, y) in mm to try: those requested, else every whole number of columns from :data:`COARSEST_MM` to
-    :data:`FINEST_MM` and the requested Skin's; for a recording only its own."""
+    """Pitches (x, y) in mm: those requested, else every whole number of columns from :data:`COARSEST_MM` to
+    :data:`FINEST_MM` and the requested Skin's; a recording's own."""
     for pitch in asked or ():
         if not 0 < pitch < math.inf:
             raise ValueError(f"--pitch-mm is {pitch}; it must be above 0")

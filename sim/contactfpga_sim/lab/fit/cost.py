@@ -1,4 +1,4 @@
-"""Cost of Skins: LUT4 from synthesis, computed only as far as ranking the cheapest needs."""
+"""Cost of Skins in LUT4, computed only as far as ranking needs."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from contactfpga_sim.lab import kept, size
 from contactfpga_sim.lab.fit.trial import SoFar, Step, Trial, gathered
 
 DEVICE = sizes.UP5K
-"""Device whose LUT4 are counted."""
 
 
 def sized(
     name: str, trials: Iterable[Trial], executor: Executor, step: Step, so_far: SoFar | None = None, before: int = 0
 ) -> list[Trial]:
-    """The trials with LUT4, the cheapest first; ``before``: pieces of this kind already done."""
+    """Trials with LUT4, the cheapest first; ``before``: pieces of this kind already done."""
     given = list(trials)
     luts: dict[Skin, int] = {}
     try:
@@ -32,7 +31,7 @@ def sized(
 
 
 def luts_of(skin: Skin) -> int:
-    """LUT4 of the whole design on the :data:`DEVICE`; some seconds unless cached."""
+    """LUT4 of the design; takes seconds unless cached."""
     key = f"{kept.made_by(__name__, skin)} {size.tools(DEVICE)}"  # spares looking at the netlist of the same Skin again
     found: int = kept.kept("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
     return found

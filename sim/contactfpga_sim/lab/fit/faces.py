@@ -1,4 +1,4 @@
-"""The covers to try on each sheet, and how well a fingertip is felt through one."""
+"""Covers to try, and how well a fingertip is felt through one."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ KINDS = ("caps", "tiles")
 """Keys of :data:`contactfpga_sim.lab.covers.COVERS` that work with any switch."""
 
 DOMES_N = (0.15, 0.25, 0.4, 0.6, 1.0)
-"""Closing forces of the switches below the covers."""
 
 Faces = dict[str, Callable[[float], Cover | None]]
-"""Covers by name, as functions of the pitch in mm; None: no cover."""
+"""Covers by name, as functions of pitch in mm; None: no cover."""
 
 BARE: Faces = {"bare": covers.bare}
 
@@ -43,12 +42,12 @@ def _on_domes(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cov
 
 
 def own(cover: Cover) -> Faces:
-    """The same cover for every sheet."""
+    """One cover for every sheet."""
     return {"the file's": lambda pitch_mm: cover}
 
 
 def refusal(cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
-    """Why switches at this pitch do not fit the cover; empty if they do."""
+    """Why switches at this pitch do not fit the cover, or empty."""
     if cover is None or cover.model == "patch":
         return ""
     try:
@@ -64,18 +63,16 @@ def feels(cover: Cover | None) -> bool:
 
 
 TOUCHES = 8
-"""Fingertip touches per scene."""
 
 FINGERTIP_M = (12e-3, 10e-3)
-"""Length and width of the fingertip's ellipse."""
 
 LINES = 9
-"""Rows and columns of the piece of sheet; touches are on its middle cell."""
+"""Sides of the sheet; touches are on its middle cell."""
 
 
 def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers: Sequence[int]) -> list[float]:
-    """For each of the :data:`TOUCHES` of each number, 1 if a fingertip with ``force_n``, randomly placed and turned in
-    the sheet's middle, closes no switch, else 0. Closing forces are drawn for each."""
+    """1 for each of the :data:`TOUCHES` of each number in which a fingertip with ``force_n``, randomly placed and
+    turned, closes no switch, else 0. Closing forces are drawn for each."""
     pitch_x, pitch_y = (pitch * 1e-3 for pitch in pitch_mm)
     cells = cells_of(cover, LINES, LINES, pitch_x, pitch_y)
     found = []

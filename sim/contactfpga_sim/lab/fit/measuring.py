@@ -1,4 +1,4 @@
-"""Errors and times of one Skin on the scenes of one source, cached by their inputs."""
+"""Errors and times of a Skin on one source, cached by inputs."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from contactfpga_sim.lab.fit.sources import Recorded, Source
 from contactfpga_sim.lab.fit.trial import FitTask
 
 Values = dict[str, list[float]]
-"""By metric, a value per scene or per fingertip touch."""
+"""Value per scene or fingertip touch, by metric."""
 
 
 def errors_of(
     task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, others: bool
 ) -> list[dict[str, Interval]]:
-    """Errors by metric of each Skin's zones; all Skins have the same sheet and cover. ``others``: on all scenes
-    reserved for the report; else on as many as a decision needs. A recording has no chance in it: all frames count."""
+    """Errors by metric of each Skin's zones, on one sheet and cover. ``others``: on all scenes reserved for the
+    report, else on as many as a decision needs. All frames of a recording count."""
     count = source.most(task.count)
     ends = [count] if others or isinstance(source, Recorded) else racing.ends(count)
     values: list[Values] = [{} for _ in skins]
@@ -71,12 +71,12 @@ def _compared(looks: Sequence[Look], skin: Skin) -> Values:
 
 
 def exact(skin: Skin) -> bool:
-    """Whether its zones are exactly the connected pieces, and so depend on connectivity alone."""
+    """Whether zones are exactly the connected pieces: connectivity alone decides."""
     return skin.report == "cells" or (skin.report == "moments" and labellers.find(skin.labeller).exact)
 
 
 def speed_of(task: FitTask, source: Source, skin: Skin, cover: Cover | None, others: bool, checked: int) -> Speed:
-    """Times of touches over the same scenes; ``checked`` of them also go through the compiled gateware."""
+    """Times of touches over the scenes, ``checked`` of them also through the gateware."""
 
     def new() -> dict[str, float]:
         frames = [cells for cells in source.cells(skin, task.base, numbers, count, cover) if cells.any()]

@@ -1,8 +1,7 @@
 """Sequential test: a Skin that surely misses a limit is dropped, one that surely meets all is kept.
 
-After each batch of scenes a Skin may be decided, by the ends of confidence intervals; each side errs with at most 2.5
-%, shared equally by all looks. Shares have Chernoff's interval, valid for any values from 0 to 1 and any count; other
-errors have the normal distribution's.
+Ends of confidence intervals decide after each batch of scenes; each side errs with at most 2.5 %, shared by all looks.
+Shares have Chernoff's interval, valid for any values from 0 to 1 and any count; other errors the normal one.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ import numpy as np
 from contactfpga_sim.lab.fit.trial import SHARES, Goals
 
 FIRST = 20
-"""Scenes in the first batch; each look doubles the number."""
+"""Scenes in the first batch; looks double them."""
 
 ENOUGH = 30
-"""Values from which their mean counts as normally distributed."""
+"""Values whose mean counts as normally distributed."""
 
 ERR = 0.025
-"""Error probability of one side of the interval, over all looks."""
+"""Error probability of a side, over all looks."""
 
 
 def ends(count: int) -> list[int]:
-    """Scenes after each batch, finally ``count``."""
+    """Scenes after each batch."""
     found = []
     reach = FIRST
     while reach < count:
@@ -36,7 +35,7 @@ def ends(count: int) -> list[int]:
 
 
 def decided(goals: Goals, values: dict[str, list[float]], looks: int) -> bool | None:
-    """True: all limits are met; False: one is missed; None: more scenes are needed. ``values``: by metric."""
+    """Whether all limits are met; None: more scenes are needed. ``values``: by metric."""
     met = True
     for name, limit in goals.limits():
         if name not in values:
@@ -49,7 +48,7 @@ def decided(goals: Goals, values: dict[str, list[float]], looks: int) -> bool | 
 
 
 def bounds(name: str, values: Sequence[float], err: float) -> tuple[float, float]:
-    """Bounds of a metric's mean, each wrong with at most this probability."""
+    """Bounds of a metric's mean, each wrong with at most probability ``err``."""
     known = np.array([value for value in values if not math.isnan(value)], float)
     if not len(known):
         return -math.inf, math.inf
@@ -64,8 +63,8 @@ def bounds(name: str, values: Sequence[float], err: float) -> tuple[float, float
 
 
 def chernoff(mean: float, count: int, err: float, end: float) -> float:
-    """The value between ``mean`` and ``end``, 0 or 1, whose relative entropy is ln(1/err)/count: the mean of values
-    from 0 to 1 is beyond it with probability at most ``err`` (Hoeffding 1963, theorem 1)."""
+    """Value between ``mean`` and ``end``, 0 or 1, with relative entropy ln(1/err)/count: the mean is beyond it with
+    probability at most ``err`` (Hoeffding 1963, theorem 1)."""
     most = math.log(1 / err) / count
     near, far = mean, end
     for _ in range(60):
@@ -75,6 +74,5 @@ def chernoff(mean: float, count: int, err: float, end: float) -> float:
 
 
 def _entropy(p: float, q: float) -> float:
-    """Relative entropy of coins with probabilities p and q."""
     parts = ((p, q), (1 - p, 1 - q))
     return sum(one * math.log(one / other) if other else math.inf for one, other in parts if one)

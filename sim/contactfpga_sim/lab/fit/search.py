@@ -1,4 +1,4 @@
-"""The search: sheets with the fewest wires first; errors and times of each, then the size of the good ones."""
+"""The search: sheets with the fewest wires first; errors and times, then the size of good ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga_sim.lab.fit.measuring import errors_of, exact, speed_of
 from contactfpga_sim.lab.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 
 CHECKED = 2
-"""Reported touches of the answer that also go through the compiled gateware."""
+"""Touches of the answer that also go through the gateware."""
 
 ZONES_ON_HOST = "reports no zones: say with --host-us how long the host takes to find them"
 
@@ -29,8 +29,8 @@ def fit(
     step: Step = lambda name, of: None,
     so_far: SoFar | None = None,
 ) -> Fit:
-    """Choose a Skin; ``step(kind of work, pieces of that kind)`` is called after each piece. Results of the same code
-    are cached. The order of candidates and sources does not matter. ``so_far`` serves a search that is interrupted."""
+    """Choose a Skin, whatever the order of candidates and sources; ``step(kind of work, pieces of that kind)``
+    follows each piece. Results are cached by code. ``so_far`` serves an interrupted search."""
     so_far = {} if so_far is None else so_far
     ordered = sorted(tried, key=lambda one: repr(one.settings))
     impossible = [Trial(one, refusals=(one.refusal,)) for one in ordered if one.skin is None]
@@ -80,8 +80,6 @@ def _none(task: FitTask, trials: list[Trial], impossible: list[Trial], executor:
 def _judged(
     task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, before: int
 ) -> list[Trial]:
-    """All candidates with their missed limits on the choosing scenes; times only for small errors. ``before``: pieces
-    done earlier."""
     sheets: dict[Settings, dict[Settings, Candidate]] = {}
     for one in tried:
         sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one)
@@ -140,12 +138,11 @@ Settings = tuple[tuple[str, Any], ...]
 
 
 def _sheet(one: Candidate) -> Settings:
-    """The sheet's settings, and its cover."""
     return tuple((name, value) for name, value in one.settings if name in (*SHEET, "cover"))
 
 
 def _sees(one: Candidate) -> Settings:
-    """The settings that decide which zones it finds."""
+    """Settings that decide which zones a candidate finds."""
     assert one.skin is not None
     if exact(one.skin):
         return (("connectivity", one.skin.connectivity),)
@@ -153,7 +150,6 @@ def _sees(one: Candidate) -> Settings:
 
 
 def _words(task: FitTask, measured: Sequence[Measurement], sure: bool = True) -> tuple[str, ...]:
-    """The missed limits, per source if there are several."""
     several = len(task.sources) > 1
     return tuple(
         f"{name}: {words}" if several else words
@@ -163,7 +159,6 @@ def _words(task: FitTask, measured: Sequence[Measurement], sure: bool = True) ->
 
 
 def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurement:
-    """The measurement plus the host's labelling time, if the host labels."""
     if skin is None or skin.report != "cells" or task.host_us is None:
         return found
     assert found.speed is not None
@@ -174,7 +169,6 @@ def _with_host(task: FitTask, skin: Skin | None, found: Measurement) -> Measurem
 def _reported(
     task: FitTask, trials: Sequence[Trial], executor: Executor, step: Step, checked: int
 ) -> tuple[tuple[Measurement, ...], ...]:
-    """Measurements on the other scenes; touches of the first Skin are checked against the gateware."""
     jobs: dict[Hashable, tuple[Any, ...]] = {}
     for number, one in enumerate(trials):
         for source in task.sources:

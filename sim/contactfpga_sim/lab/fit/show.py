@@ -1,4 +1,4 @@
-"""A fit's result as a table, text, JSON and a Skin file."""
+"""A fit's result as table, text, JSON and Skin file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga_sim.lab.fit.sources import Recorded
 from contactfpga_sim.lab.fit.trial import Fit, Measurement, Trial
 
 HEADS = ("zones by", "scan", "cover", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
-"""Column headings; cover and baud are omitted if all have the same."""
+"""Column headings; equal covers and bauds are omitted."""
 
 SHEETS = 12
 """Refused sheets that get a line: the finest."""
@@ -34,20 +34,19 @@ def printed(found: Fit) -> None:
 
 
 def printed_so_far(trials: Iterable[Trial]) -> None:
-    """Print the results of an interrupted search."""
+    """Print an interrupted search."""
     _print(rows_so_far(trials))
 
 
 def _print(lines: Sequence[Sequence[str]], keys: int = 4, bold: str | None = None) -> None:
-    """Print Skins: first what distinguishes them, last the verdict."""
     styles = {number: "bold" for number, line in enumerate(lines[1:]) if line[-1] == bold}
     tables.show(lines, keys=keys, texts=[len(lines[0]) - 1] if keys > 1 else [], styles=styles)
 
 
 def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
-    """The head, a line for the refused ones of each sheet with fewer wires and of each cover on the answer's sheet, the
-    answer and the runner-up; without an answer a line per sheet, the nearest first. ``impossible``: end with the Skins
-    that cannot exist."""
+    """The head, a line for the refused ones of each sheet with fewer wires and each cover on the answer's sheet,
+    answer and runner-up; without an answer a line per sheet, the nearest first. ``impossible``: end with Skins that
+    cannot exist."""
     lines = [_row(one, _why(one, of)) for one, of in _told(fit)]
     if fit.answer:
         lines.append(_row(fit.answer, "the answer"))
@@ -59,8 +58,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """The refused trials to show, with the number each represents: on the answer's sheet, one per other cover there,
-    one per sheet with fewer wires up to :data:`SHEETS`; without an answer one per sheet."""
+    """Refused trials to show, each with the number it represents: one per other cover on the answer's sheet and per
+    sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer
@@ -90,13 +89,13 @@ def _without_same(table: list[list[str]]) -> list[list[str]]:
 
 
 def rows_so_far(trials: Iterable[Trial]) -> list[list[str]]:
-    """The head, and a line for each measured Skin of an interrupted search, the nearest first."""
+    """The head, and a line per Skin of an interrupted search, the nearest first."""
     nearest = sorted(trials, key=lambda one: (one.excess, one.cost))
     return _without_same([list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)])
 
 
 def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
-    """The results of an interrupted search for JSON."""
+    """An interrupted search for JSON."""
     return {"interrupted": True, "measured": [_trial(one) for one in sorted(trials, key=lambda one: one.excess)]}
 
 
@@ -112,7 +111,6 @@ def _bytes(trial: Trial) -> str:
 
 
 def _latency(speeds: Sequence[Speed]) -> str:
-    """Median and worst latency of the slowest source."""
     if not speeds:
         return ""
     return f"{max(one.median_us for one in speeds):.0f} / {max(one.worst_us for one in speeds):.0f}"
@@ -155,7 +153,7 @@ def name(trial: Trial) -> str:
 
 
 def reported(fit: Fit) -> list[list[str]]:
-    """The head, and a line per Skin and source, measured on the other scenes."""
+    """The head, and a line per Skin and source on other scenes."""
     feels = any("unfelt" in one.errors for measured in fit.reported for one in measured)
     metrics = [*METRICS, "unfelt"] if feels else METRICS
     felt = [f"not felt at {fit.task.goals.felt_n:g} N"] * feels
@@ -178,7 +176,7 @@ def _error(metric: str, error: Interval) -> str:
 
 
 def notes(fit: Fit) -> list[str]:
-    """Remarks on the answer, or on its absence."""
+    """Remarks on the answer or its absence."""
     lines = []
     if fit.answer is None:
         lines.append("No Skin that was tried meets the limits.")

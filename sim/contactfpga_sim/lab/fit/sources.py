@@ -1,7 +1,7 @@
-"""Sources of scenes: families, built-in scenes, scene files and recordings, one scene per number.
+"""Sources of scenes, one scene per number.
 
-Scenes depend on the source's content and the number only, never on name or order. Numbers below a count are for
-choosing, later ones for the report.
+Scenes depend on the source's content and the number, not on name or order. Numbers below a count are for choosing,
+later ones for the report.
 """
 
 from __future__ import annotations
@@ -26,13 +26,12 @@ from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, Scene
 
 SHIFT_MM = 10.0
-"""Largest random shift of a built-in scene along x and y."""
+"""Largest shift of a built-in scene along an axis."""
 
 SECONDS = 1.0
-"""A built-in scene is sampled at a random instant of its first second."""
+"""Built-in scenes are sampled within this time."""
 
 COUNT = 500
-"""Default number of choosing scenes."""
 
 Size = tuple[float, float]
 """Width and height of a sheet in mm."""
@@ -43,25 +42,23 @@ class Source(abc.ABC):
     """Scenes to choose a Skin with, and others to report."""
 
     def size_mm(self) -> Size | None:
-        """Sheet size that the scenes need; None: any."""
         return None
 
     def most(self, count: int) -> int:
-        """Available choosing scenes, at most ``count``; as many are for the report."""
+        """Available choosing scenes, at most ``count``; the report has as many."""
         return count
 
     @abc.abstractmethod
     def looks(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[Look]:
-        """The scenes with these numbers, below twice ``count``, on a sheet under a cover; ``base``: the requested
-        Skin."""
+        """Scenes with these numbers, below twice ``count``, on a sheet under a cover; ``base``: the requested Skin."""
 
     @abc.abstractmethod
     def cells(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[np.ndarray]:
-        """The pressed (R, C) bool cells of these scenes, without the true contacts."""
+        """Pressed (R, C) bool cells of these scenes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,7 +126,7 @@ def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
 
 @dataclasses.dataclass(frozen=True)
 class File(Placed):
-    """The contacts of a scene file."""
+    """Contacts of a scene file."""
 
     says: SceneFile
 
@@ -143,8 +140,8 @@ class File(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Recorded(Source):
-    """A recording: cells of one sheet without contacts. The truth is their connected pieces, by the requested Skin's
-    connectivity. Choosing scenes are from its first half, report scenes from the second, evenly spaced."""
+    """A recording of one sheet's cells; the truth is their connected pieces by the requested Skin's connectivity.
+    Choosing scenes are from the first half, report scenes from the second."""
 
     path: str
     digest: str
@@ -152,7 +149,6 @@ class Recorded(Source):
 
     @property
     def recording(self) -> Recording:
-        """The file's recording."""
         return _recording(self.path, self.digest, self.threshold)
 
     def size_mm(self) -> Size | None:
@@ -183,11 +179,10 @@ def _recording(path: str, digest: str, threshold: float | None) -> Recording:
 
 
 def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
-    """A source by the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a
-    recording.
+    """A source by name of a family or built-in scene, or by path: .toml of a scene file, .npz or .npy of a recording.
 
-    ``seed`` of the places replaces the file's. ``threshold``: above it a recording's numbers are pressed. Families take
-    precedence over scenes. Raises ValueError for anything else.
+    ``seed`` replaces the file's. A recording's numbers above ``threshold`` are pressed. Families take precedence over
+    scenes. Raises ValueError.
     """
     if name in FAMILIES:
         return Family(name, seed or 0)

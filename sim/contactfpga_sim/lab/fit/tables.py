@@ -1,4 +1,4 @@
-"""Writes the choices of `contactfpga fit` for the examples into docs/fit.md."""
+"""Choices of `contactfpga fit` for the examples of docs/fit.md."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga_sim.lab.fit.search import fit
 
 
 def section(arguments: str) -> str:
-    """The command and its output, without settings that Skin itself refuses and the check of the runner-up."""
+    """A command and its output, without settings that Skin refuses."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()

@@ -1,4 +1,4 @@
-"""The task, its goals, the trials and the result of a fit."""
+"""Task, goals, trials and result of a fit."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from contactfpga_sim.lab.fit.sources import Source
 
 @dataclasses.dataclass(frozen=True)
 class Measurement:
-    """One Skin on the scenes of one source."""
+    """A Skin on the scenes of one source."""
 
     errors: dict[str, Interval]
-    """Errors of its zones by metric."""
     speed: Speed | None = None
-    """None if not measured, because errors are too large."""
+    """Speed; None if errors are too large."""
 
 
 DOUBT = ": too few scenes to tell"
@@ -31,8 +30,8 @@ DOUBT = ": too few scenes to tell"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Goals:
-    """Limits; None: no limit. A mean error meets its limit if the upper end of its 95 % interval does, so that unseen
-    scenes most likely agree; a time does if the worst measured one does."""
+    """Limits; None: no limit. The upper end of a mean error's 95 % interval must meet it, so that unseen scenes most
+    likely agree; so must the worst measured time."""
 
     miscounted: float | None = 0.05
     """Share of scenes with a wrong number of zones."""
@@ -41,13 +40,12 @@ class Goals:
     barycenter_mm: float | None = 5.0
     """Mean distance of a zone's barycenter from its contact's."""
     area: float | None = None
-    """Mean of a zone's error in area over the contact's area."""
+    """Mean error of a zone's area over the contact's."""
     latency_us: float | None = 1000.0
-    """From the touch to the last byte of the frame that holds all of it."""
+    """Time from the touch to the last byte of its complete frame."""
     unfelt: float | None = 0.01
-    """Share of fingertip touches that close no switch; for covers that depend on force."""
+    """Share of fingertip touches that close no switch, under covers with force."""
     felt_n: float = 2.0
-    """Force in N of these touches."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -56,8 +54,8 @@ class Goals:
                 raise ValueError(f"the limit of {field.name} is {value}; it must be above 0")
 
     def check_count(self, count: int, feeling: bool = False) -> None:
-        """Raises ValueError if this many scenes without an error could not show that a share is below its limit;
-        ``feeling``: includes fingertip touches."""
+        """Raise ValueError if this many scenes without error could not show a share below its limit; ``feeling``:
+        with fingertip touches."""
         for name, each in (("miscounted", 1), ("missed", 1), ("unfelt", TOUCHES if feeling else 0)):
             limit, of = getattr(self, name), count * each
             if of and limit is not None and Z95**2 / (of + Z95**2) > limit:
@@ -68,16 +66,12 @@ class Goals:
                 )
 
     def limits(self) -> list[tuple[str, float]]:
-        """Limits of errors, by metric."""
         given = ((name, getattr(self, name)) for name, *_ in _ERRORS)
         return [(name, limit) for name, limit in given if limit is not None]
 
     def misses(self, found: Measurement, sure: bool = True) -> list[tuple[float, str]]:
-        """For each missed limit: the factor by which it is exceeded, and the measurement. If one is surely missed,
-        limits left open by few scenes are omitted.
-
-        ``sure``: judge errors by the upper ends of their intervals, else by their means.
-        """
+        """Each missed limit: factor of excess, and measurement. If one is surely missed, undecided limits are
+        omitted. ``sure``: judge errors by the upper ends of their intervals, else by means."""
         missed = list(self._missed(found, sure))
         beyond = [one for one in missed if not one[1].endswith(DOUBT)]
         return beyond or missed
@@ -103,12 +97,12 @@ class Goals:
             yield over, f"{what}, limit {self.latency_us:.0f} us"
 
     def margin(self, found: Measurement) -> float:
-        """The largest ratio of an error's upper end to its limit."""
+        """Largest ratio of an error's upper end to its limit."""
         ends = (found.errors[name].high / limit for name, limit in self.limits() if name in found.errors)
         return max(ends, default=0.0)
 
     def excess(self, found: Measurement) -> float:
-        """The largest factor by which a limit is exceeded; 1 if all are met."""
+        """Largest factor of excess; 1 if all are met."""
         return max((over for over, _ in self.misses(found)), default=1.0)
 
 
@@ -129,30 +123,28 @@ def _number(value: float) -> str:
 
 
 SoFar = dict[Candidate, "Trial"]
-"""Results of each candidate so far, without those that Skin refuses."""
+"""Results by candidate so far, without those that Skin refuses."""
 
 Step = Callable[[str, int], None]
-"""Called after each piece of work with its kind, and the number of pieces of that kind."""
+"""Called after each piece with kind of work and pieces of that kind."""
 
 TIMED = 48
-"""Touches of each source that are timed."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FitTask:
-    """A fitting task."""
+    """Inputs of a fit."""
 
     sources: tuple[Source, ...]
     names: tuple[str, ...]
-    """Names of the sources to show."""
     base: Skin
     goals: Goals
     count: int
-    """Choosing scenes of each source; as many others are for the report."""
+    """Choosing scenes of each source; the report has as many."""
     host_us: float | None = None
-    """Host time to find zones in a bitmap; None: the host does not."""
+    """Host time to label a bitmap; None: the host does not."""
     quick: bool = False
-    """Synthesize only those that meet the goals; refused ones with as many wires are not ranked."""
+    """Synthesize only those that meet the goals; do not rank refused ones with as many wires."""
     timed: int = TIMED
 
 
@@ -162,18 +154,14 @@ class Trial:
 
     candidate: Candidate
     measured: tuple[Measurement, ...] = ()
-    """One for each source."""
     refusals: tuple[str, ...] = ()
     excess: float = math.inf
-    """The largest factor by which a limit is exceeded."""
     margin: float = math.inf
-    """The largest ratio of an error's upper end to its limit."""
     luts: int | None = None
-    """LUT4 on the :data:`contactfpga_sim.lab.fit.cost.DEVICE`; None if not computed."""
+    """LUT4; None if not computed."""
 
     @property
     def skin(self) -> Skin:
-        """The Skin of the candidate."""
         assert self.candidate.skin is not None
         return self.candidate.skin
 
@@ -184,12 +172,12 @@ class Trial:
 
     @property
     def bytes(self) -> float:
-        """Median bytes of a frame, of the source with the longest frames."""
+        """Median bytes of a frame, of the source with the longest."""
         return max((one.speed.bytes for one in self.measured if one.speed), default=math.nan)
 
     @property
     def cost(self) -> tuple[float, ...]:
-        """Ranking key: wires, LUT4, bytes, then errors relative to limits."""
+        """Ranking key: wires, LUT4, bytes, errors relative to limits."""
         return (self.wires, math.inf if self.luts is None else self.luts, self.bytes, self.margin)
 
 
@@ -201,15 +189,13 @@ class Fit:
     answer: Trial | None
     runner_up: Trial | None
     cheaper: tuple[Trial, ...]
-    """Refused trials cheaper than the answer, the cheapest first; without an answer, the nearest first."""
+    """Refused cheaper trials, the cheapest first; without an answer, the nearest first."""
     impossible: tuple[Trial, ...]
-    """Candidates that Skin refuses."""
     dearer: int
-    """Number of candidates more expensive than the answer."""
     reported: tuple[tuple[Measurement, ...], ...]
-    """Measurements of the answer and the runner-up, or of the nearest, on scenes not used to choose."""
+    """Answer and runner-up, or the nearest, on scenes not used to choose."""
     broken: tuple[str, ...]
-    """Limits that the answer misses on those scenes."""
+    """Limits that the answer misses there."""
 
 
 def gathered(
@@ -220,8 +206,8 @@ def gathered(
     before: int = 0,
     found: dict[Any, Any] | None = None,
 ) -> dict[Any, Any]:
-    """The result of each job, a function with its arguments; ``before``: pieces of this kind already done; ``found``
-    receives each result at once."""
+    """Result of each job, a function with arguments; ``before``: pieces already done; ``found`` receives each at
+    once."""
     futures: dict[Future[Any], Any] = {executor.submit(*job): key for key, job in jobs.items()}
     found = {} if found is None else found
     for future in as_completed(futures):

@@ -1,4 +1,4 @@
-"""All flips of all designs in cached blocks, and their table; the designs, and their size."""
+"""All flips of all designs, in cached blocks."""
 
 from __future__ import annotations
 
@@ -39,12 +39,11 @@ def skin(design: str) -> Skin:
 
 
 def luts(design: str) -> int:
-    """LUT4 of the design on a UP5K, with the reference Skin's clock."""
+    """LUT4 of the design on a UP5K, at the reference Skin's clock."""
     return size.luts(lambda: Top(Skin(**DESIGNS[design])), sizes.UP5K)
 
 
 BLOCK = 25
-"""Flips per piece of work of a process."""
 
 
 class Row(NamedTuple):
@@ -62,8 +61,8 @@ def run(
     done: Callable[[int], None],
     within_s: float | None = None,
 ) -> list[Row]:
-    """This many flips of register bits and of memory bits of each design. ``done`` receives the number of blocks
-    whenever one is finished.
+    """Flips of ``registers`` register and ``memories`` memory bits of each design. ``done`` receives the number of
+    blocks after each.
 
     ``within_s``: time after which only each design's first block is begun.
     """
@@ -94,7 +93,7 @@ def run(
 
 
 def _first(blocks: Iterable[list[FlipOutcome] | None]) -> Iterator[FlipOutcome]:
-    """Flips of the blocks before the first missing one, as a later choice would bias the result."""
+    """Flips before the first missing block, as a later choice would bias the result."""
     for found in itertools.takewhile(lambda block: block is not None, blocks):
         yield from found or ()
 
@@ -113,7 +112,7 @@ def _key(design: str, memory: bool, block: int) -> str:
 
 
 def finished(names: Iterable[str]) -> list[Row]:
-    """All cached flips of these designs, of each the blocks before the first missing one."""
+    """Cached flips of these designs, before each one's first missing block."""
     return [
         Row(name, FlipOutcome(*one))
         for memory in (False, True)
@@ -128,7 +127,7 @@ def _reference(design: str) -> Reference:
 
 
 def write(rows: Iterable[Row], path: Path) -> None:
-    """One line per flip."""
+    """Write a line per flip."""
     with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(("design", *FlipOutcome._fields))
@@ -138,7 +137,7 @@ def write(rows: Iterable[Row], path: Path) -> None:
 
 
 def read(path: Path) -> list[Row]:
-    """What :func:`write` wrote."""
+    """Read what :func:`write` wrote."""
     with path.open(encoding="utf-8", newline="") as file:
         return [_row(line) for line in csv.DictReader(file)]
 
@@ -158,7 +157,7 @@ def _row(line: dict[str, str]) -> Row:
 
 
 def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """The 95 % interval of a share, by Wilson's formula."""
+    """Wilson's 95 % interval of a share."""
     share, part = hits / of, z * z / of
     middle = (share + part / 2) / (1 + part)
     half = z * math.sqrt(share * (1 - share) / of + part / 4 / of) / (1 + part)

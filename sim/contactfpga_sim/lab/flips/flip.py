@@ -1,4 +1,4 @@
-"""One flip, followed until it is gone or half a second is over, and the host's reaction."""
+"""One flip, followed until it is gone or half a second is over."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from contactfpga_sim.model.board.state import Bit, Storage
 from contactfpga_sim.model.sheet.matrix import Contention
 
 SETTLED_STEPS = 4
-"""Steps that the driver still hears once the board has recovered."""
+"""Steps heard after the board has recovered."""
 QUIET_S = {"always": 0.02, "on_change": 0.12}
-"""Longest silence that is not reported: frames or keep-alives are due earlier."""
+"""Longest unreported silence: frames or keep-alives come earlier."""
 COUNTED = ("lost", "unexplained", "restarts", "foreign_skin", "foreign_version", "skin_changes", "unknown_kinds")
 """Driver counters that stay 0 on a good line."""
 
@@ -40,26 +40,25 @@ class FlipOutcome(NamedTuple):
     memory: bool
     outcome: Outcome
     kind: str
-    """The error, or the means by which it is reported."""
+    """The error, or the means that reports it."""
     frames: int
-    """Number of silently wrong frames."""
     seconds: float
-    """Time from the first silently wrong frame until the next right one."""
+    """Time from the first silently wrong frame to the next right one."""
     gone_s: float
-    """Time of the board's full recovery; infinite if later than the study."""
+    """Time of full recovery; infinite if later than the study."""
     fights: int = 0
     """Clocks in which a column was driven against a row."""
 
 
 def module(name: str) -> str:
-    """The stage that a register or memory belongs to."""
+    """Stage of a register or memory."""
     parts = name.split(".")
     inner = parts[2:] if parts[0] == "dual" and len(parts) > 2 else parts
     return "comparison" if parts[0] == "dual" and len(parts) <= 2 else inner[0].split("$")[0]
 
 
 def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Flip]:
-    """Random flips, uniform over the bits of all registers, or of all memories, and over clocks."""
+    """Random flips, uniform over clocks and all register, or memory, bits."""
     rng = np.random.default_rng([seed, memory])
     places = reference.board.places
     bits = np.array([place.bits * (place.memory == memory) for place in places])
@@ -74,7 +73,7 @@ def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Fli
 
 
 def follow(reference: Reference, flip: Flip) -> FlipOutcome:
-    """Flip the bit and judge the outcome."""
+    """Flip a bit and judge the outcome."""
     before = reference.board.fights
     listener, heard, gone_s = _run(reference, flip)
     return _judged(reference, flip, listener, heard, gone_s)._replace(fights=reference.board.fights - before)
@@ -132,13 +131,11 @@ def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFram
 
 
 def _advance(board: CompiledBoard, clocks: int) -> None:
-    """Run on, counting clocks in which pins are driven against each other."""
     with contextlib.suppress(Contention):
         board.run(clocks)
 
 
 def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame], gone_s: float, begun_s: float) -> str:
-    """The first way by which the host notices."""
     stats = listener.conversation.stats
     if listener.surprises:
         return "another Skin"
@@ -154,7 +151,7 @@ def _told(reference: Reference, listener: Listener, heard: list[DeliveredFrame],
 
 
 def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[DeliveredFrame, str]]:
-    """Frames with a wrong sheet or time, and moments of outdated frames."""
+    """Frames with a wrong sheet or time, and moments of outdated ones."""
     found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
     if reference.skin.send == "on_change":
         found += ((one, "stale") for one in _stale(reference, heard))
@@ -162,7 +159,6 @@ def _wrong(reference: Reference, heard: list[DeliveredFrame]) -> list[tuple[Deli
 
 
 def _since_restart(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """Frames with times as if the board had not restarted."""
     begun: dict[int, float] = {0: 0.0}
     for one in heard:
         shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)
@@ -178,7 +174,7 @@ def _kind(reference: Reference, one: DeliveredFrame) -> str:
 
 
 def _stale(reference: Reference, heard: Sequence[DeliveredFrame]) -> Iterator[DeliveredFrame]:
-    """The moment of each sheet change that the host learns too late."""
+    """Moments of sheet changes that the host learns too late."""
     late = reference.late_s[1] + reference.slack_s
     for before, after in itertools.pairwise(heard):
         if after.time_s - before.time_s > QUIET_S["on_change"]:

@@ -1,4 +1,4 @@
-"""The run without a flip: the reference for all others, with many entry points."""
+"""The run without a flip, with many entry points."""
 
 from __future__ import annotations
 
@@ -18,30 +18,27 @@ from contactfpga_sim.lab.flips import touches
 from contactfpga_sim.model.board.state import Checkpoint, StateBoard
 
 CLOCK_HZ, BAUD = 5_000_000, 1_250_000
-"""Five twelfths of the reference Skin's: as many frames per second in fewer clocks."""
+"""Five twelfths of the reference Skin's clock and line: as many frames in fewer clocks."""
 
 FIRST_S, LAST_S = 0.1, 0.6
 """Range of flip times; a hello follows each."""
 AFTER_S = 0.5
-"""Time for which a flip is followed."""
 
 
 class DeliveredFrame(NamedTuple):
     """A frame that the driver delivered."""
 
     time_s: float
-    """Arrival of its last byte."""
     said: touches.Said
     late_s: float
-    """Delay after its own scan time."""
     flagged: bool
     restarts: int = 0
-    """Board restarts by the driver's count; board time restarts with each."""
+    """Board restarts by the driver's count; each restarts board time."""
 
 
 @dataclasses.dataclass
 class Listener:
-    """The host."""
+    """The host during a flip."""
 
     conversation: Conversation
     rest: bytes = b""
@@ -53,7 +50,7 @@ class Listener:
         return cls(Conversation("the board", expected=skin, rng=random.Random(1)))
 
     def hear(self, events: np.ndarray, clock_hz: int) -> list[DeliveredFrame]:
-        """Feed bytes as they arrived; each packet is delivered with its delimiter."""
+        """Feed bytes as they arrive; delimiters deliver packets."""
         data = events["data"].astype(np.uint8)
         ends = np.flatnonzero(data == framing.DELIMITER) + 1
         found: list[DeliveredFrame] = []
@@ -82,16 +79,12 @@ class Step(NamedTuple):
     moment: Checkpoint
     listener: Listener
     events: np.ndarray
-    """Bytes until the next step."""
     heard: list[DeliveredFrame]
-    """Frames of these bytes."""
 
 
 class Reference:
-    """A Skin's board with moving touches, from power-up until the last flip is over.
-
-    Each instance has a board of its own, ``board``, for flips.
-    """
+    """A Skin's board with moving touches, from power-up until the last flip is over. Each instance has its own
+    ``board`` for flips."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -116,7 +109,7 @@ class Reference:
 
     @property
     def slack_s(self) -> float:
-        """Allowed time shift of frames at another scan phase: two scans and a hello."""
+        """Allowed shift at another scan phase: two scans and a hello."""
         return self.late_s[1] - self.late_s[0] + 0.5e-3
 
     def close(self) -> None:

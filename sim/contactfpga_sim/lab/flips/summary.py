@@ -17,15 +17,13 @@ from contactfpga_sim.model.board.state import StateBoard
 
 
 class Design(NamedTuple):
-    """A design's name and size."""
+    """Name and size of a design."""
 
     name: str
     luts: int
-    """LUT4 of a UP5K."""
     registers: int
     """Flip-flop bits, including those around memories."""
     memories: int
-    """Bits of memory."""
 
 
 class Share(NamedTuple):
@@ -46,7 +44,7 @@ class Share(NamedTuple):
 
 
 def measured(names: Iterable[str]) -> list[Design]:
-    """Bits and LUT4 of designs; needs the programs of extra ``boards``."""
+    """Bits and LUT4 of designs; needs programs of extra ``boards``."""
     found = []
     for name in names:
         board = StateBoard(campaign.skin(name))
@@ -57,13 +55,13 @@ def measured(names: Iterable[str]) -> list[Design]:
 
 
 def write(found: Iterable[Design], path: Path) -> None:
-    """A line for each design."""
+    """Write a line per design."""
     with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([Design._fields, *found])
 
 
 def read(path: Path) -> list[Design]:
-    """What :func:`write` wrote."""
+    """Read what :func:`write` wrote."""
     with path.open(encoding="utf-8", newline="") as file:
         return [
             Design(line.pop("name"), **{key: int(value) for key, value in line.items()})
@@ -72,23 +70,23 @@ def read(path: Path) -> list[Design]:
 
 
 def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
-    """The flips of a design's registers, or of its memories."""
+    """Flips of a design's registers, or of its memories."""
     return [row for row in rows if row.design == design and row.found.memory == memory]
 
 
 def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
-    """The share of rows with this outcome."""
+    """Share of rows with this outcome."""
     return Share(sum(row.found.outcome == outcome for row in rows), len(rows))
 
 
 def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:
-    """Duration of silently wrong output: median and longest, in ms."""
+    """Median and longest silently wrong output, in ms."""
     times = sorted(1e3 * row.found.seconds for row in rows if row.found.outcome == "silent")
     return (times[len(times) // 2], times[-1]) if times else (math.nan, math.nan)
 
 
 def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
-    """Rows grouped by ``key``, the most silently wrong first."""
+    """Rows by ``key``, the most silently wrong first."""
     parts: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         parts[key(row)].append(row)
@@ -96,5 +94,5 @@ def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
 
 
 def stage(row: Row) -> str:
-    """The module of a flip."""
+    """Module of a flip."""
     return module(row.found.name)

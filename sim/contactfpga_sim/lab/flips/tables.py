@@ -1,4 +1,4 @@
-"""The tables of docs/flips.md, and its curve of silently wrong flips against a design's cost."""
+"""Tables of docs/flips.md, and the curve of silently wrong flips against cost."""
 
 from __future__ import annotations
 
@@ -25,13 +25,10 @@ COLUMNS = (
 MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
 KINDS = ("design", "outcome", "by", "flips")
 REGISTERS, MEMORIES = 400, 100
-"""Flips of each design."""
 LONGEST_S = 25 * 60.0
-"""Time after which no more flips begin."""
 LONG_S = 0.005
-"""Limit above which a fault spoils more than a frame or two."""
+"""Time above which a fault spoils many frames."""
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
-"""Outcomes in words."""
 
 
 class FlipResults(NamedTuple):
@@ -59,7 +56,7 @@ def draw(folder: Path, found: FlipResults) -> list[Path]:
 
 
 def worst_text(found: FlipResults) -> str:
-    """The worst flips of registers and memories, with one copy and with two, and their rate."""
+    """The worst flips of registers and memories, with one and two copies, and their rate."""
     rows = found.rows
     groups = [
         (f"Flips of {'memory' if memory else 'registers'} with {'two copies' if dual else 'one copy'}", some)
@@ -97,7 +94,7 @@ def _worst(rows: Sequence[Row]) -> str:
 
 
 def designs_table(found: FlipResults) -> str:
-    """A row for each design's registers, and one for its memories."""
+    """A row per design for registers, one for memories."""
     lines = []
     for design in found.designs:
         for memory, bits in ((False, design.registers), (True, design.memories)):
@@ -128,7 +125,7 @@ def _interval(share: summary.Share) -> str:
 
 
 def modules_table(found: FlipResults) -> str:
-    """Registers of the plain designs, by module."""
+    """Registers of plain designs, by module."""
     plain = [row for row in found.rows if not row.design.endswith("dual") and not row.found.memory]
     lines = []
     for module, some in summary.by(plain, summary.stage).items():
@@ -140,7 +137,7 @@ def modules_table(found: FlipResults) -> str:
 
 
 def ways_table(found: FlipResults) -> str:
-    """Errors and reports of each design."""
+    """Errors and reports by design."""
     lines = []
     for design in found.designs:
         some = [row for row in found.rows if row.design == design.name and row.found.outcome != "masked"]
@@ -151,7 +148,6 @@ def ways_table(found: FlipResults) -> str:
 
 
 def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
-    """Draw a line for each design, each plain one above its version with two copies."""
     import matplotlib as mpl
 
     plain = [design for design in designs if not design.name.endswith(", dual")]

@@ -1,4 +1,4 @@
-"""The touches during a flip, and all truthful frames about them."""
+"""Touches during a flip, and all truthful frames about them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from contactfpga.zones.zone import Zones
 from contactfpga_sim.model import golden
 
 STEP_S = 0.005
-"""Interval of sheet changes."""
 PERIOD, REST = 8, 3
-"""For a scan that waits for touch, the last ``REST`` of every ``PERIOD`` sheets are empty."""
+"""The last ``REST`` of ``PERIOD`` sheets are empty for a waiting scan."""
 
 Said = tuple[int, int, tuple[tuple[int, int, int], ...]]
-"""Pressed cells, total zones, and the moments of the listed ones."""
+"""Pressed cells, total zones, and moments of listed ones."""
 
 
 def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
-    """(count, rows, columns) bool: three touches of different sizes that move a cell at a time, and come and go. A scan
-    that waits for touch sometimes waits."""
+    """(count, rows, columns) bool: three touches of different sizes that move a cell at a time, come and go. A
+    waiting scan sometimes waits."""
     rng = np.random.default_rng(seed)
     cells = np.zeros((count, skin.rows, skin.columns), bool)
     for rows, columns in ((2, 2), (3, 3), (4, 2)):
@@ -39,27 +38,24 @@ def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
 
 
 def said(zones: Zones) -> Said:
-    """The content of a frame."""
+    """Content of a frame."""
     moments = tuple(sorted((int(area), int(x), int(y)) for area, x, y in zones.frame.moments.tolist()))
     return zones.pressed, zones.total_zones, moments
 
 
 class TruthWindow:
-    """Possible frames at each step: any scan of the sheet, which may change between two rows. A scan that first selects
-    touched rows skips the others.
-
-    ``sheets``: (n, rows, columns) bool.
-    """
+    """Possible frames at each step of (n, rows, columns) bool ``sheets``: any scan, during which the sheet may
+    change between two rows. A scan that first selects touched rows skips the others."""
 
     def __init__(self, skin: Skin, sheets: np.ndarray):
         self._skin = skin
         self._known: dict[bytes, Said] = {}
         self.still = [self._says(cells) for cells in sheets]
-        """Content of a scan of each unchanging sheet."""
+        """Content of a scan of each sheet at rest."""
         self._changing = [self._between(*pair) for pair in itertools.pairwise(sheets)]
 
     def holds(self, what: Said, first: int, last: int) -> bool:
-        """Whether a scan can report this during the sheets from ``first`` to ``last``."""
+        """Whether a scan can report this from sheet ``first`` to ``last``."""
         last = min(last, len(self.still) - 1)
         return what in self.still[first : last + 1] or any(what in self._changing[step] for step in range(first, last))
 

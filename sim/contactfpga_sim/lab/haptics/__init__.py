@@ -1,1 +1,1 @@
-"""Places finer than the pitch: coverage of the stated uncertainty, also under a wrong contact model."""
+"""Places finer than the pitch: coverage of the stated uncertainty."""

@@ -1,7 +1,7 @@
-"""Where force joined to location fails: one assumption is violated more and more until the stated result is wrong.
+"""Where force joined to location fails: one assumption is violated more and more.
 
-Each value is tried with contacts at random places and forces until it is clear whether the stated 95 % hold for 90 % of
-them. It counts as reported if half of the failing ones are.
+Each value is tried with random contacts until it is clear whether the stated 95 % hold for 90 % of them. A failure
+counts as reported if half of the failing ones are.
 """
 
 from __future__ import annotations
@@ -24,25 +24,22 @@ from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, CoverageCase
 
 HOLDS = 0.9
-"""The required share of contacts within the stated interval, below the stated 95 % to allow for chance."""
+"""Required share of contacts within the stated interval, below 95 % to allow for chance."""
 
 TELLS = 0.5
-"""The share of failing contacts that must be reported."""
 
 CLOSE_N = 1.0
-"""Allowed error of a push."""
 
 PUSH_N, LEVER_M = 12.0, 0.05
 SURFACE = Cylinder(0.038)
 SIGMA_N = 0.05
 REACH_M = 0.0036
-"""Distance at which 12 N close switches, which is as uncertain as a zone's place: half of it along each axis."""
+"""Distance at which 12 N close switches; half of it is a zone's uncertainty by axis."""
 
 SLOW = 480
 """Most draws of methods that need 10 ms each."""
 
 TRIES = 50
-"""Attempts per touch that closes a switch."""
 
 CHI2_3 = 7.815
 """95 % quantile of chi-squared with three degrees of freedom."""
@@ -55,13 +52,12 @@ class Disturbance:
     """Load on a link with units, and violated assumptions."""
 
     unseen_n: float = 0.0
-    """Push of a second contact that the sheet does not see."""
+    """Push of a second contact beside the sheet."""
     drift_n: float = 0.0
     torsion_nm: float = 0.0
     ends_n: float = math.inf
     """Range of a unit, either way."""
     elsewhere_m: float = 0.0
-    """Distance of the zone from the contact."""
     preload_n: float | None = None
 
 
@@ -80,7 +76,7 @@ def cells(load: Disturbance) -> LoadCells:
 
 
 def pressed(load: Disturbance, made: LoadCells, rng: Random) -> tuple[Floats, Floats, Contacts]:
-    """Place and force of one contact, and the estimate."""
+    """Place and force of a contact, and the estimate."""
     x, y = rng.uniform(0, 2 * math.pi * SURFACE.radius_m), rng.uniform(-LEVER_M, LEVER_M)
     point, normal = (np.array(each) for each in SURFACE.place(x, y))
     across = np.array([0.0, 0.0, 1.0])
@@ -110,7 +106,7 @@ def _told(found: Contacts, alarm: bool) -> tuple[str, ...]:
 
 
 def force(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of the force at a zone, from the zone's place."""
+    """Outcomes of the force at a zone, from its place."""
     made, trials = cells(load), []
     for _ in range(count):
         _, exerted, found = pressed(load, made, rng)
@@ -122,7 +118,6 @@ def force(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
 
 
 def _center(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of the center of pressure, from the units alone."""
     made, trials = cells(load), []
     around = 2 * math.pi * SURFACE.radius_m
     for _ in range(count):
@@ -139,7 +134,6 @@ def _center(load: Disturbance, rng: Random, count: int) -> list[Outcome]:
 
 
 def _friction(kind: str, drag: float, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of two dragging fingers: whether the interval holds the first push, or its error."""
     made, trials = cells(Disturbance()), []
     for _ in range(count):
         places = [SURFACE.place(rng.uniform(0, 0.09), at) for at in (-0.03, 0.03)]
@@ -164,7 +158,6 @@ def holds(contact: Contact, push_n: float) -> bool:
 
 
 def _located(case: CoverageCase, rng: Random, count: int) -> list[Outcome]:
-    """Outcomes of places on a flat sheet, for contacts that close a switch."""
     finder, trials = coverage.locator(case), []
     for _ in range(TRIES * count):
         one = coverage.press(case, rng)
@@ -184,7 +177,6 @@ def _rated(draws: Callable[[float, Random, int], list[Outcome]], most: int = LOO
 
 
 def _both(change: Callable[[float], Disturbance]) -> dict[str, Callable[[float], Outcome]]:
-    """The force at a zone, and the center of pressure."""
     return {
         "force at the zone": _rated(lambda value, rng, count: force(change(value), rng, count)),
         "center of pressure": _rated(lambda value, rng, count: _center(change(value), rng, count)),
@@ -249,4 +241,3 @@ KNOBS = {
               "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
     )
 }  # fmt: skip
-"""Knobs by name, in the page's order."""

@@ -1,4 +1,4 @@
-"""Simulated contacts on a flat sheet: a push rises, switches close, units read; the estimate against the truth."""
+"""Simulated contacts on a flat sheet: a push rises, switches close, units read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from contactfpga.skin.sheet import Sheet
 
 LINES = 16
 MIDDLE = 7
-"""Contacts are in the cell from this switch to the next."""
+"""Switch at a corner of the contacts' cell."""
 
 POINT, PATCH = Model("halfspace", "point"), Model("bonded", "patch")
 BALL = Ball(0.005, 4.6e5)
@@ -29,7 +29,7 @@ RING_M = 0.075
 
 @functools.cache
 def reach_of(model: Model, ball: Ball = BALL) -> Reach:
-    """The reach of 5 mm of foam over the prototype's switches."""
+    """Reach of 5 mm of foam over the prototype's switches."""
     return Reach(PaddedSheet(Switch(), 0.005, ball), model)
 
 
@@ -47,48 +47,42 @@ class CoverageCase:
     method: str
     pitch_mm: float
     push_n: tuple[float, float] = (5.0, 30.0)
-    """Range of the final push."""
     spread: float = 0.1
-    """Assumed spread of thresholds."""
     force_sigma_n: float = 0.5
     assumed: Model = POINT
     true: Model = POINT
     true_spread: float | None = None
-    """True spread; None: as assumed."""
+    """True spread of thresholds; None: as assumed."""
     true_sigma_n: float | None = None
     drift_n: float = 0.0
-    """Drift of one unit."""
     ball: Ball = BALL
     """Ball of the true patch."""
     late_n: float = 0.0
-    """Rise of the push until it is measured."""
+    """Rise of the push until measured."""
     inside_mm: float | None = None
-    """Distance of contacts inside the outermost column; None: in the middle."""
+    """Distance inside the outermost column; None: middle."""
     wrong: str = ""
-    """The violated assumption."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Coverage:
-    """Results over all contacts that closed a switch."""
+    """Results over contacts that closed a switch."""
 
     count: int
     rms_m: float
     barycenter_m: float
-    """RMS error of the barycenter."""
     covered: float
     """Share of contacts within the stated radius."""
     radius_m: float
-    """Median stated radius."""
     theory_m: float
-    """Median of the smallest radius that noise allows; NaN without a formula."""
+    """Median smallest radius that noise allows; NaN if unknown."""
     disagreed: float
-    """Share of contacts for which the method reported that no place explains all."""
+    """Share of contacts that the method reported as contradictory."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pressed:
-    """One simulated contact."""
+    """A simulated contact."""
 
     x_m: float
     y_m: float
@@ -99,7 +93,7 @@ class Pressed:
 
 
 def locator(case: CoverageCase) -> Locator:
-    """The locator under the case's assumptions."""
+    """Locator under the case's assumptions."""
     sheet = Sheet(
         rows=LINES,
         columns=LINES,
@@ -116,7 +110,7 @@ def locator(case: CoverageCase) -> Locator:
 
 
 def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
-    """Press ``count`` times."""
+    """Press ``count`` times and judge the estimates."""
     rng, finder = np.random.default_rng(seed), locator(case)
     find: Callable[[Pressed], tuple[Place, float]] = functools.partial(METHODS[case.method], case, finder, rng)
     errors, coarse, radii, theory, agrees = [], [], [], [], []
@@ -164,13 +158,13 @@ def _closings(case: CoverageCase, rng: np.random.Generator, one: Pressed) -> lis
 
 
 def by_barycenter(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Static estimate from the known push."""
+    """Static estimate from the push."""
     rows, columns = np.mean(one.cells, axis=0) * 1e-3 * case.pitch_mm
     return finder.barycenter(float(columns), float(rows), _measured(case, rng, one.push_n)), math.nan
 
 
 def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Static estimate from cells and known push."""
+    """Static estimate from cells and push."""
     return finder.locate(one.cells, _measured(case, rng, one.push_n)), math.nan
 
 
@@ -209,8 +203,8 @@ def _middle_m(case: CoverageCase) -> float:
 
 
 def bound_m(case: CoverageCase, one: Pressed) -> float:
-    """The smallest 95 % radius that noise allows, from the slope of each closing's force over the place (Cramér-Rao);
-    NaN with fewer than two closings, or with two in line with the contact."""
+    """Smallest 95 % radius that noise allows, from the slopes of closing forces over the place (Cramér-Rao); NaN
+    with fewer than two closings, or two in line with the contact."""
     reach, pitch = reach_of(case.assumed), 1e-3 * case.pitch_mm
     if not case.force_sigma_n and not case.spread:
         return math.nan
@@ -250,7 +244,6 @@ RIGHT = (
     CoverageCase("center of pressure", 10.0, (12.0, 12.0)),
     CoverageCase("closings + center of pressure", 5.0, RAMP),
 )
-"""Cases with true assumptions."""
 
 WRONG = (
     CoverageCase("set", 5.0, true=PATCH, wrong="a ball of 5 mm, taken for a point"),
@@ -259,4 +252,3 @@ WRONG = (
     CoverageCase("closings", 5.0, RAMP, true_sigma_n=2.0, wrong="forces off by 2 N, taken for 0.5 N"),
     CoverageCase("center of pressure", 10.0, (12.0, 12.0), drift_n=0.2, wrong="a unit drifted by 0.2 N"),
 )
-"""Cases with violated assumptions."""

@@ -1,7 +1,7 @@
-"""End to end: contacts press a sheet on three units, the compiled gateware sends, driver and haptics answer.
+"""End to end: contacts press a sheet on three units, compiled gateware sends, driver and haptics answer.
 
-A push rises as the arm's does, 1.6 N per ms. Once the first switch has closed, each method repeatedly estimates the
-place from the host's data so far.
+A push rises by 1.6 N per ms, as the arm's does. Each method estimates the place from data since the first switch
+closed.
 """
 
 from __future__ import annotations
@@ -28,14 +28,13 @@ from contactfpga_sim.model.scenes.scene import Scene
 RATE_N_S = 1600.0
 MOST_N = 30.0
 LEAD_S = 1.5e-3
-"""Time from power-up until the first switch closes; the push begins earlier, without effect on the answers."""
+"""Time from power-up until the first switch closes."""
 LOOK_S = 20e-6
 RING_M = 0.075
 GAIN_N = 0.02
 ZERO = 300.0
 
 TIMES_S = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 15e-3)
-"""Times after the first switch closed."""
 
 METHODS = ("barycenter", "center of pressure", "closings", "closings + center of pressure")
 
@@ -48,7 +47,6 @@ class Setting:
     pitch_mm: float
     unit_sigma_n: float = 0.05
     spread: float = 0.0
-    """Relative spread of the switches' thresholds."""
     lines: int = 16
 
     @property
@@ -78,32 +76,30 @@ SETTINGS = (
 
 @dataclasses.dataclass(frozen=True)
 class Touching:
-    """A point force on the sheet whose push rises."""
+    """A point force whose push rises."""
 
     setting: Setting
     place_m: Floats
-    """Place on the sheet in m, (2,)."""
+    """(2,) place on the sheet."""
     seed: int
 
     @functools.cached_property
     def closing_n(self) -> Floats:
-        """(rows, columns): the push in N that closes each switch."""
+        """(rows, columns) push in N that closes each switch."""
         along = 1e-3 * self.setting.pitch_mm * np.arange(self.setting.lines)
         x, y = np.meshgrid(along, along)
         spread = 1 + self.setting.spread * np.random.default_rng([self.seed, 7]).standard_normal(x.shape)
         return reach_of(POINT).closing_n(np.hypot(x - self.place_m[0], y - self.place_m[1])) * np.maximum(spread, 0.1)
 
     def push(self, seconds: float) -> float:
-        """Push in N."""
         return min(MOST_N, max(0.0, float(self.closing_n.min()) + RATE_N_S * (seconds - LEAD_S)))
 
     def pressed(self, seconds: float) -> np.ndarray:
-        """(rows, columns) bool."""
+        """(rows, columns) bool closed switches."""
         found: np.ndarray = self.closing_n <= self.push(seconds)
         return found
 
     def board(self) -> VirtualBoard:
-        """A board that feels the touch."""
         cells, rng = self.setting.cells, np.random.default_rng([self.seed, 8])
         x, y = self.place_m + np.array(cells.sheet_m)
         each = np.linalg.pinv(cells.matrix) @ np.array([0, 0, -1, -y, x, 0])
@@ -119,7 +115,7 @@ class Touching:
 
 @dataclasses.dataclass
 class FrameArrival:
-    """A frame, with the host times of it and its readings."""
+    """A frame, with host times of it and of its readings."""
 
     zones: Zones
     came_s: float
@@ -127,7 +123,7 @@ class FrameArrival:
 
 
 def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
-    """All frames until this time."""
+    """All frames until ``until_s``."""
     found: list[FrameArrival] = []
     open_ones: list[FrameArrival] = []
     with contactfpga.open(touching.board(), touching.setting.skin) as board:
@@ -142,12 +138,12 @@ def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
 
 
 def ramp(setting: Setting, seed: int) -> Touching:
-    """One contact anywhere in a cell in the middle."""
+    """One contact anywhere in a middle cell."""
     return Touching(setting, (MIDDLE + np.random.default_rng(seed).random(2)) * 1e-3 * setting.pitch_mm, seed)
 
 
 def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> dict[str, list[float]]:
-    """Errors in m of one contact: for each method at each of these rising times; NaN without an answer."""
+    """Errors in m of a contact, by method at these rising times; NaN without an answer."""
     touching, cells = ramp(setting, seed), setting.cells
     frames = heard(touching, LEAD_S + times_s[-1] + 0.2e-3)
     assert cells.noise.covariance is not None
@@ -171,7 +167,6 @@ def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> d
 def _places(
     finder: Locator, cells: LoadCells, watch: ClosingWatch, came: list[Zones], known: list[Zones]
 ) -> dict[str, tuple[float, float] | None]:
-    """Place on the sheet in m by each method."""
     zone = came[-1][0] if came and len(came[-1]) else None
     coarse = None if zone is None or zone.x_mm is None else (1e-3 * zone.x_mm, 1e-3 * (zone.y_mm or 0.0))
     center = None
@@ -202,14 +197,13 @@ FINGER_MM = 6.0
 FINGER = f"finger of {2 * FINGER_MM:g} mm"
 KINDS = POINTS, AT_ONCE, ONE_FIRST = ("point", FINGER, f"{FINGER}, one of them alone before")
 FIRST_S = 0.025
-"""Time for which the first contact is alone."""
 BOTH = 4
-"""Frames of both contacts, the last of which counts."""
+"""Frames of both contacts; the last counts."""
 
 
 def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> PairForces:
-    """Two contacts at this distance at a random place and angle of the sheet of 10 mm, and their estimated pushes.
-    Points are where each alone closes a switch; fingers, wider than the pitch, are anywhere."""
+    """Pushes of two contacts at a distance, at a random place and angle of the sheet of 10 mm. Points are where each
+    alone closes a switch; fingers are anywhere."""
     setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
     near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == POINTS else math.inf
@@ -240,7 +234,7 @@ def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) ->
 
 
 def pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Two places in mm, each nearer than ``near_mm`` to a switch."""
+    """Two places in mm, each within ``near_mm`` of a switch."""
     pitch = setting.pitch_mm
     while True:
         turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2

@@ -1,4 +1,4 @@
-"""Limits of two fingers' pushes: their uncertain places along the line through both. Geometry alone, without a board.
+"""Limits of two fingers' pushes by geometry: their uncertain places along the line through both.
 
 Three units on a plane measure the sum of the pushes and two moments. Each finger is a disc that closes the switches
 under it.
@@ -14,13 +14,12 @@ from contactfpga_sim.lab.haptics.felt import FINGER_MM, SETTINGS, pair
 METHODS = ("barycenters", "mean of all places that fit", "one place known")
 PUSH_N = 12.0
 STEP_MM = 0.4
-"""Step of the grid of places."""
 DRAWN = 2000
-"""Pairs of places per pair of fingers."""
+"""Pairs of places drawn per pair of fingers."""
 
 
 def errors(apart_mm: float, count: int, seed: int = 1) -> dict[str, Floats]:
-    """(2 count,) errors of the pushes in N, by method, of ``count`` pairs that each close a switch."""
+    """(2 count,) errors of pushes in N, by method, of ``count`` pairs that each close a switch."""
     rng, setting = np.random.default_rng([seed, 3]), SETTINGS[0]
     middle, noise = -1e3 * setting.cells.sheet_m[0], setting.cells.noise.covariance
     covariance = noise[np.ix_((2, 3, 4), (2, 3, 4))] * np.outer((1, 1e3, 1e3), (1, 1e3, 1e3))  # in mm
@@ -43,12 +42,12 @@ def errors(apart_mm: float, count: int, seed: int = 1) -> dict[str, Floats]:
 
 
 def _exert(places: Floats) -> Floats:
-    """(n, 3, 2): force along z, moments about x and y, in N and N mm, by the pushes at (n, 2, 2) places in mm."""
+    """(n, 3, 2): force along z in N, moments about x and y in N mm, by pushes at (n, 2, 2) places in mm."""
     return np.stack([-np.ones(places.shape[:2]), -places[:, :, 1], places[:, :, 0]], axis=1)
 
 
 def _pushes(places: Floats, wrench: Floats, covariance: Floats) -> Floats:
-    """(2,) pushes: least squares at each pair of places, averaged by the likelihood of the wrench."""
+    """(2,) pushes: least squares at pairs of places, averaged by the wrench's likelihood."""
     weight, matrix = np.linalg.inv(covariance), _exert(places)
     normal = matrix.transpose(0, 2, 1) @ weight @ matrix
     pushes = np.linalg.solve(normal, matrix.transpose(0, 2, 1) @ (weight @ wrench)[:, None])[:, :, 0]
@@ -66,7 +65,7 @@ def _closed(pitch_mm: float, place_mm: Floats) -> Floats:
 
 
 def _fitting(pitch_mm: float, place_mm: Floats) -> Floats:
-    """(m, 2): grid places at which a finger closes the same switches as here; none if it closes none."""
+    """(m, 2): grid places with the same closed switches; none if none closes."""
     closed = {tuple(each) for each in _closed(pitch_mm, place_mm)}
     if not closed:
         return np.empty((0, 2))

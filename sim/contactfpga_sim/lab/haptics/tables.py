@@ -1,4 +1,4 @@
-"""The tables and pictures of docs/haptics.md and docs/haptics_limits.md."""
+"""Tables and pictures of docs/haptics.md and docs/haptics_limits.md."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
 RING_M = 0.03
 CONTACTS = 1000
-"""Contacts per line of the table of places."""
 
 NAMED = (
     "hexapod at mid-length, 45 degrees",
@@ -35,7 +34,7 @@ NAMED = (
 
 
 def layouts_table() -> str:
-    """Arrangements of the page's link, and the best one."""
+    """Arrangements on the page's link, and the best one."""
     found = compared(LINK, RING_M)
     rows = [["units", "a unit bears", "error of the place", "error of the force", "smallest force seen"]]
     rows += [_layout(one) for one in found if one.layout.name in NAMED]
@@ -54,7 +53,7 @@ def _layout(rating: Rating, before: str = "") -> list[str]:
 
 
 def places_table() -> str:
-    """Places by each method under true assumptions."""
+    """Places by method under true assumptions."""
     rows = [["method", "pitch", "error", "the barycenter's", "stated radius", "over theory", "covers"]]
     for case in coverage.RIGHT:
         found = coverage.run(case, CONTACTS)
@@ -65,7 +64,7 @@ def places_table() -> str:
 
 
 def wrong_table() -> str:
-    """Places by each method under violated assumptions."""
+    """Places by method under violated assumptions."""
     rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "reports it"]]
     for case in coverage.WRONG:
         found = coverage.run(case, CONTACTS)
@@ -83,7 +82,7 @@ def _percent(share: float) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The arrangements of units, and the results."""
+    """Arrangements of units, and results."""
     return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *draw_felt(folder)]
 
 
@@ -91,7 +90,6 @@ END_TO_END = 100
 """Contacts per line; `make campaign` presses 1,000 in all."""
 
 LIMITS = 1000
-"""Pairs of fingers for the limits."""
 APART_MM = (30.0, 60.0, 100.0)
 SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
 
@@ -104,7 +102,7 @@ def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] 
 
 
 def interval(errors: np.ndarray) -> tuple[float, float, float]:
-    """RMS and its 95 % interval, from the spread of the squares, without NaN."""
+    """RMS with its 95 % interval from the spread of squares."""
     squares = errors[~np.isnan(errors)] ** 2
     mean, half = squares.mean(), 1.96 * squares.std(ddof=1) / math.sqrt(len(squares))
     return math.sqrt(mean), math.sqrt(max(0.0, mean - half)), math.sqrt(mean + half)
@@ -136,7 +134,7 @@ def pairs_table() -> str:
 
 
 def limits_table() -> str:
-    """Limits of the forces of two fingers."""
+    """Limits of two fingers' forces."""
     rows = [["how fingers are located", "error of a push", "95 % interval"]]
     for method, errors in pairs.errors(60.0, LIMITS).items():
         middle, low, high = interval(errors)
@@ -146,7 +144,7 @@ def limits_table() -> str:
 
 @functools.cache
 def swept() -> dict[str, dict[str, Sweep]]:
-    """All breaks, swept."""
+    """Sweeps of all breaks."""
     return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
 
 
@@ -157,16 +155,15 @@ def breaks_table() -> str:
 
 
 SAID = {"lifted": "The picture is that of [`clipping`](#clipping), but `lifted` reports every break."}
-"""In place of a picture that would repeat another one."""
 
 
 def breaks_pictures() -> str:
-    """A heading for each, and a picture or what is said in its place."""
+    """A heading per break, and a picture or sentence."""
     return tables.headed(breaks.KNOBS, "haptics", SAID)
 
 
 def draw_felt(folder: Path) -> list[Path]:
-    """Error over time, and a picture for each break."""
+    """Error over time, and a picture per break."""
     drawn = [_front(folder / "haptics-front.svg")]
     (folder / "haptics").mkdir(exist_ok=True)
     for name in (one for one in breaks.KNOBS if one not in SAID):

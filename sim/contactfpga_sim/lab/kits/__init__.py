@@ -1,1 +1,1 @@
-"""The kits: times from the finger to user code, sizes, and predictions that a builder can prove wrong."""
+"""Times, sizes and testable predictions of the kits."""

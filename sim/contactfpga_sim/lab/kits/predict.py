@@ -1,8 +1,7 @@
 """Predictions of a kit with 95 % intervals.
 
 Gateware and bridge times are exact up to the crystal and the choice of touches. Circuit and cover are computed for
-draws of the tolerances (:func:`drawn_circuit`, :func:`drawn_cover`); 2.5 to 97.5 % are the interval. Tolerances were
-assumed, not measured.
+draws of assumed tolerances (:func:`drawn_circuit`, :func:`drawn_cover`), from 2.5 to 97.5 %.
 """
 
 from __future__ import annotations
@@ -39,26 +38,25 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 
 DRAWS = 200
 TOUCHES = 100
-"""Touches, or breaks, with which a builder measures a median or a worst time."""
+"""Touches or breaks in a builder's measurement."""
 AWAKE_US, LONGEST_US = 700, 2000
-"""Time of the first line check after power-up, and the latest time to report a break."""
+"""First line check, and latest report of a break."""
 CRYSTAL = 1e-4
-"""Tolerance of a board's clock."""
 PRESSED_N = 2.0
 PLACES = tuple((x / 4, y / 4) for y in range(3) for x in range(3))
-"""Places of a finger's middle, x and y in pitches from a switch: on it, between two, among four, and halfway."""
+"""Finger middles, in pitches from a switch: on it, between two, among four, halfway."""
 AROUND = 7
-"""Rows and columns of the computed sheet; further switches take no force."""
+"""Rows and columns that take force."""
 
 
 def predicted(kit: Kit) -> dict[str, Prediction]:
-    """All predictions of a kit by name; needs a minute or two."""
+    """All predictions of a kit by name; takes a minute or two."""
     found = [*_times(kit), *_circuit(kit), *_cover(kit)]
     return {one.name: one for one in found}
 
 
 def _made(name: str, what: str, unit: str, values: Sequence[float], model: str, command: str) -> Prediction:
-    """The first value with the interval of the others, widened to hold it, to five digits."""
+    """The first value to five digits, with the interval of the others, widened to hold it."""
     low, high = np.quantile(values[1:] or values, [0.025, 0.975])
     value, low, high = (float(f"{one:.5g}") for one in (values[0], min(low, values[0]), max(high, values[0])))
     today = datetime.date.today()
@@ -71,7 +69,6 @@ def _commit() -> str:
 
 
 def _times(kit: Kit) -> Iterator[Prediction]:
-    """Times of board and bridge, as :data:`TOUCHES` touches find them."""
     command = f"contactfpga latency --kit {kit.name} --exact"
     bridge = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
     found = stages.measure(kit.skin, bridge, host_touches=0)
@@ -106,15 +103,13 @@ def _times(kit: Kit) -> Iterator[Prediction]:
 
 
 def reported(skin: Skin) -> MixedTimes:
-    """Time from a break of a row or column of an untouched sheet until `contact` reports it, as with `fail_safe`: the
-    first of each, at any instant between two checks."""
+    """Time from a break of a row or column of an untouched sheet until `contact` reports it with `fail_safe`, at any
+    instant between two checks."""
     with CompiledBoard(skin, ["contact"]) as board:
         return MixedTimes.mixed([_between_checks(board, {0: 0}, {}), _between_checks(board, {}, {0: 0})])
 
 
 def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[int, int]) -> MixedTimes:
-    """Times between the latest break that a check finds and the earliest that it misses."""
-
     def told(start: int) -> int:
         board.cut({}, {})
         board.restart()
@@ -135,13 +130,12 @@ def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[in
 
 
 def _near(rng: np.random.Generator, share: float) -> float:
-    """A factor within this share of 1."""
     return float(rng.uniform(1 - share, 1 + share))
 
 
 def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
-    """A sheet within tolerances: lines within 30 %, pins 25, pulls and series resistors 1; switches from 1 ohm to the
-    stated value; the diode's capacitance within 30, its current within a factor of 3."""
+    """A sheet within tolerances: lines 30 %, pins 25, pulls and series resistors 1; switches from 1 ohm to the
+    stated value; the diode's capacitance 30, its current a factor of 3."""
     near = functools.partial(_near, rng)
     diode = dataclasses.replace(
         circuit.diode,
@@ -164,7 +158,6 @@ def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
 
 
 def _circuit(kit: Kit) -> Iterator[Prediction]:
-    """Times, levels and currents of the layout's lines at the worst pattern."""
     skin, stated = kit.skin, load_circuit(kit.skin_path)
     nominal = extracted(lay_out(skin, stated)).circuit
     rng = np.random.default_rng(1)
@@ -200,8 +193,7 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
 
 
 def drawn_cover(cover: Cover, rng: np.random.Generator) -> Cover:
-    """A cover within tolerances: domes of a batch within 10 % of their force and 25 of their travel, foam within 30 %
-    of its modulus and 10 of its thickness."""
+    """A cover within tolerances: domes 10 % of force and 25 of travel, foam 30 % of modulus and 10 of thickness."""
     near = functools.partial(_near, rng)
     switch = dataclasses.replace(
         cover.switch, force_n=cover.switch.force_n * near(0.1), travel_m=cover.switch.travel_m * near(0.25)
@@ -212,7 +204,6 @@ def drawn_cover(cover: Cover, rng: np.random.Generator) -> Cover:
 
 
 def _cover(kit: Kit) -> Iterator[Prediction]:
-    """Smallest felt forces of a fingertip of 12 x 10 mm."""
     skin, nominal = kit.skin, load_cover(kit.skin_path)
     assert nominal is not None
     pitch_m = 1e-3 * skin.pitch_x_mm
@@ -234,7 +225,7 @@ def _cover(kit: Kit) -> Iterator[Prediction]:
 
 
 def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
-    """The force that closes a first switch, at each of :data:`PLACES`; the first cover has no spread."""
+    """First closing force at each of :data:`PLACES`; the first cover has no spread."""
     if not seed:
         cover = dataclasses.replace(cover, switch=dataclasses.replace(cover.switch, spread=0.0))
     cells = Cells(cover, AROUND, AROUND, pitch_m, pitch_m, seed)
@@ -249,7 +240,7 @@ def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Add current predictions to each kit's file if they differ."""
+    """Add predictions to each kit's file if they differ."""
     parser = argparse.ArgumentParser(description="Add predictions that have changed to a kit's file.")
     parser.add_argument("kit", nargs="*", metavar="KIT", help="Default: all.")
     for name in parser.parse_args(argv).kit or kits.names():

@@ -1,4 +1,4 @@
-"""Tables of docs/kits.md and of the README."""
+"""Tables of docs/kits.md and the README."""
 
 from __future__ import annotations
 
@@ -24,9 +24,8 @@ from contactfpga_sim.lab.spread import Spread
 from contactfpga_sim.lab.usb import BridgeSettings
 
 NAMES = ("starter", "fast")
-"""Names in the tables' order."""
 SEEDS = (1, 2, 3, 4, 5)
-"""Seeds of place and route; the slowest counts."""
+"""Seeds of place and route."""
 COVER = "| run, 6.4 mm, tiles |"
 PAPER = "| run, 6.4 mm, paper |"
 ARM = "| tiles | 6.4 | 0.4 | 5 |"
@@ -59,7 +58,7 @@ def _worst_first(us: Spread, digits: int = 0) -> str:
 
 
 def headline(found: list[KitFigures]) -> str:
-    """The README's table: worst first, both kits, and comparisons."""
+    """The README's table: both kits, and comparisons."""
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
     fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
     arm, paper_arm = (_worst_force(start) for start in (ARM, ARM_PAPER))
@@ -105,14 +104,13 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
 
 
 def _of_page(page: str, start: str, column: int) -> str:
-    """A cell of the table row with this beginning, up to a semicolon."""
+    """Cell of the row with this beginning, up to a semicolon."""
     text = Path("docs", page).read_text(encoding="utf-8")
     found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
     return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
 
 
 def _worst_force(start: str) -> str:
-    """Worst and mean force of an arm's touches by UART."""
     text = Path("docs/arm.md").read_text(encoding="utf-8")
     line = next(line for line in text.splitlines() if line.startswith(start))
     mean, worst = line.strip("|").split("|")[5].split(" / ")
@@ -120,7 +118,7 @@ def _worst_force(start: str) -> str:
 
 
 def times_table(found: list[KitFigures]) -> str:
-    """Each stage of each kit."""
+    """Stages of each kit."""
     return writer.table(
         ("kit", "stage", "median, us", "99 %, us", "worst, us"),
         (writer.line(row) for one in found for row in _stages(one)),
@@ -161,7 +159,7 @@ def built_table(found: list[KitFigures]) -> str:
 
 
 def pins_table() -> str:
-    """Sheets for an iCEBreaker's 23 pins, with guard lines and `alive` if they fit."""
+    """Sheets for an iCEBreaker's 23 pins."""
     kit = kits.kit("starter").skin
     cases = {
         "16x16, rows on registers, columns driven back (the kit)": kit,
@@ -200,7 +198,7 @@ def _reversal(skin: Skin) -> Skin:
 
 
 def parts_table() -> str:
-    """Parts for each kit: the sheet's by count, and those of kit.toml."""
+    """Parts of each kit."""
     lines = []
     for name in NAMES:
         kit = kits.kit(name)
@@ -216,7 +214,7 @@ def parts_table() -> str:
 
 
 def predictions_table() -> str:
-    """The kits' newest predictions side by side."""
+    """The kits' newest predictions."""
     both = {name: predictions.load(kits.kit(name)) for name in NAMES}
     lines = []
     for key in dict.fromkeys(key for found in both.values() for key in found):

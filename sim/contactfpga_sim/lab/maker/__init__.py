@@ -1,1 +1,1 @@
-"""The maker's sheet: diodes, pull-ups, series resistors and the schematic."""
+"""The maker's sheet: diodes, resistors and schematic."""

@@ -1,4 +1,4 @@
-"""The schematic of docs/maker.md: a corner of a sheet with guard lines, resistors and diodes."""
+"""Schematic for docs/maker.md: a corner of a sheet with guard lines."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from typing import Any
 from contactfpga import picture_style as style
 
 SIZE = 4
-"""Rows and columns, before the guard lines."""
 STEP = 1.5
 LEFT, TOP = 2.6, 2.1
-"""Starts of rows and columns after their resistors."""
 WIRE = {"color": style.INK, "lw": 1.2, "solid_capstyle": "round"}
 
 
@@ -57,7 +55,6 @@ def _color(guard: bool) -> str:
 
 
 def _row(axes: Any, row: int) -> None:
-    """Draw a row's pin and series resistor, and for row-reading scans a pull-down."""
     y, color = _y(row), _color(row == SIZE)
     axes.text(0, y, _name("row", row), ha="right", va="center", color=color)
     _line(axes, [(0.1, y), (0.5, y)], color)
@@ -72,7 +69,6 @@ def _row(axes: Any, row: int) -> None:
 
 
 def _column(axes: Any, column: int) -> None:
-    """Draw a column's pin, series resistor and pull-up."""
     x, color = _x(column), _color(column == SIZE)
     axes.text(x, TOP + 1.42, _name("column", column), ha="center", va="bottom", color=color)
     axes.plot(x, TOP + 1.3, "s", color=color, ms=4)
@@ -89,7 +85,6 @@ def _column(axes: Any, column: int) -> None:
 
 
 def _cell(axes: Any, row: int, column: int) -> None:
-    """Draw the path from column through switch and diode to row; a guard line has a wire."""
     x, y = _x(column), _y(row)
     guard = SIZE in (row, column)
     color, place = _color(guard), x + 0.5
@@ -107,7 +102,6 @@ def _cell(axes: Any, row: int, column: int) -> None:
 
 
 def _gaps(axes: Any) -> None:
-    """Mark the omitted lines before the last."""
     for index in range(SIZE + 1):
         for x, y, turn in ((_x(SIZE - 1) - 0.4, _y(index), 0), (_x(index), _y(SIZE - 1) + 1.2, 90)):
             gap = {"boxstyle": "square,pad=0.05", "fc": style.CARD, "ec": "none"}
@@ -138,7 +132,6 @@ def _dot(axes: Any, x: float, y: float, color: str = style.INK) -> None:
 
 
 def _resistor(axes: Any, x: float, y: float, upright: bool, ls: Any = "solid") -> None:
-    """Draw a box of 0.6 from (x, y) upward or to the right."""
     from matplotlib.patches import Rectangle
 
     corner, size = ((x - 0.11, y), (0.22, 0.6)) if upright else ((x, y - 0.11), (0.6, 0.22))

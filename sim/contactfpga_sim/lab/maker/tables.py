@@ -1,4 +1,4 @@
-"""The tables and the schematic of docs/maker.md."""
+"""Tables and schematic of docs/maker.md."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from contactfpga_sim.lab.maker import schematic
 
 SIZE = 16
 PULLED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5600.0)
-"""The sheet of the schematic."""
 DIODES = {"Schottky (BAT54's kind)": SCHOTTKY, "silicon (1N4148's kind)": SILICON}
 PULLS_OHM = (1000.0, 2200.0, 4700.0, 10_000.0, 22_000.0, 47_000.0, 100_000.0)
 SERIES_OHM = (0.0, 33.0, 100.0, 220.0, 470.0)
 PIN_OHM = 2 * Circuit().pin_ohm
-"""Resistance of the two pins that a short joins."""
+"""Resistance of both shorted pins."""
 
 
 def diodes_table() -> str:
-    """Levels with either kind of diode."""
+    """Levels by kind of diode."""
     rows = [["diode", "pressed column", "left to VIL", "touched row (reversal)", "left to VIH", "`settle_us`"]]
     rows[0].append("`release_us` without precharge")
     for name, diode in DIODES.items():
@@ -33,7 +32,7 @@ def diodes_table() -> str:
 
 
 def pulls_table() -> str:
-    """Times and currents of each column pull-up."""
+    """Times and currents by column pull-up."""
     rows = [
         ["pull-up", "`release_us` without precharge", "`settle_us`", "row's pin, all columns pressed", "left to VIL"]
     ]
@@ -48,7 +47,7 @@ def pulls_table() -> str:
 
 
 def series_table() -> str:
-    """Effect of a resistor at each pin on a short, pulses and times."""
+    """Effect of pin resistors on shorts, pulses and times."""
     rows = [["resistor at each pin", "two pins shorted to each other", "pulses while lines charge", "`settle_us`"]]
     rows[0].append("left to VIL")
     for ohm in SERIES_OHM:

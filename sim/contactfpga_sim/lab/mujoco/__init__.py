@@ -1,4 +1,4 @@
-"""A robot in MuJoCo that wears sheets: contacts press switches, and the driver receives the device's bytes."""
+"""A robot in MuJoCo that wears sheets, read by the driver."""
 
 from contactfpga_sim.lab.mujoco.sheets import Sheets
 from contactfpga_sim.lab.mujoco.touch import SheetTouch

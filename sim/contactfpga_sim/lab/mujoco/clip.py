@@ -1,4 +1,4 @@
-"""The arms of docs/mujoco.md side by side: their peak forces, and a clip from a headless browser."""
+"""Arms of docs/mujoco.md side by side: peak forces, and a clip."""
 
 from __future__ import annotations
 
@@ -22,20 +22,19 @@ ROBOT, SCENE, REFLEXES = (str(ARM / name) for name in ("pushed.toml", "scene.xml
 REFLEX = "BackOff"
 MEETINGS = 12
 NEAR_RAD, SPREAD_RAD = 0.4, 0.01
-"""Range of start angles, 0.14 rad before the bar, so that the touch is at a random phase of scan and step."""
+"""Start angle before the bar, and its range, for random phases of scan and step."""
 STEP_S, ENDS_S = 1e-3, 0.25
-"""MuJoCo's step, and a time at which all have touched the bar and all but one have let go."""
+"""MuJoCo's step, and a time by which all arms touched the bar and all but one let go."""
 COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
-"""Times of the clip: the approach, and the touch in slow motion."""
+"""Times of approach and slow motion."""
 COMING, TOUCHING, STANDING = 10, 28, 15
-"""Frames of approach, touch and still end."""
 FRAME_MS, SETTLE_MS, QUALITY = 100, 900, 55
 WIDTH, HEIGHT, TALL = 1120, 400, 700
-"""Pixels; tall while choosing, so that the panel does not scroll."""
+"""Pixels; TALL while choosing, lest the panel scroll."""
 
 
 class Asked(SimulatedPace):
-    """A pace that lets the robots go on up to a given moment."""
+    """A pace that runs the robots up to a given moment."""
 
     until_s = 0.0
 
@@ -44,7 +43,7 @@ class Asked(SimulatedPace):
 
 
 def paced(found: SimulatedSource) -> Asked:
-    """All skins side by side from their start, at the requested pace."""
+    """All skins side by side, at the requested pace."""
     found.skin = ALL
     found.restart()
     pace = found.pace = Asked(0.0)
@@ -53,15 +52,15 @@ def paced(found: SimulatedSource) -> Asked:
 
 @dataclasses.dataclass(frozen=True)
 class Met:
-    """Result of one arm's motion into the bar."""
+    """Result of an arm's motion into the bar."""
 
     late_s: float
-    """From the touch to the reflex's next command; nan: none."""
+    """Time from the touch to the reflex's command; nan: none."""
     peak_n: float
 
 
 def meet(angle: float) -> list[Met]:
-    """The example's arm by :data:`contactfpga.tools.view.simulated.SKINS`, from this angle, with reflex."""
+    """The example's arm with reflex in each of :data:`contactfpga.tools.view.simulated.SKINS`, from this angle."""
     robots = SimulatedSource(ROBOT, SCENE, REFLEXES)
     robots.reflex, pace = REFLEX, paced(robots)
     robots.advance()

@@ -1,4 +1,4 @@
-"""Random collisions of a forearm that wears a sheet: reports of the sheet against a momentum observer's."""
+"""Random collisions of a forearm: a sheet's reports against a momentum observer's."""
 
 from __future__ import annotations
 
@@ -30,19 +30,17 @@ from contactfpga_sim.lab.writer import table_of
 
 ROD_M = 0.02
 SHEET_M = (0.06, 0.20)
-"""Start and length of the sheet on the forearm."""
+"""Sheet's start and length on the forearm."""
 RADIUS_M = 0.038
 LEAD_S, AFTER_S = 0.15, 0.2
-"""Times before the touch (if nothing bent) and after it."""
+"""Times before and after the touch."""
 SERVO = (30.0, 10.0)
-"""Gain of the joints' speed controllers, Nm s/rad."""
+"""Gain of the joints' controllers, Nm s/rad."""
 LIMIT_NM = (40.0, 20.0)
 GAINS = (20.0, 50.0, 100.0, 200.0)
-"""Observer gains to choose from, 1/s."""
 SPRING = "0.1 0.1"
-"""MuJoCo's ``solref``: about 10 N/mm on this arm, lightly damped; a push grows over some 10 ms."""
+"""MuJoCo's ``solref``: about 10 N/mm on this arm, lightly damped."""
 FREE_S = 3.0
-"""Duration of a free motion."""
 
 SCENE = f"""<mujoco><option timestep="5e-4" gravity="0 0 0" integrator="implicitfast"/>
 <default><geom contype="0" conaffinity="0" solref="{SPRING}"/></default><worldbody>
@@ -84,16 +82,14 @@ class Collision:
     """A moving forearm and a rod in its way."""
 
     angles: tuple[float, float]
-    """Joint angles at the touch."""
     speeds: tuple[float, float]
     place_m: float
-    """Position along the forearm."""
     wrong: Wrong
     seed: int
 
     @classmethod
     def drawn(cls, seed: int) -> Collision:
-        """Anywhere on the sheet except its last 20 mm, at 0.1 to 0.5 m/s across the forearm."""
+        """Anywhere on the sheet but its last 20 mm, at 0.1 to 0.5 m/s."""
         rng = np.random.default_rng(seed)
         angles = rng.uniform(-1.0, 1.0, 2)
         place = rng.uniform(SHEET_M[0] + 0.02, sum(SHEET_M) - 0.02)
@@ -106,19 +102,19 @@ class Collision:
 
 @dataclasses.dataclass(frozen=True)
 class Heard:
-    """Result of one collision."""
+    """Result of a collision."""
 
     late_s: float | None
-    """From MuJoCo's first contact to the program's knowledge; None: not within :data:`AFTER_S`."""
+    """Time from MuJoCo's first contact to its detection; None: not within :data:`AFTER_S`."""
     early: bool
     """Whether it was reported before any contact."""
     off_m: float | None
-    """Error of the reported place along the forearm, at its most certain, against MuJoCo's."""
+    """Error of the most certain reported place along the forearm."""
     peak_n: float
 
 
 class Arm:
-    """The arm under its speed controllers, sampled every ms."""
+    """The arm under speed controllers, sampled every ms."""
 
     def __init__(self, folder: Path):
         (folder / "skin.toml").write_text(SKIN)
@@ -149,13 +145,12 @@ class Arm:
         return data
 
     def drive(self, data: Any, wanted: np.ndarray) -> None:
-        """Apply torques for the wanted (2,) speeds in rad/s."""
+        """Apply torques for (2,) speeds in rad/s."""
         forward = np.array(DAMPING) * wanted + np.array(FRICTION_NM) * np.sign(wanted)
         torque = forward + np.array(SERVO) * (wanted - data.qvel)
         data.ctrl[:] = np.clip(torque, -np.array(LIMIT_NM), LIMIT_NM)
 
     def force_n(self, data: Any) -> float:
-        """Total force of all contacts."""
         total, wrench = 0.0, np.zeros(6)
         for number in range(data.ncon):
             mujoco.mj_contactForce(self.model, data, number, wrench)
@@ -163,13 +158,12 @@ class Arm:
         return total
 
     def touched_m(self, data: Any) -> float:
-        """Contact position along the forearm."""
         body = data.body("forearm")
         return float((body.xmat.reshape(3, 3).T @ (data.contact[0].pos - body.xpos))[0])
 
 
 Detector = Callable[[Any], tuple[bool, float | None, float]]
-"""From MuJoCo's data: whether a contact is detected, its place along the forearm, and its certainty."""
+"""Whether a contact is detected, its place along the forearm, and its certainty."""
 
 
 def collide(
@@ -199,7 +193,7 @@ def collide(
 
 
 def by_sheet(arm: Arm, case: Collision) -> Heard:
-    """Detection by the sheet: the first snapshot with a contact, through USB and driver."""
+    """Detection by the first snapshot with a contact."""
     data = arm.meets(case)
     with Sheets(arm.model, data, arm.robot, golden=True, radius_m=ROD_M, seed=case.seed) as sheets:
 
@@ -213,7 +207,7 @@ def by_sheet(arm: Arm, case: Collision) -> Heard:
 
 
 def by_observer(arm: Arm, case: Collision, gain: float, limits_nm: np.ndarray, reacts: bool = True) -> Heard:
-    """Detection by the observer: a residual beyond its limit; the place is from the largest residual."""
+    """Detection by a residual beyond its limit; the largest residual gives the place."""
     data = arm.meets(case)
     observer = Observer(gain, case.wrong, np.random.default_rng(case.seed))
 
@@ -225,7 +219,7 @@ def by_observer(arm: Arm, case: Collision, gain: float, limits_nm: np.ndarray, r
 
 
 def free(arm: Arm, seed: int) -> np.ndarray:
-    """(gains, n, 2) absolute residuals in Nm, by :data:`GAINS`, of a contact-free motion without its first 0.1 s."""
+    """(gains, n, 2) absolute residuals in Nm of a free motion after 0.1 s."""
     rng = np.random.default_rng(seed)
     wrong = Wrong.drawn(rng)
     observers = [Observer(gain, wrong, np.random.default_rng(seed)) for gain in GAINS]
@@ -242,8 +236,8 @@ def free(arm: Arm, seed: int) -> np.ndarray:
 
 
 def tuned(arm: Arm, free_runs: int, cases: Sequence[Collision]) -> tuple[float, np.ndarray]:
-    """Gain and limits: per gain the lowest limits without a false alarm in these free motions; of these the gain with
-    the least mean delay, missed or early ones counting as :data:`AFTER_S`."""
+    """Per gain the lowest limits without a false alarm; of these the gain with the least mean delay, missed or early
+    ones counting as :data:`AFTER_S`."""
     limits = np.max([free(arm, seed).max(1) for seed in range(free_runs)], 0)
 
     def delay_s(number: int) -> float:
@@ -261,16 +255,16 @@ class Compared:
     gain: float
     limits_nm: np.ndarray
     alarms: int
-    """Of :attr:`free_runs` not used in tuning, those with a false alarm of the observer."""
+    """Runs among :attr:`free_runs`, not used in tuning, with a false alarm."""
     free_runs: int
     sheet: list[Heard]
     observer: list[Heard]
     none: list[Heard]
-    """Collisions of an arm that does not react, so that no reaction bends the residuals of the observer's place."""
+    """Collisions of an arm without reaction, which would bend the residuals."""
 
 
 def compare(collisions: int = 200, free_runs: int = 100) -> Compared:
-    """Tune on half of the seeds, judge on the other half."""
+    """Tune on half of the seeds, judge on the rest."""
     with tempfile.TemporaryDirectory() as folder:
         arm = Arm(Path(folder))
         gain, limits = tuned(arm, free_runs, [Collision.drawn(10_000 + seed) for seed in range(collisions // 4)])
@@ -330,7 +324,6 @@ def _share(flags: Sequence[bool]) -> str:
 
 
 def _median(values: Sequence[float]) -> str:
-    """Median with its 95 % interval by order statistics."""
     ordered, count = sorted(values), len(values)
     reach = 0.98 * np.sqrt(count)
     low, high = max(0, int(count / 2 - reach)), min(count - 1, int(np.ceil(count / 2 + reach)))

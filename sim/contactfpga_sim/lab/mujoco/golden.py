@@ -1,4 +1,4 @@
-"""A board with frames by the golden model, at most one a step, for speed."""
+"""A board with frames by the golden model, for speed."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from contactfpga_sim.model.golden.zones import Departure
 class GoldenBoard:
     """The part of :class:`contactfpga_sim.model.board.compiled.CompiledBoard` that a lockstep needs.
 
-    A frame has the cells at the end of a clock run. Zones equal the gateware's if the cells rest for a scan; times
-    differ by up to a scan and a run. The line is the gateware's, byte by byte.
+    A frame has the cells at the end of a clock run, at most one a step. Zones equal the gateware's if cells rest for a
+    scan; times differ by up to a scan and a run.
     """
 
     def __init__(self, skin: Skin):
-        """Raises ContactFPGAError for a Skin whose frames depend on more than the cells."""
+        """Raise ContactFPGAError for a Skin whose frames depend on more than cells."""
         for name in ("units", "guard", "self_test", "alive"):
             if getattr(skin, name):
                 raise ContactFPGAError(f"{name} is {getattr(skin, name)}; golden zones have none: take the gateware")
@@ -44,7 +44,7 @@ class GoldenBoard:
         self._line.want_hello(0)
 
     def press(self, cells: np.ndarray) -> None:
-        """Press these (rows, columns) bool cells from now on."""
+        """Press (rows, columns) bool cells from now on."""
         before, self._cells = self._cells, cells & ~self._facts.mask
         if before.any() != self._cells.any():
             self._levels.append((self.cycle, int(self._cells.any()), 0))
@@ -53,7 +53,6 @@ class GoldenBoard:
         """Ignored: there are no units."""
 
     def send(self, data: bytes) -> None:
-        """Bytes from the host to the board."""
         known, free = self._facts, 0
         if self._received:
             begun, before = self._received[-1]
@@ -114,13 +113,10 @@ class GoldenBoard:
 
 
 class _Line(Link):
-    """A link whose bytes are read while it runs."""
-
     def __init__(self, known: Facts, state: State):
         super().__init__(known, state)
 
     def until(self, cycle: int) -> list[tuple[int, int]]:
-        """The unread bytes up to this cycle."""
         self.finish(max(0, cycle))
         count = sum(at <= cycle for at, _ in self.bytes)
         found, self.bytes = self.bytes[:count], self.bytes[count:]

@@ -1,7 +1,5 @@
-"""A momentum observer (De Luca and Mattone 2005; Haddadin, De Luca and Albu-Schaeffer 2017) of a two-joint arm.
-
-Its inputs are torques and joint speeds, with realistic errors: see :class:`Wrong`.
-"""
+"""A momentum observer of a two-joint arm, with realistic errors (De Luca and Mattone 2005; Haddadin, De Luca and
+Albu-Schaeffer 2017)."""
 
 from __future__ import annotations
 
@@ -15,17 +13,17 @@ MASS_KG = (1.5, 1.0)
 DAMPING = (0.4, 0.2)
 """Joint damping in Nm s/rad."""
 FRICTION_NM = (0.3, 0.15)
-"""Coulomb friction in the joints; the observer knows it as well as the damping."""
+"""Coulomb friction, known to the observer like the damping."""
 ROTOR = (0.03, 0.015)
 """Inertia of motors and gears about the joints, in kg m2."""
 CONTROL_S = 1e-3
 SLOW = 0.02
-"""Speed in rad/s below which Coulomb friction is proportional to speed."""
+"""Speed in rad/s below which Coulomb friction is proportional to it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Wrong:
-    """Errors of the observer's model, as shares of the truth, and measurement noise."""
+    """Model errors as shares of the truth, and noise."""
 
     masses: tuple[float, float]
     friction: tuple[float, float]
@@ -53,8 +51,7 @@ class Observer:
         self.residual_nm = np.zeros(2)
 
     def take(self, angles: np.ndarray, speeds: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """Update with the joints' (2,) angles in rad, speeds and torques since the last sample; returns (2,) residuals
-        in Nm."""
+        """Update with (2,) angles in rad, speeds and torques since the last sample; return (2,) residuals in Nm."""
         speeds = speeds + self._noise.normal(0, self._wrong.speed_rad_s, 2)
         torques = torques + self._noise.normal(0, self._wrong.torque_nm, 2)
         cross, link = self._coupled * np.cos(angles[1]), self._outer - ROTOR[1]
@@ -74,8 +71,7 @@ class Observer:
         return self.residual_nm
 
     def place_m(self, angle: float) -> float:
-        """Position of a push across the forearm; ``angle`` of the elbow in rad. Clipped to the forearm, as only
-        shoulder and elbow torques are known."""
+        """Position of a push across the forearm, clipped to it; ``angle`` of the elbow in rad."""
         first, second = self.residual_nm
         push_n = (first - second) / (FIRST_M * np.cos(angle))
         return float(np.clip(second / push_n, 0.0, SECOND_M)) if push_n else SECOND_M / 2

@@ -24,12 +24,12 @@ from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
 from contactfpga_sim.lab.usb import BridgeSettings
 
 LEAD_S = 0.01
-"""Time from the boards' power-up to MuJoCo's first step, for opening them."""
+"""Time from the boards' power-up to MuJoCo's first step."""
 LOOK_S = 2.5e-4
-"""Boards' step in s before MuJoCo's first step."""
+"""Boards' step before MuJoCo's first."""
 
 COVER = Cover(model="hertz")
-"""Default cover of a Skin file without a table ``[cover]``."""
+"""Cover of a Skin file without ``[cover]``."""
 
 
 class Sheets(Mapping[str, WornSheet]):
@@ -95,11 +95,11 @@ class Sheets(Mapping[str, WornSheet]):
     # ---- time
 
     def clock(self) -> float:
-        """Seconds since the boards' power-up: LEAD_S at MuJoCo's first step."""
+        """Seconds since power-up: LEAD_S at MuJoCo's first step."""
         return LEAD_S + self._steps * float(self.model.opt.timestep)
 
     def step(self) -> None:
-        """MuJoCo's next step, whose contacts press the sheets."""
+        """Take MuJoCo's next step."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         self._note_joints()
@@ -115,13 +115,11 @@ class Sheets(Mapping[str, WornSheet]):
             worn.run(self.clock())
 
     def reset(self) -> None:
-        """Put MuJoCo's state back to its start. The boards go on, as if the robot were carried back."""
+        """Reset MuJoCo's state. The boards go on, as if the robot were carried back."""
         mujoco.mj_resetData(self.model, self.data)
         self._pushed[:] = 0.0
 
     def _press(self, foam: Mapping[tuple[int, int], Floats], touches: list[list[SheetTouch]]) -> None:
-        """Press this step's contacts and ``touches``, the fingers of each link; ``foam``: force in N on the link by
-        contact and link."""
         data, plans = self.data, list(self.body.links.values())
         for number, second, owner in self._contacts():
             one = of_solver(self.model, data, number, second)
@@ -133,14 +131,14 @@ class Sheets(Mapping[str, WornSheet]):
             worn.press(mine)
 
     def _contacts(self) -> Iterator[tuple[int, bool, int]]:
-        """(contact number, whether the link's geom is its second one, link number)."""
+        """(contact number, whether the link's geom is second, link number)."""
         if self.data.ncon:
             owners = self._owner[self.data.contact.geom]
             for number, side in np.argwhere(owners >= 0).tolist():
                 yield number, side == 1, int(owners[number, side])
 
     def _point(self, owner: int, pushed: Floats) -> list[SheetTouch]:
-        """Let the fingers on a link push its body; adds to (nv,) ``pushed``."""
+        """Let fingers push a link's body; adds to (nv,) ``pushed``."""
         worn, number, found = list(self._worn.values())[owner], self._bodies[owner], []
         position, rotation = self.data.xpos[number], self.data.xmat[number].reshape(3, 3)
         for one in worn.fingers:
@@ -151,7 +149,7 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _push(self, pushed: Floats) -> dict[tuple[int, int], Floats]:
-        """Let the foam push bodies apart; adds to (nv,) ``pushed``. Returns its force in N by contact and link."""
+        """Let the foam push bodies apart; adds to (nv,) ``pushed``. Returns N by contact and link."""
         model, data = self.model, self.data
         found: dict[tuple[int, int], Floats] = {}
         for number, second, owner in self._contacts():
@@ -167,7 +165,6 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _note_joints(self) -> None:
-        """Store the joint positions, each ms."""
         if self._joints and self._steps % self._every == 0:
             angles = {name: float(self.data.qpos[address]) for name, address in self._joints.items()}
             self._history.add(self.clock(), angles)
@@ -175,8 +172,8 @@ class Sheets(Mapping[str, WornSheet]):
     # ---- what the host knows
 
     def snapshot(self) -> Snapshot:
-        """All links as a program knows them now, like :meth:`contactfpga.body.OpenBody.latest`: the touches when the
-        newest received frames were scanned."""
+        """All links as a program knows them now, like :meth:`contactfpga.body.OpenBody.latest`: touches at the scan
+        of the newest frames."""
         observed = {name: worn.observe() for name, worn in self._worn.items()}
         states = States(self.body.links, observed, self.clock())
         return Snapshot(self.body, self.clock(), states, self._history if self._joints else None)
@@ -207,7 +204,6 @@ class Sheets(Mapping[str, WornSheet]):
 
 
 def _covers(path: Path) -> dict[str, Cover]:
-    """Covers from the Skin files, by link."""
     links = tomlfile.load(path, BodyError)["links"]
     return {one["name"]: load_cover(path.parent / one["skin"]) or COVER for one in links}
 
@@ -220,7 +216,7 @@ def _body(model: Any, plan: Plan) -> int:
 
 
 def _owners(model: Any, body: Body, bodies: list[int]) -> Floats:
-    """Number of the link by geom, -1 for none; the last entry is for contacts without a geom."""
+    """Link number by geom, -1 for none; the last is for contacts without a geom."""
     owner = np.full(model.ngeom + 1, -1)
     for number, (name, of) in enumerate(zip(body.links, bodies)):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)

@@ -1,4 +1,4 @@
-"""MuJoCo's contacts as touches of a sheet: place on the sheet laid flat, and force."""
+"""MuJoCo's contacts as places on the sheet laid flat, with forces."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tools.view.fingers import Finger
 
 SLANT = 0.5
-"""Least cosine between the contact's and the sheet's normals for the cover to be pressed, not another side of a box."""
+"""Least cosine between contact and sheet normals at which the cover is pressed, not another side."""
 
 
 class SheetTouch(NamedTuple):
-    """A contact point of MuJoCo on a link that wears a sheet."""
+    """A contact point on a link that wears a sheet."""
 
     contact: int
     """Index in ``data.contact``; -1 for a finger."""
     point_m: Vector
     """Point in the link's frame."""
     force_n: Vector
-    """Force on the link, in the link's frame, with friction."""
+    """Force on the link in its frame, with friction."""
     push_n: float
-    """Force along the contact's normal, 0 or above."""
+    """Force along the normal, 0 or above."""
     x_mm: float | None
-    """Place on the sheet laid flat; None beside the sheet."""
+    """Place on the flat sheet; None beside it."""
     y_mm: float | None
 
 
 class ContactForce(NamedTuple):
-    """Force of a MuJoCo contact on the link, in the world's frame."""
+    """Force of a contact on the link, in the world's frame."""
 
     contact: int
     point_m: Floats
@@ -42,7 +42,7 @@ class ContactForce(NamedTuple):
 
 
 def of_solver(model: Any, data: Any, number: int, second: bool) -> ContactForce:
-    """The constraint solver's result; ``second``: on the contact's second geom."""
+    """The solver's force; ``second``: on the contact's second geom."""
     contact, wrench = data.contact[number], np.zeros(6)
     mujoco.mj_contactForce(model, data, number, wrench)
     frame, sign = contact.frame.reshape(3, 3), 1.0 if second else -1.0
@@ -50,7 +50,7 @@ def of_solver(model: Any, data: Any, number: int, second: bool) -> ContactForce:
 
 
 def on_sheet(plan: Plan, position_m: Floats, rotation: Floats, one: ContactForce) -> SheetTouch:
-    """The contact on a link whose frame is at ``position_m``, turned by (3, 3) ``rotation``."""
+    """A contact on a link at ``position_m``, turned by (3, 3) ``rotation``."""
     point, force = rotation.T @ (one.point_m - position_m), rotation.T @ one.force_n
     push = float(one.force_n @ one.inward)
     place = _place(plan, point, rotation.T @ one.inward)
@@ -65,7 +65,7 @@ def by_finger(plan: Plan, finger: Finger) -> SheetTouch:
 
 
 def _place(plan: Plan, point_m: Floats, inward: Floats) -> tuple[float, float] | None:
-    """Place in mm on the sheet laid flat; None beside it, or on another side of its wearer."""
+    """Place in mm on the flat sheet; None beside it, or on its wearer's other sides."""
     skin, pose = plan.skin, plan.pose
     x, y = plan.laid.flat(vector(1e3 * ((point_m - pose.point_m) @ pose.rotation)))
     width, height = skin.columns * skin.pitch_x_mm, skin.rows * skin.pitch_y_mm
@@ -78,7 +78,7 @@ def _place(plan: Plan, point_m: Floats, inward: Floats) -> tuple[float, float] |
 
 
 def _around_mm(plan: Plan) -> float:
-    """Circumference of a cylinder whose ``flat`` leaves the turn open; 0 elsewhere."""
+    """Circumference of a cylinder with an open turn; else 0."""
     skin = plan.skin
     if skin.closed:
         return skin.columns * skin.pitch_x_mm

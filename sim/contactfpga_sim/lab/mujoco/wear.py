@@ -1,4 +1,4 @@
-"""Geoms with the shape of the sheets, for models without such."""
+"""Geoms with the shape of the sheets, for models without them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from contactfpga.robot.body.plan import Plan
 from contactfpga.surfaces import CylinderSurface, PlaneSurface
 
 BACK_M = 0.01
-"""Thickness of the box under a flat sheet."""
 
 
 def wear(spec: Any, robot: str | Path) -> None:
-    """Add to a ``mujoco.MjSpec`` a massless geom for each link of ``robot.toml``, named like it, on the body of its
-    frame: a box under a flat sheet, a cylinder in a bent one, else the convex hull of the cells' places. Its outside is
-    the sheet's."""
+    """Add to a ``mujoco.MjSpec`` a massless geom per link of ``robot.toml``, with its name, on the body of its
+    frame: a box under a flat sheet, a cylinder in a bent one, else the convex hull of the cells. Its outside is the
+    sheet's."""
     for name, plan in Body.load(robot).links.items():
         body = spec.body(plan.frame)
         if body is None:
@@ -35,7 +34,7 @@ def wear(spec: Any, robot: str | Path) -> None:
 
 
 def _ends_m(plan: Plan) -> np.ndarray:
-    """(2, 2): first and last x and y of the sheet in m, half a pitch beyond its outermost switches."""
+    """(2, 2): first and last x and y in m, half a pitch beyond outer switches."""
     pitches = np.array([plan.skin.pitch_x_mm, plan.skin.pitch_y_mm])
     counts = np.array([plan.skin.columns, plan.skin.rows])
     return 1e-3 * np.stack([-pitches / 2, (counts - 0.5) * pitches])
@@ -64,7 +63,6 @@ def _cylinder(geom: Any, plan: Plan, surface: CylinderSurface) -> None:
 
 
 def _hull(spec: Any, geom: Any, plan: Plan) -> None:
-    """Make the hull of the cells' places, and of places below them if the sheet is nearly flat."""
     skin = plan.skin
     x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
     points, normals = (np.asarray(each) for each in plan.surface.place(x, y))

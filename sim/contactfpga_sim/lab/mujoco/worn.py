@@ -1,4 +1,4 @@
-"""A link's sheet: switches under the cover, their board, and its USB chip."""
+"""A link's sheet: switches, board, and USB chip."""
 
 from __future__ import annotations
 
@@ -25,39 +25,34 @@ from contactfpga_sim.model.scenes.felt import LoadedUnits
 from contactfpga_sim.model.scenes.scene import around_m
 
 HOST_S = Usb().host_s
-"""From the host's USB controller to the program, as in ``contactfpga study arm``."""
+"""Time from the USB controller to the program, as in ``contactfpga study arm``."""
 
 POLL_S = 1e-6
-"""Time by which the board, but not the robot, advances in a read without waiting."""
+"""Advance of the board, but not the robot, in a read without waiting."""
 
 
 class WornSheet:
-    """A sheet on its link, in simulated time; :attr:`board` reads it like a real one."""
+    """A sheet on its link in simulated time; :attr:`board` reads it."""
 
     board: Board
-    """The open board."""
 
     def __init__(self, plan: Plan, cover: Cover, radius_m: float, bridge: BridgeSettings, golden: bool, seed: int):
         skin = self.skin = plan.skin
         self.plan = plan
         self.ball = Ball(radius_m, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson))
         self.touches: list[SheetTouch] = []
-        """The current touches."""
         self.fingers: tuple[Finger, ...] = ()
-        """Pushes on the sheet and its link from outside MuJoCo."""
         self.contact = False
-        """The level of the board's ``contact`` pin."""
         self.dead = False
-        """Set it to stop the board: its pins are frozen, it sends nothing."""
+        """Set it to freeze the board's pins and silence it."""
         self.line: Callable[[bytes], bytes] = bytes
-        """Transforms each packet that the USB chip delivers; one that raises :class:`~contactfpga.PortLost` is a pulled
-        plug."""
+        """Transforms each packet of the USB chip; if it raises :class:`~contactfpga.PortLost`, the plug is pulled."""
         pitches = (1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
         self._cells = cells_of(cover, skin.rows, skin.columns, *pitches, seed)
         self.forces_n: Floats = np.zeros((skin.rows, skin.columns))
         """(rows, columns) force in N on each switch."""
         self.closed = np.zeros((skin.rows, skin.columns), bool)
-        """(rows, columns) closed switches."""
+        """(rows, columns) bool closed switches."""
         self._units = LoadedUnits(plan.units, skin, seed) if plan.units is not None else None
         self._device = GoldenBoard(skin) if golden else CompiledBoard(skin, capture=("contact",))
         self._hz = skin.clock_hz
@@ -70,8 +65,8 @@ class WornSheet:
         self._load()
 
     def cut(self, rows: Mapping[int, int] | None = None, columns: Mapping[int, int] | None = None) -> None:
-        """Cut these lines of the sheet, like :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises
-        ContactFPGAError for golden zones."""
+        """Cut lines, like :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut`. Raises ContactFPGAError
+        for golden zones."""
         if isinstance(self._device, GoldenBoard):
             raise ContactFPGAError("golden zones come from cells and know no lines: take the gateware")
         self._device.cut(rows or {}, columns or {})
@@ -81,18 +76,17 @@ class WornSheet:
     by_force = True
 
     def touch(self, fingers: Sequence[Finger]) -> None:
-        """From MuJoCo's next step on, push the link with these fingers, each along the normal; from any thread."""
+        """From the next step on, push the link with fingers along the normal; from any thread."""
         self.fingers = tuple(fingers)
 
     @property
     def pressed(self) -> np.ndarray:
-        """Same as :attr:`closed`."""
         return self.closed
 
     # ---- what MuJoCo does to it
 
     def press(self, touches: list[SheetTouch]) -> None:
-        """Apply these touches from now on."""
+        """Apply touches from now on."""
         if touches or self.touches:
             self.touches = touches
             loads = self._loads()
@@ -116,12 +110,11 @@ class WornSheet:
         return found
 
     def _load(self) -> None:
-        """Apply the forces to the units, which change with every step."""
         if self._units is not None:
             self._device.load(self._units.under(self.wrench()))
 
     def wrench(self) -> Floats:
-        """(6,): force in N and moment in Nm of all contacts on the link, in its frame about its origin."""
+        """(6,): force in N and moment in Nm of all contacts, in the link's frame about its origin."""
         total = np.zeros(6)
         for touch in self.touches:
             total += np.concatenate([touch.force_n, np.cross(touch.point_m, touch.force_n)])
@@ -130,7 +123,7 @@ class WornSheet:
     # ---- its time
 
     def run(self, until_s: float) -> None:
-        """Run the board up to this time since its power-up."""
+        """Run the board until this time since power-up."""
         self._clock_s = max(self._clock_s, until_s)
         if not self.dead:
             self._device.run(max(0, round(until_s * self._hz) - self._device.cycle))
@@ -146,25 +139,23 @@ class WornSheet:
                 self._coming.append((at + HOST_S, data))
 
     def clock(self) -> float:
-        """Seconds since the board's power-up."""
         return self._clock_s
 
     def arrived(self) -> bytes:
-        """The bytes that reached the program since the last call."""
+        """Bytes that reached the program since the last call."""
         found = b""
         while self._coming and self._coming[0][0] <= self._clock_s + 1e-12:
             found += self.line(self._coming.popleft()[1])
         return found
 
     def send(self, data: bytes) -> None:
-        """Bytes from the host."""
         if not self.dead:
             self._device.send(data)
 
     # ---- what the host knows of it
 
     def observe(self) -> tuple[LinkMemory, float]:
-        """Read all received frames; returns the knowledge of the link, and the board's clock."""
+        """Read all received frames; return the link's state and the board's clock."""
         try:
             while True:
                 self._take()
@@ -180,19 +171,17 @@ class WornSheet:
         self._known = LinkMemory(True, 0.0, zones, self._tracker.update(zones), sampled_s, sampled_s)
 
     def close(self) -> None:
-        """Free the board."""
         self._device.close()
 
 
 class SteppedPort:
-    """A :class:`contactfpga.driver.transport.SimulatedPort`: the whole robot goes on while a program waits for a
-    board."""
+    """A :class:`contactfpga.driver.transport.SimulatedPort` that steps the whole robot while a program waits."""
 
     def __init__(self, worn: WornSheet, step: Callable[[], None], seed: int):
         self._worn, self._step = worn, step
         self.rng = random.Random(seed)
         self.still = True
-        """Set it to let the board go on without the robot."""
+        """Set it to run the board without the robot."""
 
     def read(self, seconds: float) -> bytes:
         worn, until_s = self._worn, self._worn.clock() + seconds

@@ -1,4 +1,4 @@
-"""Fate of the mutants of each group of Skins."""
+"""Fate of mutants by group of Skins."""
 
 from __future__ import annotations
 
@@ -18,16 +18,14 @@ from contactfpga_sim.verify.mutants.netlist import STAGES, Mutant
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 
 GROUPS: dict[str, Mapping[str, object]] = {"mutants": SKINS, "options": OPTIONS, "several": SEVERAL}
-"""Skins, or several sheets, by their section of the page."""
+"""Skins by section of the page."""
 EACH = 40
-"""Mutants per Skin."""
 JOBS = 2
-"""Skins at a time."""
 CACHE = "CONTACTFPGA_CACHE"
 
 
 def compute() -> dict[str, list[Result]]:
-    """The results of all Skins by name."""
+    """Results of all Skins by name."""
     return run([name for group in GROUPS.values() for name in group], EACH, 0, proof.LONG_S, pool.usual_jobs or JOBS)
 
 
@@ -51,7 +49,7 @@ def _all(found: Mapping[str, Sequence[Result]], names: Iterable[str]) -> list[Re
 
 
 def table(results: Sequence[Result]) -> str:
-    """Counts by stage as Markdown; shares are of mutants not proved equivalent."""
+    """Counts by stage; shares are of mutants not proved equivalent."""
     rows = [["stage", "mutants", "killed", "equivalent, proved", "alive", "killed of the rest"]]
     drawn = {result.mutant.stage for result in results}
     for stage in [*(stage for stage in STAGES if stage in drawn), "all"]:
@@ -63,13 +61,13 @@ def table(results: Sequence[Result]) -> str:
 
 
 def listed(results: Iterable[Result]) -> str:
-    """Survivors, one per line: stage, source place, change, Skin."""
+    """A line per survivor: stage, source, change, Skin."""
     alive = sorted((str(result.mutant), result.skin) for result in results if result.fate == "alive")
     return "\n".join(f"{mutant}  ({skin})" for mutant, skin in alive)
 
 
 def run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> dict[str, list[Result]]:
-    """Results by Skin, with a progress bar each, or lines if stderr is no terminal."""
+    """Results by Skin, with progress bars, or lines off a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -97,7 +95,6 @@ def run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> d
 
 @contextlib.contextmanager
 def _own_cache() -> Iterator[None]:
-    """Keep the mutants' libraries out of the user's cache."""
     named = os.environ.get(CACHE)
     os.environ[CACHE] = named or "build/mutants"
     try:
@@ -108,7 +105,6 @@ def _own_cache() -> Iterator[None]:
 
 
 def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], None]) -> list[Result]:
-    """The results of :func:`examine`, cached by code."""
     design = chosen(name)[0]
     skins = design.skins if isinstance(design, Several) else (design,)
     code = kept.made_by(campaign.__name__, *skins)

@@ -1,1 +1,1 @@
-"""Many boards through one Zenoh router: frames, losses, CPU time and latency, against a bare Zenoh pair."""
+"""Many boards through one Zenoh router, against a bare Zenoh pair."""

@@ -1,6 +1,6 @@
-"""Links through a router, in four processes: boards with publishers, the router, and two readers of half each.
+"""Links through a router, in four processes: boards with publishers, router, and two readers of half each.
 
-The boards run at full speed almost for free: their frames are made beforehand, and delivered when due.
+Frames are made beforehand, and delivered when due, so that boards cost almost nothing.
 """
 
 from __future__ import annotations
@@ -30,23 +30,22 @@ from contactfpga_sim.model.golden.request import heard
 
 HELLO_S = 0.5
 GREETED_HZ = 20.0
-"""Frames per second before :meth:`Steady.go`."""
 
 
 @functools.cache
 def frames(low: int) -> list[bytes]:
-    """All frames of a board whose last request number has these lowest bits."""
+    """Frames of a board whose last request number has these lowest bits."""
     return [frame(number, low) for number in range(FRAMES)]
 
 
 def said(sent: int, number: int) -> bytes:
-    """The hello of a board that has sent this many frames and received this request."""
+    """Hello of a board after this many frames and this request."""
     counters = ((sent, SENT_DIGITS), (sent * STEP_US >> EPOCH_BITS, EPOCH_DIGITS), (number, HEARD_DIGITS), (0, 2))
     return hello(facts(SKIN), [value >> 7 * place & 127 for value, count in counters for place in range(count)])
 
 
 class Steady:
-    """A transport with a board that sends ``rate_hz`` frames per second after :meth:`go`."""
+    """A transport that sends ``rate_hz`` frames per second after :meth:`go`."""
 
     threaded = True
 
@@ -59,13 +58,13 @@ class Steady:
         self._begun_s, self._rate_hz = time.monotonic(), GREETED_HZ
 
     def go(self, begun_s: float, rate_hz: float) -> int:
-        """From that moment send at this rate; returns the number of the first of these frames."""
+        """Send at this rate; return the first frame's number."""
         with self._lock:
             self._begun_s, self._rate_hz, self._first = begun_s, rate_hz, self._sent
             return self._sent
 
     def read(self, timeout_s: float) -> bytes:
-        """The due frames, after waiting for the first."""
+        """Due frames, after waiting for the first."""
         until = time.monotonic() + timeout_s
         while True:
             with self._lock:
@@ -90,7 +89,6 @@ class Steady:
         return data
 
     def write(self, data: bytes) -> None:
-        """Receive requests."""
         with self._lock:
             self._asked += data
             for one in heard([(0, self._asked)], facts(SKIN).bit_clocks).requests[self._taken :]:
@@ -100,7 +98,6 @@ class Steady:
                     self._answers += said(self._sent, one.number)
 
     def clock(self) -> float:
-        """The machine's clock."""
         return time.monotonic()
 
 
@@ -111,31 +108,27 @@ def number_of(time_us: int) -> int:
 
 SECONDS = 5.0
 FULL_HZ = 10_000.0
-"""Rate of the one fast link."""
 RATE_HZ = 1000.0
 BARE_BYTES = 100
-"""Size of a message of the bare pair."""
 LONG_S = 120.0
 
 
 class NetworkRun(NamedTuple):
-    """Result of a run; times in s."""
+    """Result of a run, in s."""
 
     links: int
     share: float
-    """Share of the sent frames received by the end; the others are in transit, or lost."""
+    """Share of sent frames received by the end."""
     frames: float
-    """Received frames per second."""
     lost: int
-    """Frames and messages that did not arrive."""
+    """Frames and messages lost."""
     messages: float
-    """Messages per second."""
     cpu: dict[str, float]
-    """Share of a core used by publishers, router and readers."""
+    """Core share of publishers, router and readers."""
     latency: tuple[float, float]
-    """p50 and p99 from a frame being due at the port to its reader, for one link."""
+    """p50 and p99 from due at the port to reader, for one link."""
     bare: tuple[float, float]
-    """p50 and p99 of the bare Zenoh pair, from put to callback."""
+    """p50 and p99 of the bare pair, from put to callback."""
 
 
 def measure(links: int, batch_s: float, full: bool = False, seconds: float = SECONDS) -> NetworkRun:
@@ -218,7 +211,6 @@ def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full
 
 
 def _beat(bare: Any, until_s: float) -> None:
-    """Run the bare pair: a message with its time, 1,000 times per second."""
     while (now_s := time.monotonic()) < until_s:
         bare.put(np.float64(now_s).tobytes() + bytes(BARE_BYTES - 8))
         time.sleep(1 / RATE_HZ)
@@ -251,7 +243,6 @@ def _read(pipe: Connection, endpoint: str, links: range, batch_s: float, full: b
 
 
 def _probed(board: contactfpga.Board, first: int, begun_s: float, until_s: float) -> list[float]:
-    """Delay of each frame of one link."""
     found = []
     with board.subscribe(maxsize=1 << 16) as frames:
         while time.monotonic() < until_s:

@@ -1,4 +1,4 @@
-"""The tables and the picture of docs/net.md."""
+"""Tables and picture of docs/net.md."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)
 GROWTH_MS = 10.0
 LINE_BYTES = 54 + 12
-"""Approximate overhead of a message: Ethernet, IP, TCP and Zenoh's header."""
+"""Approximate overhead of a message."""
 GIGABIT = 1e9 / 8
 
 
 @functools.cache
 def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
-    """One measurement per run of this program. ``full`` has no default, since the cache distinguishes calls without
-    it."""
+    """One measurement per run of this program; the cache needs ``full`` in the call."""
     return load.measure(links, batch_ms / 1000, full)
 
 
 def batch_table() -> str:
-    """One link."""
+    """Load of one link, by batch."""
     head = ("batch", "messages per second", "latency p50 / p99", "of a bare pair", "ratio p50 / p99")
     rows: list[tuple[str, ...]] = [(*head, "CPU, all ends")]
     for batch_ms in BATCHES_MS:
@@ -39,7 +38,7 @@ def batch_table() -> str:
 
 
 def links_table() -> str:
-    """From one link to many."""
+    """Load from one link to many."""
     head = ("links", "frames per second", "of those sent", "lost", "CPU per link: publisher", "router", "reader")
     rows: list[tuple[str, ...]] = [(*head, "latency p50 / p99", "in times of a bare pair's")]
     for links, full in (*((count, False) for count in LINKS), (LINKS[-1], True)):
@@ -57,7 +56,7 @@ def _ends(found: load.NetworkRun) -> tuple[float, float, float]:
 
 
 def thousand_table() -> str:
-    """Estimate for a thousand links, measured and computed."""
+    """Estimate for a thousand links."""
     found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
     frame = len(load.frames(1)[0])
@@ -94,13 +93,12 @@ def _ms(latency: tuple[float, float]) -> str:
 
 
 WHOLE = Path("docs/tables/net-links.csv")
-"""The whole table of links."""
 ENDS = {"publisher": style.BLUE, "router": style.VERMILLION, "reader": style.GREEN}
 SHARES = {"half arrive (p50)": style.BLUE, "99 % arrive (p99)": style.VERMILLION}
 
 
 def draw(folder: Path) -> Path:
-    """CPU time and latency by number of links, from :data:`WHOLE`."""
+    """CPU time and latency over links, from :data:`WHOLE`."""
     import matplotlib
 
     with WHOLE.open(newline="", encoding="utf-8") as file:

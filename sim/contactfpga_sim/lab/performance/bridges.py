@@ -1,4 +1,4 @@
-"""The boards pages' times from the wire to the host, by the model of the USB bridge."""
+"""Times from wire to host by the model of the USB bridge, for the boards pages."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from contactfpga_sim.lab.usb import DEFAULT_TIMER_MS, BridgeSettings
 TOUCHES = 24
 
 BRIDGES = {"high speed": BOARDS["icebreaker"].bridge, "full speed": BOARDS["ulx3s-12f"].bridge}
-"""Bridges, each for all of its speed."""
 
 SET = {"set by the rule": {}, "as new": {"timer_ms": DEFAULT_TIMER_MS, "event": None}}
-"""The settings of ``contactfpga doctor``, and those after power-up."""
+"""Settings of ``contactfpga doctor``, and after power-up."""
 
 
 class BridgeRow(NamedTuple):
-    """One line of :func:`bridge_table`."""
+    """A line of :func:`bridge_table`."""
 
     speed: str
     settings: str
@@ -31,7 +30,7 @@ class BridgeRow(NamedTuple):
 
 
 def rows() -> list[BridgeRow]:
-    """Each bridge in each setting, for a sheet that sends each scan and one that sends changes."""
+    """Each bridge and setting, for sheets that send each scan and that send changes."""
     fast = Skin.load(examples() / "fast.toml")
     found = []
     for speed, chip in BRIDGES.items():
@@ -47,7 +46,7 @@ def bridge_table() -> str:
 
 
 def bridge_row(row: BridgeRow) -> str:
-    """One line of the table."""
+    """A row of :func:`bridge_table`."""
     chip = BRIDGES[row.speed]
     settings = BridgeSettings(chip, **SET[row.settings])  # type: ignore[arg-type]
     found = stages.measure(row.skin, settings, touches=TOUCHES, host_touches=0)
@@ -60,7 +59,7 @@ def bridge_row(row: BridgeRow) -> str:
 
 
 def bridge_sample() -> str:
-    """The first row of :func:`bridge_table`."""
+    """First row of :func:`bridge_table`."""
     return bridge_row(rows()[0])
 
 

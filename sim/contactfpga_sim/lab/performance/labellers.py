@@ -1,5 +1,5 @@
-"""Latency of the labeller's last record, in clocks from a frame's last row: over touches at every place, recordings,
-and shapes that break labellers."""
+"""Clocks of the labeller's last record from a frame's last row: over touches at every place, recordings, and shapes
+that break labellers."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
 
 TOUCHES = 400
-"""Scenes of each family, each with a place within a cell, angle and size of its own."""
+"""Random scenes of each family."""
 
 SEED = 20
 
 
 def labeller_table() -> str:
-    """Latency over touches, over shapes that break labellers, and the bound."""
+    """Latency over touches and breaking shapes, and the bound."""
     place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
     lines = []
     for size in (16, 32, 64):
@@ -41,7 +41,7 @@ def labeller_table() -> str:
 
 
 def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
-    """One line of :func:`labeller_table`; ``places``: of :func:`every_place`."""
+    """A line of :func:`labeller_table`; ``places``: of :func:`every_place`."""
     worst = worst_last_record_clocks(skin)
     found = f"{spread(*places, skin.connectivity, skin.labeller)} clocks"
     most = str(bound(skin.columns, skin.connectivity, skin.labeller))
@@ -50,12 +50,12 @@ def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
 
 
 def recordings_table() -> str:
-    """:func:`recorded_table` of the recordings in the project's folder."""
+    """:func:`recorded_table` of the project's recordings."""
     return recorded_table(scans.recordings())
 
 
 def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
-    """Latency over all (n, R, C) bool frames of each recording, as if the sheet ended after any row."""
+    """Latency over (n, R, C) bool frames, as if the sheet ended after any row."""
     lines = []
     for name, frames in recordings.items():
         _, rows, columns = frames.shape
@@ -71,20 +71,20 @@ def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
 
 
 def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
-    """Bound on the clocks from a frame's last row to its last record: the end mark is a clock later."""
+    """Most clocks from a frame's last row to its last record: the end mark is a clock later."""
     skin = Skin(rows=16, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=15.0)
     return skin.derived.label_clocks - 1
 
 
 def worst_last_record_clocks(skin: Skin) -> int:
-    """Worst latency in clocks over the shapes that break labellers, in the compiled gateware."""
+    """Worst clocks over breaking shapes, in compiled gateware."""
     with LabelBench(skin) as bench:
         frames = np.stack([cells for _, cells in variants(skin.rows, skin.columns)])
         return int(bench.run(frames).last_record_clocks.max())
 
 
 def touches(skin: Skin) -> np.ndarray:
-    """(n, R, C) bool: the built-in contacts, and some scenes of every family."""
+    """(n, R, C) bool: built-in contacts, and scenes of every family."""
     scenes = [make(skin) for make in CONTACTS.values()]
     for family in FAMILIES:
         scenes += placements(family, TOUCHES, SEED, skin)
@@ -93,16 +93,14 @@ def touches(skin: Skin) -> np.ndarray:
 
 def last_rows(frames: np.ndarray) -> np.ndarray:
     """(m, 2) uint64 words: the last two rows if the sheet ends after any row of (n, R, C) bool frames, or one row
-    later, if a cell is pressed in them. Every zone there leaves with the last row, so no other row decides the
-    latency."""
+    later, if a cell is pressed in them. Every zone there leaves with the last row, so no other row decides."""
     words = np.pad(to_words(frames), ((0, 0), (1, 1)))
     pairs = np.stack([words[:, :-1], words[:, 1:]], axis=-1).reshape(-1, 2)
     return pairs[pairs.any(axis=1)]
 
 
 def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The last two rows at every whole-cell offset of these frames, partly off the sheet too: (k, 2, C) bool, and their
-    counts."""
+    """The last two rows at every whole-cell offset of frames, also partly off the sheet: (k, 2, C) bool, and counts."""
     columns = frames.shape[2]
     sheet = np.uint64((1 << columns) - 1)
     pairs = last_rows(frames)
@@ -112,7 +110,7 @@ def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """The distinct nonempty words as (k, 2, C) bool, and their counts."""
+    """Distinct nonempty words as (k, 2, C) bool, and counts."""
     # One number a pair: unique() by number is many times faster than by rows.
     pairs = np.ascontiguousarray(pairs[pairs.any(axis=1)])
     different, count = np.unique(pairs.view([("before", "<u8"), ("last", "<u8")]), return_counts=True)
@@ -121,10 +119,7 @@ def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: LabellerName | Labeller) -> str:
-    """Median, 99 % and worst of the clocks to the last record, over (k, 2, C) rows with these counts.
-
-    The clocks are the golden model's, equal to the gateware's.
-    """
+    """Median, 99 % and worst clocks to the last record, by the golden model, over (k, 2, C) rows with these counts."""
     clocks = volume.last_record_clocks(rows, connectivity, labeller)
     order = np.argsort(clocks, kind="stable")
     reached = np.cumsum(count[order])
@@ -133,6 +128,6 @@ def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: Lab
 
 
 def labeller_sample() -> str:
-    """The first row of :func:`labeller_table`."""
+    """First row of :func:`labeller_table`."""
     skin = Skin(labeller="run", settle_us=15.0)
     return labeller_row(skin, every_place(touches(skin)))

@@ -1,4 +1,4 @@
-"""The pages' figures of scans, measured in clock cycles of the gateware."""
+"""Figures of scans in the gateware's clock cycles."""
 
 from __future__ import annotations
 
@@ -21,16 +21,13 @@ from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS
 
 INSTANTS = 96
-"""Touch instants, spread evenly over a scan."""
 
 RECORDINGS = Path("../shared/data")
-"""Folder of recordings outside the project."""
 
 RECORDED = 100
-"""Frames used of a recording."""
 
 HELD_SCANS = 4
-"""Scan periods for which a frame is held; a sheet recorded a hundred times per second holds it longer."""
+"""Scan periods that a frame is held; a recorded sheet holds it longer."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -42,11 +39,10 @@ SETTINGS = {
 
 
 REPORTS = ("moments", "barycenter")
-"""Reports with zones."""
 
 
 class EventTimes(NamedTuple):
-    """Median and worst time in us from a switch closing to an event, over the touch phases."""
+    """Median and worst us from a closing to an event, over touch phases."""
 
     median: float
     worst: float
@@ -68,15 +64,15 @@ def one_switch(skin: Skin, row: int) -> np.ndarray:
 
 
 def dots_in_last_row(skin: Skin) -> np.ndarray:
-    """(R, C) bool: every other switch of the last row, the most zones that can end in one row with 8-connectivity."""
+    """(R, C) bool: every other switch of the last row, the most zones that end in one row."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[-1, ::2] = True
     return cells
 
 
 def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, EventTimes]:
-    """From switches of one row closing to the pin, and to the first and last byte of their frame. Default: one switch
-    in the first row, the worst, as the rest of the scan follows it."""
+    """Times from switches of one row closing to the pin, and to the first and last byte of their frame. Default: one
+    switch in the first row, the worst."""
     frame = skin.derived.frame_clocks
     touched = one_switch(skin, 0) if touched is None else touched
     untouched = np.zeros_like(touched)
@@ -94,7 +90,6 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
 
 
 def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:
-    """Cycles of the start bit of a frame's first byte, and of the end of its last stop bit."""
     received = board.take("received")
     for got in frames_in(skin, zip(received["cycle"].tolist(), received["data"].tolist())):
         if got.frame.cells:
@@ -103,7 +98,7 @@ def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]
 
 
 def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
-    """Frames per second that reach the host with one zone, and bytes of such a frame."""
+    """Frames per second with one zone at the host, and bytes of one."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[1:3, 1:3] = True
     with CompiledBoard(skin) as board:
@@ -113,13 +108,13 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
 
 
 def reference_table() -> str:
-    """Latency, rate and bytes for some settings."""
+    """Latency, rate and bytes by setting."""
     head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames per second", "bytes, one zone")
     return writer.table(head, [reference_row(name, skin) for name, skin in SETTINGS.items()])
 
 
 def reference_row(name: str, skin: Skin) -> str:
-    """One setting's row of :func:`reference_table`."""
+    """A row of :func:`reference_table`."""
     latency = touch_latencies(skin)
     rate, size = frame_rate(skin)
     scan = skin.derived.frame_clocks / (skin.clock_hz / 1e6)
@@ -128,7 +123,7 @@ def reference_row(name: str, skin: Skin) -> str:
 
 
 def report_table() -> str:
-    """Bytes saved by on-board division, and its cost, for some sheets."""
+    """Bytes saved by on-board division, and its cost."""
     head = ("sheet", "report", "bytes per zone", "first row", "last row", "every other switch of the last row")
     names = ("reference", "32x32", "64x64")
     return writer.table(
@@ -137,26 +132,22 @@ def report_table() -> str:
 
 
 def report_row(name: str, skin: Skin) -> str:
-    """One line of :func:`report_table`."""
+    """A row of :func:`report_table`."""
     scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
     times = [f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes]
     return writer.line((name, f"`{skin.report}`", str(skin.derived.record_bytes), *times))
 
 
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
-    """Frame time of an adaptive scan, and its speedup over a raster scan.
-
-    ``scenes``: (n, R, C) bool frames by name. Times are the golden model's, equal to the gateware's in every clock.
-    """
+    """Frame time of an adaptive scan by the golden model, and its speedup over a raster scan, for scenes of (n, R,
+    C) bool frames."""
     head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
     return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
 
 
 def gain_row(name: str, frames: np.ndarray) -> str:
-    """One line of :func:`gain_table`. Each frame is held for some scan periods: most scans see a sheet at rest.
-
-    The mean is of the frame under way at a random instant.
-    """
+    """A row of :func:`gain_table`. Each frame is held for some scans: most see a sheet at rest. The mean is of the
+    frame under way at a random instant."""
     _, rows, columns = frames.shape
     known = facts(adaptive_skin(rows, columns))
     hold = HELD_SCANS * known.scan_clocks
@@ -176,7 +167,7 @@ def gain_row(name: str, frames: np.ndarray) -> str:
 
 
 def built_in_scenes() -> dict[str, np.ndarray]:
-    """(n, 16, 16) frames of every contact scene: one of those at rest, 50 over half a second of the moving one."""
+    """(n, 16, 16) frames of every contact scene, 50 over half a second of the moving one."""
     skin = adaptive_skin(16, 16)
     times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
     return {
@@ -186,7 +177,7 @@ def built_in_scenes() -> dict[str, np.ndarray]:
 
 
 def recordings(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
-    """(n, R, C) bool: all frames of each recording in the folder."""
+    """(n, R, C) bool frames of each recording in the folder."""
     return {path.name.partition(".")[0]: Recording.load(path).pressed for path in sorted(folder.glob("*.npz"))}
 
 
@@ -196,7 +187,7 @@ def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
 
 
 def scenes_gain_table() -> str:
-    """:func:`gain_table` of the built-in scenes."""
+    """:func:`gain_table` of built-in scenes."""
     return gain_table(built_in_scenes())
 
 
@@ -206,12 +197,12 @@ def recorded_gain_table() -> str:
 
 
 def reference_sample() -> str:
-    """The reference Skin's row of :func:`reference_table`."""
+    """Row of the reference Skin."""
     return reference_row("reference", Skin())
 
 
 def report_sample() -> str:
-    """The first row of :func:`report_table`."""
+    """First row of :func:`report_table`."""
     return report_row("reference", Skin(report="moments"))
 
 
@@ -223,14 +214,14 @@ FAST_SKINS = {
     "64x64, palm": (FAST_64, (10, 10)),
     "64x64, any pattern": (FAST_64.replace(settle_us=2.9, project_us=8.2), (3, 3)),
 }
-"""Fast Skins; the last has the times of docs/settle.md for any pressed switches."""
+"""Fast Skins; the last has docs/settle.md's times for any pressed switches."""
 
 TOUCHES = 196
-"""Places of a contact, spread over the sheet; on 16x16 every place of 3x3 cells."""
+"""Places of a contact."""
 
 
 def latency_table() -> str:
-    """Latency of the reversal scan, and of a raster scan of the reference sheet."""
+    """Latency of the reversal scan, and of the reference sheet's raster scan."""
     head = (
         "sheet", "contact", "touch to `contact` pin, worst", "touch to last byte, median / worst", "bound",
         "change to last byte, worst", "frames per second", "bytes",
@@ -240,7 +231,7 @@ def latency_table() -> str:
 
 
 def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
-    """One line of :func:`latency_table`."""
+    """A row of :func:`latency_table`."""
     found = latency.measure(skin, cells, TOUCHES)
     last = found.touch_to_last_byte_us
     return writer.line(
@@ -258,7 +249,6 @@ def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
 
 
 def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
-    """The projection, a row time per touched row, and the frame's bits; and the worst touch's excess over it."""
     if not skin.reads_rows:
         return ""
     derived = skin.derived
@@ -268,5 +258,5 @@ def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
 
 
 def latency_sample() -> str:
-    """The first row of :func:`latency_table`."""
+    """First row of :func:`latency_table`."""
     return latency_row("16x16", *FAST_SKINS["16x16"])

@@ -1,1 +1,1 @@
-"""Delay of frames to user code with either reader, against a C program on the same line."""
+"""Delay of frames to user code by reader, against a C program."""

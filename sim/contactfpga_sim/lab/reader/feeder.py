@@ -1,4 +1,4 @@
-"""Boards on pseudo-terminals in a process of their own, which notes the time before writing each frame."""
+"""Boards on pseudo-terminals in a process that notes the time of each frame."""
 
 from __future__ import annotations
 
@@ -14,21 +14,18 @@ from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import heard
 
 ALIVE_S = 0.25
-"""Interval of frames before a board is started."""
+"""Interval of frames before the start."""
 
 
 class Pace(NamedTuple):
-    """Timing of the written frames."""
+    """Timing of written frames."""
 
     per_second: int
     at_once: int
-    """Frames per write, as a USB port delivers them."""
     seconds: float
-    """Duration of a stream."""
 
     @property
     def step_us(self) -> int:
-        """Frame period on the board's clock."""
         return round(1e6 / self.per_second)
 
     @property
@@ -37,7 +34,7 @@ class Pace(NamedTuple):
 
 
 PACES = Pace(1_000, 1, 1.5), Pace(10_000, 1, 1.0), Pace(72_000, 18, 0.5)
-"""The reference sheet with a slow and a fast scan, and the capacity of 12 Mbaud."""
+"""The reference sheet's slow and fast scan, and 12 Mbaud's capacity."""
 
 
 class Feeder:
@@ -55,13 +52,12 @@ class Feeder:
         self.ports = [os.ttyname(slave) for slave in self._slaves]
         self.go = context.Event()
         self.first = context.RawArray("q", boards)
-        """Number of each board's first frame after the start."""
+        """Each board's first frame after the start."""
         self.written_s = context.RawArray("d", count)
-        """Time on ``time.monotonic`` just before each frame was written to the first board."""
+        """``time.monotonic`` just before each frame's write to the first board."""
         self.end = context.RawValue("q", -1)
         """Frames written by each board; -1: still writing."""
         self.greeted = context.RawValue("q", 0)
-        """Number of answered requests."""
         self.process = context.Process(target=self._run, daemon=True)
         self.process.start()
 
@@ -126,7 +122,6 @@ class Feeder:
         self.go.set()
 
     def close(self) -> None:
-        """End the boards."""
         self.process.kill()
         self.process.join()
         for descriptor in self._masters + self._slaves:

@@ -1,4 +1,4 @@
-"""From the last byte to user code, with a thread in C or in Python that reads, beside a C program on the same line."""
+"""Delay from the last byte to user code, with a reader in C or Python, beside a C program."""
 
 from __future__ import annotations
 
@@ -22,11 +22,9 @@ from contactfpga_sim.lab.speed.driver import SKIN
 LEFT_OUT = 0.15
 """Ignored share of a stream's beginning."""
 OPEN_S = 60.0
-"""Time for a board to answer on a busy machine."""
 ENDED_S = 0.8
-"""Silence that ends a stream."""
 BEGUN = 20
-"""Frames after which a stream has begun; a few come while the board makes the others."""
+"""Frames that begin a stream."""
 READERS = ("native", "thread")
 
 
@@ -34,9 +32,8 @@ class Found(NamedTuple):
     """Result of one stream."""
 
     us: np.ndarray
-    """From the last byte's write to user code, for each returned call."""
+    """Delay from the last byte's write to user code, by returned call."""
     calls: float
-    """Returned calls per second."""
 
 
 @contextlib.contextmanager
@@ -53,7 +50,6 @@ def bare_program() -> Iterator[Path]:
 
 
 def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
-    """Delays of frames with these numbers and receive times."""
     places = numbers - feeder.first[0]
     counted = (places > feeder.end.value * LEFT_OUT) & (places < feeder.end.value)
     places, seconds = places[counted], seconds[counted]
@@ -75,7 +71,7 @@ def bare(program: Path, pace: Pace) -> Found:
 
 
 def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
-    """Result of the driver; ``busy``: while another Python thread computes."""
+    """Result of the driver; ``busy``: beside a computing Python thread."""
     numbers: list[int] = []
     seconds: list[float] = []
     with contextlib.closing(Feeder(1, pace)) as feeder:
@@ -93,7 +89,7 @@ def driver(reader: str, pace: Pace, busy: bool, call: str = "latest") -> Found:
 
 @contextlib.contextmanager
 def computing(busy: bool) -> Iterator[None]:
-    """If ``busy``, a thread that only computes."""
+    """If ``busy``, compute in a thread."""
     done: list[bool] = []
 
     def compute() -> None:

@@ -1,4 +1,4 @@
-"""Load of many links of 1 kHz on the process that uses them, with either reader."""
+"""Load of many 1 kHz links on the process that uses them."""
 
 from __future__ import annotations
 
@@ -15,22 +15,20 @@ from contactfpga_sim.lab.speed.driver import SKIN
 
 PACE = Pace(1_000, 1, 3.0)
 LOOP_S = 0.01
-"""How often each link is looked at."""
 
 
 class Share(NamedTuple):
-    """What it takes."""
+    """Load and age of links."""
 
     used: float
-    """Of a core, by the process that uses the links, with all its threads."""
+    """Core share of the process with all its threads."""
     came: float
-    """Share of the frames that arrived while they were sent."""
+    """Share of frames that arrived while sent."""
     age_ms: float
-    """Median age of a link's newest frame when taken."""
 
 
 def measured(reader: str, links: int, call: str) -> Share:
-    """``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
+    """Load of links; ``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
     with contextlib.closing(Feeder(links, PACE)) as feeder, contextlib.ExitStack() as opened:
         with ThreadPoolExecutor(4) as workers:
             boards = list(workers.map(lambda port: _opened(port, reader), feeder.ports))
@@ -61,7 +59,6 @@ def _opened(port: str, reader: str) -> contactfpga.Board:
 
 
 def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str, feeder: Feeder) -> float:
-    """Age of a link's newest frame."""
     if call == "latest":
         zones = board.latest(10.0)
         time_us, arrived_s = zones.time_us, zones.arrived_s

@@ -1,4 +1,4 @@
-"""The control loop of ``examples/reflex.py`` beside a computing Python thread: missed deadlines, and false silences."""
+"""The loop of ``examples/reflex.py`` beside a computing Python thread: missed deadlines and false silences."""
 
 from __future__ import annotations
 
@@ -21,9 +21,8 @@ class Missed(NamedTuple):
 
     deadlines: int
     missed: int
-    """Periods without a step."""
     silent: int
-    """Stops for lack of a recent frame, though the board sent one every ms."""
+    """Stops for lack of a recent frame, though one came every ms."""
 
 
 def measured(reader: str, busy: bool, switch_s: float) -> Missed:

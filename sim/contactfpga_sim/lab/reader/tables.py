@@ -1,7 +1,6 @@
-"""Tables of the delay of frames to user code with either reader.
+"""Tables of the delay of frames to user code.
 
-Methods alternate, so that other load affects all equally. Times are this machine's; no test holds them. On a busy
-machine compare within a row.
+Methods alternate, so that other load affects all equally. No test holds these times.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ def shown(streams: list[Found]) -> str:
 
 
 def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
-    """From the last byte to user code in an otherwise idle process."""
+    """Last byte to user code in an otherwise idle process."""
     rows = [
         [
             "frames per second",
@@ -55,7 +54,7 @@ def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
 
 
 def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
-    """From the last byte to user code beside a computing thread."""
+    """Last byte to user code beside a computing thread."""
     rows = [["frames per second", "call", *(f'`reader="{reader}"`' for reader in READERS), "calls per second"]]
     for pace in paces:
         for call in ("latest", "next") if pace is paces[0] else ("latest",):

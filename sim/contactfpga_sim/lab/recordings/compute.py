@@ -1,4 +1,4 @@
-"""Cost of recordings, and loss after kill -9: the figures of docs/recordings.md."""
+"""Cost of recordings, and loss after kill -9, for docs/recordings.md."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from contactfpga.tools.recordings.session import Session
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
-"""Boards by their approximate frame rate."""
+"""Boards by approximate frame rate."""
 
 _PIECE = struct.Struct("<dQ")
-"""Arrival times of bytes, and their number by then."""
+"""Arrival times of bytes, and their number."""
 
 
 def finger(seconds: float) -> np.ndarray:
@@ -46,7 +46,7 @@ def folder() -> Iterator[Path]:
 
 
 def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
-    """Write a board's bytes under a circling finger; returns the number of frames."""
+    """Write a board's bytes under a circling finger; return the frames' number."""
     with contactfpga.open(VirtualBoard(skin, finger), record=path) as board:
         count = 1
         while board.clock() < seconds:
@@ -57,16 +57,15 @@ def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class Cost:
-    """Cost of one rate and one way to record."""
+    """Cost of a rate and way to record."""
 
     frames_per_s: float
     bytes_per_frame: float
     frames_per_cpu_s: float
-    """Frames received and written per CPU second, with all of the driver's work."""
+    """Frames per CPU second, with all of the driver's work."""
 
     @property
     def mb_an_hour(self) -> float:
-        """Megabytes per hour at that rate."""
         return self.frames_per_s * self.bytes_per_frame * 3600 / 1e6
 
 
@@ -90,11 +89,10 @@ class Reading:
     rows: float
     """Rows of a table, with tracks."""
     parquet_bytes: float
-    """Bytes per frame."""
 
 
 def reading(path: Path, into: Path) -> Reading:
-    """Read a recording, and export it."""
+    """Read and export a recording."""
     recording = Recording(path)
     before = time.process_time()
     count = sum(1 for _ in recording.frames())
@@ -105,18 +103,16 @@ def reading(path: Path, into: Path) -> Reading:
 
 @dataclasses.dataclass(frozen=True)
 class Loss:
-    """Loss after one kill -9."""
+    """Loss after a kill -9."""
 
     came: int
-    """Bytes that had arrived."""
     lost: int
-    """Arrived bytes missing in the recovered file."""
     lost_s: float
-    """Time from the last recovered byte to the last one that arrived."""
+    """Time from the last recovered byte to the last arrived one."""
 
 
 def loss(source: Path, seconds: float, place: Path) -> Loss:
-    """Record a board in real time, kill the program after this time, and recover its file."""
+    """Record a board in real time, kill the program, and recover its file."""
     place.mkdir()
     file, log = place / "killed.mcap", place / "log"
     child = subprocess.Popen([sys.executable, "-m", __name__, f"replay://{source}?pace=1", str(file), str(log)])
@@ -135,7 +131,6 @@ def loss(source: Path, seconds: float, place: Path) -> Loss:
 
 
 def _record(port: str, file: str, log: str) -> None:
-    """The process to kill; it logs arrivals itself."""
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT)
     count = 0
 

@@ -1,4 +1,4 @@
-"""The figures of docs/recordings.md."""
+"""Tables of docs/recordings.md."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.recordings import compute
 
 SECONDS = {10_000: 3.0, 1_000: 5.0}
-"""Device time by frames per second."""
 KILLS = 8
 
 
@@ -28,7 +27,7 @@ def stream(rate: int) -> Path:
 
 
 def sizes_table() -> str:
-    """Sizes (machine-independent, but for chunk ends) and speeds (of this machine)."""
+    """Sizes (but for chunk ends, machine-independent), and this machine's speeds."""
     head = ("frames/s", "messages", "bytes per frame", "MB an hour", "frames per CPU second")
     rows = [head]
     with compute.folder() as place:
@@ -64,7 +63,7 @@ def reading_table() -> str:
 
 
 def loss_table() -> str:
-    """Loss when killed at several moments."""
+    """Loss by moment of the kill."""
     with compute.folder() as place:
         found = [compute.loss(stream(10_000), 0.5 + 0.237 * kill, place / str(kill)) for kill in range(KILLS)]
     rows = [

@@ -1,1 +1,1 @@
-"""Electrical faults of a sheet and its board: which are reported, by what means, and how fast."""
+"""Electrical faults of a sheet and its board: which are reported, how, and how fast."""

@@ -1,7 +1,4 @@
-"""The electrical faults of docs/safety.md: each fault on the simulated sheet, its places and effects.
-
-To add one, add an entry to :data:`FAULTS`; study and page follow.
-"""
+"""Electrical faults of docs/safety.md. To add one, extend :data:`FAULTS`; study and page follow."""
 
 from __future__ import annotations
 
@@ -22,13 +19,12 @@ Cell = tuple[int, int]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SheetFault:
-    """A fault. Rows and columns are those of the sheet; cells are (row, column)."""
+    """A fault of the sheet; cells are (row, column)."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut rows: first column whose switches no longer reach the pin; 0 also stands for a driver that never selects."""
+    """Cut rows: first column that no longer reaches the pin; 0 also for a driver that never selects."""
     columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut columns: first row whose switches no longer reach the pin; 0 also stands for an input that always reads
-    released."""
+    """Cut columns: first row that no longer reaches the pin; 0 also for an input that always reads released."""
     selected: tuple[int, ...] = ()
     """Rows constantly at the selecting level."""
     stuck: tuple[int, ...] = ()
@@ -38,24 +34,20 @@ class SheetFault:
     dead: tuple[Cell, ...] = ()
     """Switches that never conduct."""
     bare: tuple[Cell, ...] = ()
-    """Switches whose diode is shorted."""
+    """Switches with shorted diodes."""
     joined_rows: tuple[Cell, ...] = ()
-    """Pairs of shorted rows."""
     joined_columns: tuple[Cell, ...] = ()
-    """Pairs of shorted columns."""
     pulls_win: bool = False
-    """Whether undefined levels, with two pins driving against each other, read as released."""
+    """Whether undefined levels, of two opposing pins, read as released."""
     line: ColumnLine | None = None
     """Settling of the columns; None: instant."""
     running: bool = True
     """Whether the board has supply, clock and configuration."""
     connected: bool = True
-    """Whether its bytes reach the host."""
     contact_connected: bool = True
-    """Whether its pin `contact` reaches the robot."""
 
     def middle(self, rows: int, columns: int) -> Cell:
-        """A cell of the fault, for a sheet of this size."""
+        """A cell of the fault."""
         for row, column in (*self.closed, *self.dead, *self.bare, *self.rows.items()):
             return row, min(column, columns - 1)
         for column, row in self.columns.items():
@@ -67,7 +59,7 @@ class SheetFault:
         return rows // 2, columns // 2
 
     def press(self, board: CompiledBoard, touched: np.ndarray) -> None:
-        """Give a running board's sheet these touches, from the next cycle on."""
+        """Touch a running board's sheet from the next cycle on."""
         read = self._read(wiring.extended(touched))
         cuts = wiring.missed(read)
         board.cut(cuts.rows | dict(self.rows), cuts.columns | dict(self.columns))
@@ -81,7 +73,6 @@ class SheetFault:
         board.press(read[:-1, :-1])
 
     def _read(self, closed: np.ndarray) -> np.ndarray:
-        """The switches that read pressed, given the closed ones of an extended sheet."""
         cells = closed.copy()
         for cell in self.closed:
             cells[cell] = True
@@ -108,17 +99,15 @@ class Fault:
 
     title: str
     effect: str
-    """The error if nobody notices."""
+    """The error if unnoticed."""
     places: Places
-    """Places by name."""
     left: str
-    """The user's remedy, and for an unreported fault the reason."""
+    """The user's remedy; for an unreported fault the reason."""
     host: str = ""
-    """Means for this fault: ``self_test`` at power-up, or the host's ``Watch``, which is not run here."""
+    """``self_test`` at power-up, or the host's ``Watch``, which is not run here."""
 
 
 def _ends(length: int) -> tuple[int, ...]:
-    """Cuts of a line: at its pin, in the middle, before its last switch."""
     return 0, length // 2, length - 1
 
 
@@ -135,7 +124,6 @@ def _cut_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _row_chips(skin: Skin) -> Mapping[str, SheetFault]:
-    """A failed connector or 74HC595: its rows, or all later rows too."""
     firsts = range(0, skin.rows, 8)
     alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
     return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
@@ -164,7 +152,6 @@ def _stuck_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _cells(skin: Skin) -> list[tuple[int, int]]:
-    """Corner and diagonal cells."""
     rows, columns = skin.rows - 1, skin.columns - 1
     corners = [(0, 0), (0, columns), (rows, 0), (rows, columns)]
     return corners + [(rows * step // 4, columns * step // 4) for step in (1, 2, 3)]
@@ -179,7 +166,6 @@ def _dead(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _bare(skin: Skin) -> Mapping[str, SheetFault]:
-    """Shorted diodes, with both values of undefined levels."""
     return {
         f"switch {cell}, {'released' if released else 'pressed'} wins": SheetFault(bare=(cell,), pulls_win=released)
         for cell in _cells(skin)
@@ -188,7 +174,6 @@ def _bare(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _joined_rows(skin: Skin) -> Mapping[str, SheetFault]:
-    """Two opposing pins, with both resulting column levels."""
     return {
         f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": SheetFault(
             joined_rows=((row, row + 1),), pulls_win=released
@@ -206,7 +191,6 @@ def _joined_columns(skin: Skin) -> Mapping[str, SheetFault]:
 
 
 def _slow(skin: Skin) -> Mapping[str, SheetFault]:
-    """Lines of increasing capacitance, with slow pulls up and a resistance."""
     found = {}
     for picofarad in (464, 1000, 2154, 4642):
         for name, circuit in (
@@ -307,4 +291,3 @@ FAULTS: Mapping[str, Fault] = {
         "take zones as the second way to a stop; test the stop at every start",
     ),
 }
-"""Every electrical fault by its name."""

@@ -1,5 +1,5 @@
-"""Every fault at every place, in every scene: what reports it, how fast, and earlier errors. For faults meant for a
-self-test, the compiled board is powered up and the pin `contact` is watched."""
+"""Every fault at every place, in every scene: its reports, their times, and earlier errors. Self-test faults also
+power up the compiled board."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ PHASES = (0.03, 0.37, 0.71)
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """A fault at one place, in all scenes."""
+    """A fault at a place, in all scenes."""
 
     name: str
     scenes: Mapping[str, Told]
 
     @property
     def harmful(self) -> bool:
-        """Whether it causes an error that this study detects."""
+        """Whether it causes a detected error."""
         return any(told.harmful for told in self.scenes.values())
 
     def us(self, by: str) -> int | None:
-        """Time for this means to report it: untouched if possible, else in every scene with an error."""
+        """Time of the report by this means: untouched if possible, else in every scene with an error."""
         rest = self.scenes["rest"].by.get(by)
         if rest is not None:
             return rest
@@ -46,17 +46,16 @@ class Place:
 
     @property
     def wrong(self) -> int:
-        """Largest number of wrong frames without a flag."""
+        """Most wrong frames without a flag."""
         return max(told.wrong for told in self.scenes.values())
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Content of the first flagged frames over all scenes."""
         return tuple(dict.fromkeys(word for told in self.scenes.values() for word in told.words))
 
 
 def places(skin: Skin, fault: str) -> Iterator[tuple[str, SheetFault]]:
-    """The places of a fault on a sheet."""
+    """Places of a fault on a sheet."""
     yield from FAULTS[fault].places(skin).items()
 
 
@@ -75,7 +74,7 @@ def found(skin: str, fault: str) -> tuple[Place, ...]:
 
 
 def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
-    """Number of harmful places at which one of these channels reports the fault, and number of harmful places."""
+    """Harmful places whose fault these channels report, and all harmful places."""
     harmful = [place for place in found(skin, fault) if place.harmful]
     return sum(any(place.us(channel) is not None for channel in channels) for place in harmful), len(harmful)
 
@@ -83,18 +82,17 @@ def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
 TESTED = Skin.load(examples() / "fast.toml").replace(guard=True, self_test=True, fail_safe=True, alive=True)
 
 HOST = "self_test"
-"""Faults by :attr:`~contactfpga_sim.lab.safety.catalogue.Fault.host`."""
 
 
 def clocks(skin: Skin) -> int:
-    """Clocks of the self-test at power-up, and the pin after it; the scan drives no row until then."""
+    """Clocks of the self-test at power-up, and the pin after it; no row is driven until then."""
     derived = skin.derived
     slot = 2 * derived.project_clocks + derived.settle_clocks + 8
     return (1 + skin.rows + skin.columns) * slot + 2
 
 
 def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
-    """Time of the pin's report in us from power-up, with the switches of shorted diodes pressed; None: none."""
+    """Time of the pin's report in us from power-up, with shorted diodes' switches pressed; None: none."""
     cells = np.zeros((1, skin.rows, skin.columns), bool)
     for cell in hurt.bare:
         cells[0][cell] = True
@@ -107,7 +105,7 @@ def told_us(hurt: SheetFault, skin: Skin = TESTED) -> float | None:
 
 @functools.cache
 def times_at_start(fault: str) -> dict[str, float | None]:
-    """Time of the self-test's report by place; empty for other faults."""
+    """Self-test report times by place; empty for other faults."""
     if FAULTS[fault].host != HOST:
         return {}
     return {name: told_us(hurt) for name, hurt in places(TESTED, fault)}

@@ -1,4 +1,4 @@
-"""The tables of docs/safety.md."""
+"""Tables of docs/safety.md."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
     "these and `self_test`": ("guarded", ("flags", "deadline", "alive", compute.HOST)),
 }
-"""Options with their Skin and their reporting channels."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
 
 
 def faults_table() -> str:
-    """Each fault with what reports it, how fast, and earlier errors."""
+    """Each fault with its reports, their times, and earlier errors."""
     head = [
         "fault",
         "effect if undetected",
@@ -49,7 +48,7 @@ def faults_table() -> str:
 
 
 def coverage_table() -> str:
-    """Listed faults that are reported, with and without each option."""
+    """Reported faults, with and without each option."""
     rows = [["options", "faults reported at every place", "share of faults", "places reported"]]
     for name, (skin, channels) in OPTIONS.items():
         counts = [_told(skin, fault, channels) for fault in FAULTS]
@@ -61,7 +60,6 @@ def coverage_table() -> str:
 
 
 def _told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
-    """:func:`compute.told`, with the self-test if it is among the channels."""
     tested = compute.times_at_start(fault) if compute.HOST in channels else {}
     if not tested:
         return compute.told(skin, fault, channels)
@@ -86,7 +84,6 @@ def _is_told(places: list[Place]) -> bool:
 
 
 def _told_by(places: list[Place], host: str) -> str:
-    """The channels that report it, at all or some places."""
     if not any(_channels(place) for place in places):
         return f"**not reported** by a scan; meant for `{host}`" if host else "**not reported**"
     words = dict.fromkeys(_general(word) for place in places for word in place.words)
@@ -97,7 +94,6 @@ def _told_by(places: list[Place], host: str) -> str:
 
 
 def _tested(fault: str) -> str:
-    """The self-test's report at power-up."""
     times = [us for us in compute.times_at_start(fault).values() if us is not None]
     of = len(compute.times_at_start(fault))
     share = "" if len(times) == of else f" at {len(times)} of {of} places"
@@ -117,7 +113,6 @@ def _count(places: list[Place], channels: tuple[str, ...]) -> str:
 
 
 def _after(places: list[Place], channels: tuple[str, ...]) -> str:
-    """The longest time of the fastest means."""
     times = [[us for channel in channels if (us := place.us(channel)) is not None] for place in places]
     found = [min(one) for one in times if one]
     return f"{max(found):,} µs" if found else ""

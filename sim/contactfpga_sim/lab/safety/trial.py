@@ -1,4 +1,4 @@
-"""One fault at one place: the compiled board scans a sheet that gets the fault, and its reports are noted."""
+"""One fault at one place of the compiled board's sheet."""
 
 from __future__ import annotations
 
@@ -13,38 +13,36 @@ from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments,
 from contactfpga_sim.lab.safety.catalogue import SheetFault
 
 LONGEST_US = 5000
-"""Time after which a fault counts as unreported."""
+"""Time that makes a fault unreported."""
 STEP_US = 8
-"""Resolution of the times."""
 QUIET_US = 2500
-"""Time without an edge of `alive` at which a watchdog acts: two and a half of its half periods."""
+"""Time without an edge of `alive` at which a watchdog acts: 2.5 of its half periods."""
 DEADLINE_US = 1000
-"""The host's deadline for frames, set by the user; ten frames is a short one."""
+"""The host's deadline: ten frames is a short one."""
 
 WARM_UP_US = 3000
-"""Run time after the hello, by which frames arrive and `alive` toggles."""
+"""Run time after the hello."""
 SEEN_SCANS = 6
-"""Scans for which a reported fault is watched further."""
+"""Scans watched after a report."""
 
 PINS = ("contact", "alive")
 
 
 @dataclasses.dataclass(frozen=True)
 class Told:
-    """Result of a fault in one scene. Times are in us from the fault."""
+    """Result of a fault in one scene, in us from the fault."""
 
     by: Mapping[str, int]
-    """Report times: by the frames' ``flags``, a host's ``deadline``, the pins ``contact`` and ``alive``."""
+    """Report times by ``flags``, a host's ``deadline``, pins ``contact`` and ``alive``."""
     words: tuple[str, ...]
-    """Content of the first flagged frame."""
     wrong: int
-    """Wrong frames without a fault flag, until the fault is flagged or the run ends."""
+    """Wrong frames before the flag or the end."""
     harmful: bool
-    """Whether a frame was wrong or missing at any time."""
+    """Whether a frame was wrong or missing."""
 
 
 def scenes(skin: Skin, hurt: SheetFault) -> dict[str, np.ndarray]:
-    """Touches during the fault: nothing, a finger at the fault, everything."""
+    """Touches during the fault: nothing, a finger at it, everything."""
     finger = np.zeros((skin.rows, skin.columns), bool)
     row, column = hurt.middle(*finger.shape)
     finger[max(row - 2, 0) : row + 1, max(column - 2, 0) : column + 1] = True  # of two shorted lines on the first
@@ -52,7 +50,7 @@ def scenes(skin: Skin, hurt: SheetFault) -> dict[str, np.ndarray]:
 
 
 def run(skin: Skin, hurt: SheetFault, touched: np.ndarray, phase: float = 0.0) -> Told:
-    """A sheet with this touch gets the fault after this share of a scan."""
+    """Bring about a fault on a touched sheet after this share of a scan."""
     with Rig(skin, capture=PINS) as rig:
         board = rig.board
         board.hold(touched[None], hello_clocks(skin) + skin.derived.clocks(WARM_UP_US) + int(phase * rig.scan))
@@ -85,8 +83,6 @@ def _watch(rig: Rig, hurt: SheetFault, watched: _Watched) -> Told:
 
 
 class _Watched:
-    """Observations of the host and a watchdog since the fault."""
-
     def __init__(self, skin: Skin, touched: np.ndarray, contact: bool):
         self._skin = skin
         self._truth = [moments(touched)] if touched.any() else []  # every scene is one contact
@@ -99,13 +95,11 @@ class _Watched:
 
     @property
     def done(self) -> bool:
-        """Whether the result is final."""
         pins = {"contact"} if self._skin.fail_safe else set()
         pins |= {"alive"} if self._skin.alive else set()
         return self._now_us > SEEN_SCANS * self._scan_us and {"flags", *pins} <= set(self._by)
 
     def step(self, now_us: int, frames: list[Zones], edges: Mapping[str, int], hurt: SheetFault) -> None:
-        """Add the events since the last step."""
         self._now_us = now_us
         for zones in frames:
             self._last_frame = now_us
@@ -131,5 +125,4 @@ class _Watched:
         return -(-self._skin.derived.frame_clocks // self._skin.derived.clocks_per_us)
 
     def told(self) -> Told:
-        """The result."""
         return Told(self._by, self._words, self._wrong, self._harmful)

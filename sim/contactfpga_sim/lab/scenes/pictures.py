@@ -1,7 +1,4 @@
-"""The picture in docs/scenes.md.
-
-Hand-written, so that the same scenes always make the same file.
-"""
+"""The picture in docs/scenes.md, hand-written: equal scenes make equal files."""
 
 from __future__ import annotations
 
@@ -23,7 +20,6 @@ from contactfpga_sim.model.scenes.scene import Scene, sheet
 
 ACROSS = 4
 PANEL, MARGIN, LINE, FOOT = 160, 16, 16, 24
-"""Panel size, margin, title line height and room for the scale, in pixels."""
 
 HEAD = 4 * LINE
 OUTLINE = style.VERMILLION
@@ -32,7 +28,7 @@ SCALES_MM = (10, 20, 50, 100)
 
 @dataclasses.dataclass(frozen=True)
 class Panel:
-    """A scene at the time 0 on a sheet, under a cover."""
+    """A scene at time 0 on a sheet, under a cover."""
 
     title: str
     detail: str
@@ -42,7 +38,7 @@ class Panel:
 
 
 def panels() -> list[Panel]:
-    """A scene of some families, where covered switches are pressed; and two fingers under every kind of cover."""
+    """Some families' scenes with pressed switches; two fingers under every kind of cover."""
     hand, foot = (_square(size, pitch) for size, pitch in ((32, 5.0), (64, 5.0)))
     drawn = [
         Panel(name, f"pitch {skin.pitch_x_mm:g} mm", placements(name, 1, seed, skin)[0], skin, Cover())
@@ -63,7 +59,7 @@ def _square(size: int, pitch_mm: float) -> Skin:
 
 
 def svg(drawn: Sequence[Panel]) -> str:
-    """All panels as one SVG file."""
+    """All panels as SVG."""
     down, step = -(-len(drawn) // ACROSS), HEAD + PANEL + FOOT + MARGIN
     width, height = style.WIDTH_PX, down * step + MARGIN
     lines = [
@@ -113,7 +109,6 @@ def _panel(panel: Panel) -> list[str]:
 
 
 def _scale(sheet_mm: float, scale: float) -> list[str]:
-    """A scale bar below the sheet, at most 0.4 of its width."""
     long_mm = max((one for one in SCALES_MM if one <= 0.4 * sheet_mm), default=SCALES_MM[0])
     wide = long_mm * scale
     return [
@@ -123,7 +118,6 @@ def _scale(sheet_mm: float, scale: float) -> list[str]:
 
 
 def _outline(part: Part, left_mm: float, top_mm: float, scale: float) -> str:
-    """A part's rim."""
     x, y = (part.x_m / contacts.M - left_mm) * scale, (part.y_m / contacts.M - top_mm) * scale
     half_x, half_y = (half / contacts.M * scale for half in (part.half_x_m, part.half_y_m))
     if isinstance(part, Ellipse):
@@ -135,6 +129,6 @@ def _outline(part: Part, left_mm: float, top_mm: float, scale: float) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """All panels, in ``scenes.svg``."""
+    """Write ``scenes.svg``."""
     write_text(folder / "scenes.svg", svg(panels()))
     return folder / "scenes.svg"

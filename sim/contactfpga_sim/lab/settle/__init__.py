@@ -1,1 +1,1 @@
-"""Where a precharged scan breaks: coupling, slow contacts, long lines, many columns, faulty diodes."""
+"""Where a precharged scan breaks."""

@@ -1,4 +1,4 @@
-"""Knobs of the sheet's circuit under precharge, moved until a time or a level is missed."""
+"""Knobs of the circuit under precharge, moved until a time or level is missed."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from contactfpga.design.circuit.phases import Levels
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 
 SETTLE_US, PRECHARGE_US = 0.5, 0.25
-"""Times of a fast scan."""
 SIZE = 16
 HIGH_V = Circuit().high_v
-"""Level below which a column no longer reads as unpressed."""
+"""Level below which a column reads as pressed or unclear."""
 US = 1e6
 
 
@@ -27,7 +26,6 @@ def sweeps(name: str) -> dict[str, Sweep]:
 
 
 def _settled(circuit: Circuit, names: Sequence[str], size: int = SIZE) -> Outcome:
-    """Whether the circuit settles in time under each of these patterns."""
     found = []
     for name in names:
         phase = phases.settle(Network(circuit, patterns.named(size, size)[name]), Levels.of(circuit))
@@ -111,4 +109,3 @@ KNOBS = {
         ),
     )
 }
-"""Every knob by its name."""

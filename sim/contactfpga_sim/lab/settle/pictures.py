@@ -18,7 +18,7 @@ COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
 
 
 def draw(folder: Path) -> list[Path]:
-    """Write all of them into a folder."""
+    """Write all pictures."""
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):
@@ -26,7 +26,6 @@ def draw(folder: Path) -> list[Path]:
 
 
 def _steps(axes: Any, found: RowTime) -> None:
-    """Mark the beginning of each step of a row time."""
     for start, end, name in zip(found.starts_us, found.starts_us[1:], NAMES):
         axes.axvline(start, color=style.GRID, lw=1)
         if end - start > 0.1:

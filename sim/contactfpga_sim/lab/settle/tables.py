@@ -1,4 +1,4 @@
-"""Currents through switches with shorted diodes, and the tables and pictures of docs/settle.md."""
+"""Currents through switches with shorted diodes; tables and pictures of docs/settle.md."""
 
 from __future__ import annotations
 
@@ -17,19 +17,18 @@ from contactfpga_sim.model.sheet import agreement
 from contactfpga_sim.model.sheet.agreement import SpiceComparison
 
 GAP_US = 1 / 24
-"""One clock at 24 MHz."""
 NAMES = ("precharge", "gap", "select", "gap")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RowTime:
-    """All lines during a row time, from the precharge on."""
+    """All lines during a row time, from its precharge on."""
 
     network: Network
     seconds: np.ndarray
     volts: np.ndarray
     amperes: np.ndarray
-    """(n, lines) currents out of the driving pins."""
+    """(n, lines) out of the driving pins."""
     starts_us: tuple[float, ...]
     """Starts of the steps in :data:`NAMES`, and the end."""
 
@@ -39,7 +38,7 @@ class RowTime:
         return self.volts[:, patterns.middle(self.network.columns)]
 
     def pin_ma(self, row: int) -> np.ndarray:
-        """Current out of the pin of a row."""
+        """Current out of a row's pin."""
         return np.asarray(1e3 * self.amperes[:, self.network.columns + row])
 
 
@@ -54,7 +53,7 @@ def sheet(shorted: int, circuit: Circuit | None = None) -> Network:
 
 
 def row_time(network: Network) -> RowTime:
-    """One row time, after a row with the same pressed switches and a gap."""
+    """A row time, after a row with the same pressed switches and a gap."""
     supply = network.circuit.supply_v
     selected = np.full(network.rows, supply)
     selected[patterns.middle(network.rows)] = 0.0
@@ -79,7 +78,7 @@ def row_time(network: Network) -> RowTime:
 
 
 def flowing_us(found: RowTime, row: int, above_ma: float = 1.0) -> float:
-    """Time for which the pin of a row carries more than this."""
+    """Time for which a row's pin carries more than ``above_ma``."""
     flows = np.abs(found.pin_ma(row)) > above_ma
     steps = np.diff(found.seconds)
     return float(US * steps[flows[1:] & flows[:-1]].sum())
@@ -146,7 +145,7 @@ def agreement_table() -> str:
 
 
 def summary_table() -> str:
-    """The largest difference of each phase."""
+    """Largest difference of each phase."""
     rows = [["phase", "circuits", "largest difference"]]
     for name in agreement.PHASES:
         errors = [abs(one.error) for one in compared() if one.case.phase.name == name]

@@ -1,4 +1,4 @@
-"""Measures the cost of several sheets on one FPGA and their shares of the line, for docs/several.md."""
+"""Cost of several sheets on one FPGA, and their shares of the line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ SKIN = Skin(row_drive="74hc595", column_read="74hc165")
 COUNTS = (1, 2, 3, 4, 8)
 BAUDS = (3_000_000, 12_000_000)
 SECONDS = 0.05
-"""Observed board time, without hellos."""
 
 
 def size_table() -> str:
@@ -36,7 +35,7 @@ def size_table() -> str:
 
 
 def line_table() -> str:
-    """Rate and age of frames by number of sheets, each touched by two fingertips."""
+    """Rate and age of frames by sheets, each under two fingertips."""
     rows = [_row(count, baud) for baud in BAUDS for count in COUNTS]
     return writer.table_of([("baud", "sheets", "frames/s per sheet", "replaced", "longest wait for the line"), *rows])
 
@@ -59,19 +58,17 @@ def _row(count: int, baud: int) -> tuple[str, ...]:
 
 
 def _frames(trace: Trace, after: int) -> list[int]:
-    """Cycles in which frames begin on the line after a cycle."""
     ends = [cycle for cycle, value in trace.bytes if value == 0]
     begins = {end: cycle for (end, _), (cycle, _) in itertools.pairwise(trace.bytes)}
     return [begins[end] for end in ends[:-1] if end > after]
 
 
 def _longest_wait(trace: Trace, begins: list[int]) -> int:
-    """Largest number of clocks from the last row of a sent frame."""
     rows = np.array([cycle for cycle, _, last in trace.rows if last])
     newest = np.searchsorted(rows, np.array(begins)) - 1
     return int(max(np.array(begins) - rows[newest]))
 
 
 def line_sample() -> str:
-    """The first row of :func:`line_table`."""
+    """First row of :func:`line_table`."""
     return writer.line(_row(COUNTS[0], BAUDS[0]))

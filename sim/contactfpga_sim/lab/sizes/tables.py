@@ -1,4 +1,4 @@
-"""Measures size and clock by place and route for the performance and boards pages."""
+"""Size and clock by place and route, for the performance and boards pages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size, writer
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
-"""Sheets on the boards page besides the default ones."""
 FAST = Path("examples/fast.toml")
 
 
@@ -27,13 +26,11 @@ FAULTS: dict[str, dict[str, Any]] = {
     "`guard`, `fail_safe` and `alive`": {"guard": True, "fail_safe": True, "alive": True},
     "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
 }
-"""Fault-reporting options by title."""
 FAST_FAULTS: dict[str, dict[str, Any]] = {
     "`guard`": {"guard": True},
     "`self_test`": {"self_test": True},
     "`guard` and `self_test`": {"guard": True, "self_test": True},
 }
-"""Fault-reporting options of a scan by line reversal, by title."""
 
 WEIGHTS = (
     (1, 2, 3, -4, 5, 6, 7, 8),
@@ -41,7 +38,7 @@ WEIGHTS = (
     (100, -50, 20, 10, 5, -7, 9, 11),
     (1, 1, 1, 1, 1, 1, 1, 1),
 )
-"""Weights of sums, cut to the number of units."""
+"""Weights of sums, cut to the units."""
 
 
 def gateware_table() -> str:
@@ -78,7 +75,7 @@ def _fault_rows(skin: Skin, name: str, table: dict[str, dict[str, Any]]) -> list
 
 
 def units_table() -> str:
-    """The reference Skin with pressure units and weighted sums of them."""
+    """The reference Skin with pressure units and weighted sums."""
     reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
     rows = []
     for units, sums in ((1, 0), (3, 1), (6, 0), (6, 4), (8, 4)):
@@ -89,7 +86,7 @@ def units_table() -> str:
 
 
 def boards_table() -> str:
-    """The sheets that the boards page names, each built for its board."""
+    """Sheets of the boards page, built for their boards."""
     head = ("board", "FPGA", "clock", "sheet", "LUT4", "flip-flops", "block RAMs", "logic cells", "Fmax")
     lines = []
     for board in BOARDS.values():
@@ -100,7 +97,7 @@ def boards_table() -> str:
 
 
 def board_row(board: BoardSpec, skin: Skin) -> str:
-    """FPGA resources of a Skin's bitstream on the board."""
+    """FPGA resources of a Skin's bitstream."""
     print(f"{board.title}, {skin.rows}x{skin.columns}: bitstream", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as folder:  # these tools do not see /tmp
         found = build.build(skin, board, Path(folder))

@@ -1,4 +1,4 @@
-"""The table of the Skin page: each field with its default, and its docstring as Markdown."""
+"""The Skin page's table of fields, from their docstrings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROLE = re.compile(r":\w+:`~?([^`]*)`")
 
 
 def fields_table() -> str:
-    """Fields in the order of the class; defaults as in a TOML file."""
+    """Fields in class order; defaults as in TOML."""
     defaults = {field.name: field.default for field in dataclasses.fields(Skin)}
     told = [field for field in helptext.fields(Skin) if field.name in defaults]
     rows = [(f"`{field.name}`", _toml(defaults[field.name]), _markdown(field.text)) for field in told]

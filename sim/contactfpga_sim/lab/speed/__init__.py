@@ -1,1 +1,1 @@
-"""Speed of board and driver on this machine, and an hour's run."""
+"""Speed of board and driver on this machine."""

@@ -1,7 +1,5 @@
-"""Speed of the virtual board on this machine, over some Skins: `python -m contactfpga_sim.lab.speed.board`.
-
-It counts CPU time, as if on a core of its own, of the best of some runs. No test holds the figures.
-"""
+"""CPU time of the virtual board on this machine, the best of some runs: `python -m contactfpga_sim.lab.speed.board`.
+No test holds it."""
 
 from __future__ import annotations
 
@@ -24,11 +22,10 @@ SKINS = {
 RUNS = 10
 
 RUN_S = 0.02
-"""Board time of a run."""
 
 
 def cycles_per_second(skin: Skin, scene: str = "two_fingers") -> float:
-    """Clock cycles per second of the board alone, without a client."""
+    """Clock cycles per second of the board without a client."""
     cycles = round(RUN_S * skin.clock_hz)
     with VirtualBoard(skin, scene) as board:
         board.advance(cycles)  # the first run finds cold caches

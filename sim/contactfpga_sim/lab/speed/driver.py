@@ -1,7 +1,7 @@
 """Throughput and delay of the driver on this machine: `python -m contactfpga_sim.lab.speed.driver`.
 
-A process of its own plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this process's
-CPU time over all threads, independent of other load; latencies are not. No test holds the figures.
+Another process plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this process's CPU
+time, independent of other load; latencies are not. No test holds them.
 """
 
 from __future__ import annotations
@@ -31,16 +31,15 @@ from contactfpga_sim.model.golden.request import heard
 SKIN = Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5)
 FRAMES = 1 << 14
 STEP_US = (1 << 24) // FRAMES
-"""Frame period, chosen so that time and sequence wrap where the frames repeat."""
+"""Frame period, so that time and sequence wrap where frames repeat."""
 CHUNK = 4096
-"""Bytes per read of a port."""
 PACED, PACE_S = 18, 250e-6
-"""Frames per write and its interval, 72,000 per second: the capacity of 12 Mbaud."""
+"""Frames per write and its interval: 12 Mbaud's capacity."""
 ROUNDS = 20
 
 
 def frame(number: int, low: int, fingers: int = 1, step_us: int = STEP_US) -> bytes:
-    """A frame of fingertips of 3x3 cells, 4 rows apart, that move along their rows."""
+    """A frame of fingertips of 3x3 cells, 4 rows apart, that move along rows."""
     known = facts(SKIN)
     x, y = 1 + number // 40 % (SKIN.columns - 2), SKIN.rows // 2
     counted = 24 + 8 + 3 + known.area_bits + known.zones_bits
@@ -66,14 +65,14 @@ def frame(number: int, low: int, fingers: int = 1, step_us: int = STEP_US) -> by
 
 
 def greeting(number: int = 0) -> bytes:
-    """The hello of a freshly powered board that received this request."""
+    """Hello of a new board that received this request."""
     digits = [0] * 11 + [number >> 7 * place & 127 for place in range(3)] + [0, 0]
     return hello(facts(SKIN), digits)
 
 
 class Feeder:
-    """The board: answers requests until started, then writes all frames ``rounds`` times: ``paced`` of them every
-    PACE_S, or, if 0, as fast as they are read. ``touched``: numbers of the frames with the fingertip."""
+    """A board that answers requests until started, then writes all frames ``rounds`` times: ``paced`` of them every
+    PACE_S, or, if 0, as fast as read. ``touched``: frames with the fingertip."""
 
     def __init__(self, rounds: int, paced: int, touched: Callable[[int], bool]):
         self._rounds, self._paced, self._touched = rounds, paced, touched
@@ -83,7 +82,7 @@ class Feeder:
         self.port = os.ttyname(slave)
         self.go = context.Event()
         self.written_s = context.RawArray("d", rounds * FRAMES)
-        """Time on ``time.monotonic`` just before each frame's last byte was written."""
+        """``time.monotonic`` before each frame's last byte."""
         self.process = context.Process(target=self._run, daemon=True)
 
     def _run(self) -> None:
@@ -127,7 +126,7 @@ class Feeder:
 def stream(
     rounds: int, paced: int = 0, touched: Callable[[int], bool] = lambda number: True
 ) -> Iterator[tuple[contactfpga.Board, contactfpga.Subscription, Feeder]]:
-    """An open board, and a queue of all its frames except the first."""
+    """An open board, and a queue of its frames but the first."""
     feeder = Feeder(rounds, paced, touched)
     feeder.process.start()
     try:
@@ -142,7 +141,7 @@ def stream(
 
 
 def decoded(take: Callable[[Conversation, bytes, float], list[Event | Run]]) -> float:
-    """Frames per second from chunks of bytes to a batch per megabyte, without a port."""
+    """Frames per second from chunks of bytes to a batch per megabyte."""
     data = b"".join(frame(number, 1) for number in range(FRAMES))
     best = 0.0
     for _ in range(5):
@@ -168,7 +167,7 @@ def over_a_port(take: Callable[[contactfpga.Subscription], int]) -> float:
 
 
 def latencies_us() -> list[float]:
-    """From the last byte's write to ``latest``, for returned frames after the first tenth."""
+    """Delays from the last byte's write to ``latest``, after the first tenth."""
     found, rounds = [], 6
     with stream(rounds, PACED) as (board, queue, feeder):
         queue.close()

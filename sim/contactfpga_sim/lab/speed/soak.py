@@ -1,9 +1,9 @@
 """A board in real time and its driver for an hour: `make soak`. Nothing may grow, or be lost unreported.
 
 The virtual board runs on a pseudo-terminal; three threads read it, one requests, subscriptions come and go, and the
-port is reopened now and then. Each line is a minute: frames, losses, memory and open descriptors of this process. The
-status is 1 if a frame was repeated or out of order, a count does not add up, memory or descriptors grew, or no frame
-arrived. The first period with a wrong frame or count is the last.
+port is reopened. Each line is a minute: frames, losses, memory and open descriptors. The status is 1 if a frame was
+repeated or out of order, a count does not add up, memory or descriptors grew, or no frame arrived. The first period
+with a wrong frame or count is the last.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from contactfpga.tools.console import interrupt, numbers
 from contactfpga_sim.model.board.pty_board import PtyBoard
 
 SKIN = contactfpga.Skin(clock_hz=3_000_000, baud=750_000, settle_us=25.0)
-"""A Skin with a clock that a busy machine holds."""
 
 REOPENED_S = 60.0
 GROWTH_MB = 30.0
-"""Allowed growth after the first tenth of the time, for Python itself."""
+"""Growth allowed to Python after the first tenth of the time."""
 
 
 class Soak:
@@ -38,7 +37,6 @@ class Soak:
         self._port = port
 
     def run(self, seconds: float) -> None:
-        """Read for this long, then release the port."""
         self.opened += 1
         with contactfpga.open(self._port, timeout=10.0) as board:
             until = time.monotonic() + seconds
@@ -90,7 +88,7 @@ class Soak:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run it; returns 1 if something was wrong."""
+    """Run it; return 1 if something was wrong."""
     parser = argparse.ArgumentParser(prog="make soak", description=__doc__)
     parser.add_argument("--seconds", type=numbers.SECONDS, default=3600.0, help="how long (default: an hour)")
     seconds = parser.parse_args(arguments).seconds
@@ -125,7 +123,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _megabytes() -> float:
-    """Resident memory; 0 if the system does not report it."""
+    """Resident memory; 0 if unreported."""
     status = Path("/proc/self/statm")
     return int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6 if status.exists() else 0.0
 

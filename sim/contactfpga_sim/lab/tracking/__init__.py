@@ -1,1 +1,1 @@
-"""Quality of tracking: moving scenes with a known truth, recordings, a baseline, and where it breaks."""
+"""Quality of tracking on moving scenes with a known truth and on recordings."""

@@ -1,6 +1,6 @@
 """Where ids are lost: one knob at a time, moved until fewer than 95 % of random placements keep them.
 
-A placement shifts the scene by up to a pitch along both axes, and its frames by up to one frame.
+A placement shifts the scene by up to a pitch along both axes, and its frames by up to one.
 """
 
 from __future__ import annotations
@@ -20,47 +20,43 @@ from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_o
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)
-"""A wide sheet for long slides."""
 
 Y_MM = 73.0
 HZ = 1000.0
 
 MOST = 480
-"""Most placements per value; undecided ones count as broken."""
+"""Most placements per value; undecided ones break."""
 
 Ids = list[list[int]]
-"""Ids from left to right, frame by frame, without frames that lack a zone."""
+"""Ids from left to right by frame, without frames that lack a zone."""
 
 Made = tuple[Zones, ...]
 
 Rates = list[tuple[float, rated.Rate]]
-"""Number of correct placements per value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One parameter, moved until ids are lost."""
+    """A parameter, moved until ids are lost."""
 
     name: str
     title: str
     axis: str
     """The moved quantity, with its unit."""
     values: tuple[float, ...]
-    """Values in the order of the sweep."""
     scene: Callable[[float, Random], Made]
-    """The frames for a value, at a random placement."""
+    """Frames for a value, at a random placement."""
     right: Callable[[Ids, float], bool]
     """Whether the ids are those of the contacts."""
     methods: Mapping[str, Callable[[], Update]]
     closed: Mapping[str, str]
-    """Break points by formula, for the methods that have one."""
+    """Break points by formula, by method."""
     helps: str
-    """The remedy."""
 
     def rates(
         self, value: float, methods: Iterable[str], seed: int = 0, looks: Sequence[int] = rated.LOOKS
     ) -> dict[str, rated.Rate]:
-        """Correct placements at a value, for each method, on the same placements; as many as the decision needs."""
+        """Correct placements at a value, the same for each method; as many as the decision needs."""
         hits = dict.fromkeys(methods, 0)
         found: dict[str, rated.Rate] = {}
         for number in range(MOST):
@@ -75,7 +71,7 @@ class Knob:
         return found
 
     def sweep(self, seed: int = 0) -> dict[str, Rates]:
-        """Rates for each method, value by value until too few are correct."""
+        """Rates by method, value by value until too few are correct."""
         found: dict[str, Rates] = {method: [] for method in self.methods}
         for value in self.values:
             whole = [method for method, rates in found.items() if not rates or holds(rates[-1][1])]
@@ -90,14 +86,14 @@ def holds(rate: rated.Rate) -> bool:
 
 
 def held_until(rates: Rates) -> float | None:
-    """The last value up to which enough are correct; None if there is none."""
+    """Last value up to which enough are correct, or None."""
     held = [value for value, rate in rates if holds(rate)]
     return held[-1] if held else None
 
 
 @functools.cache
 def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
-    """:meth:`Knob.sweep` of the knob of this name, cached."""
+    """:meth:`Knob.sweep` of this knob, cached."""
     key = repr((kept.made_by(__name__), name, seed))
 
     def new() -> dict[str, list[tuple[float, int, int]]]:
@@ -118,13 +114,12 @@ def sweeps() -> dict[str, dict[str, Rates]]:
 
 
 def _moved(rng: Random) -> tuple[float, float]:
-    """Random shift of a scene, in mm."""
     x, y = rng.uniform(0, SKIN.pitch_x_mm), rng.uniform(0, SKIN.pitch_y_mm)
     return float(x), float(y)
 
 
 def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
-    """(n, rows, columns) bool: the switches under a finger at n places, without a cover."""
+    """(n, rows, columns) bool: bare switches under a finger at n places."""
     columns, rows = WIDE.pitch_x_mm * np.arange(WIDE.columns), WIDE.pitch_y_mm * np.arange(WIDE.rows)
     across, along = columns - xs_mm[:, None, None], rows[:, None] - y_mm
     closed: np.ndarray = across**2 + along**2 <= FINGER_MM**2
@@ -132,7 +127,6 @@ def under(xs_mm: np.ndarray, y_mm: float) -> np.ndarray:
 
 
 def _frames(times: Sequence[float], cells: np.ndarray) -> Made:
-    """The frames of (n, rows, columns) bool cells."""
     return tuple(zones_of(one, round(now * 1e6), WIDE)[0] for now, one in zip(times, cells))
 
 
@@ -158,7 +152,6 @@ def _one_id(ids: Ids, _value: float) -> bool:
 
 
 def _slide(step_mm: float, rng: Random, from_rest: bool) -> Made:
-    """Ten frames at this speed, optionally after ten of acceleration."""
     steps = [step_mm * (number + 1) / 10 for number in range(10 if from_rest else 0)] + [step_mm] * 9
     xs = [10.0]
     for step in steps:
@@ -196,7 +189,6 @@ SPEEDING, AT_ONCE = (
 
 
 def _pair(distance_mm: float, rng: Random) -> Made:
-    """Two fingers that start 60 mm apart, stay 0.1 s at this distance, and go back, at 400 mm/s relative speed."""
     travel = (60 - distance_mm) / 400
     x_mm, y_mm = _moved(rng)
     now = _times(2 * travel + 0.19, rng, 250.0)
@@ -240,7 +232,6 @@ CROSS = Knob(
 
 
 def _open(open_ms: float, rng: Random) -> Made:
-    """A finger whose switches open once for this long, at 2,000 frames per second."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.04, rng, 2000.0))
     lifted = (now >= 0.01) & (now < 0.01 + open_ms / 1000)
@@ -278,7 +269,6 @@ BOUNCE = Knob(
 
 
 def _stuck(count: float, rng: Random) -> Made:
-    """A finger that slides at 300 mm/s along a row with stuck switches 40 mm apart, to 20 mm past the fourth."""
     x_mm, y_mm = _moved(rng)
     now = _times(0.69, rng, 125.0)
     cells = under(40 + x_mm + 300 * np.array(now), Y_MM + y_mm)
@@ -304,7 +294,6 @@ STUCK = Knob(
 
 
 def _gap(ms: float, rng: Random) -> Made:
-    """A finger that slides for 0.1 s, then without frames for this long, then for 0.1 s more."""
     x_mm, y_mm = _moved(rng)
     now = np.array(_times(0.2, rng, 500.0))
     half = len(now) // 2
@@ -328,4 +317,3 @@ LOST = Knob(
 )
 
 KNOBS = {knob.name: knob for knob in (SPEEDING, AT_ONCE, MEET, CROSS, BOUNCE, STUCK, LOST)}
-"""Every knob by its name."""

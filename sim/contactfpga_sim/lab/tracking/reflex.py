@@ -1,7 +1,6 @@
-"""Reaction time of the control loop of ``examples/reflex.py`` on this machine: `python -m
-contactfpga_sim.lab.tracking.reflex`.
+"""Reaction time of the loop of ``examples/reflex.py`` on this machine: `python -m contactfpga_sim.lab.tracking.reflex`.
 
-A process of its own plays a board on a pseudo-terminal, with a touch every 5 ms. Times depend on this machine's load.
+Another process plays a board on a pseudo-terminal, with a touch every 5 ms.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ PACED = 3
 """Frames per write: 12,000 per second, slightly more than the reference Skin's."""
 
 PERIOD, TOUCHED = 64, 16
-"""Frames from touch to touch, and frames of a touch; FRAMES is a multiple of the first."""
+"""Frames from touch to touch, a divisor of FRAMES, and of a touch."""
 
 ROUNDS = 4
 
@@ -28,16 +27,15 @@ HEAD = ("stops on a touch", "median", "99 %", "worst", "stops on silence")
 
 
 class ReactionTimes(NamedTuple):
-    """From the last byte of the first frame with a touch to the loop's decision, in us."""
+    """Times in us from the last byte of a touch's first frame to the decision."""
 
     found_us: list[float]
     """Times in increasing order."""
     silent: int
-    """Stops of the loop because the machine paused beyond its deadline."""
+    """Stops because the machine paused too long."""
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Cells of a table."""
         found = self.found_us
         p99 = found[len(found) * 99 // 100]
         times = (statistics.median(found), p99, found[-1])
@@ -55,7 +53,7 @@ def example() -> ModuleType:
 
 
 def measured(rounds: int = ROUNDS) -> ReactionTimes:
-    """Run the loop repeatedly, each time from an untouched sheet."""
+    """Run the loop repeatedly, from an untouched sheet."""
     loop, found, last, silent = example(), [], (rounds - 1) * FRAMES, 0
 
     def touched(number: int) -> bool:

@@ -1,5 +1,5 @@
-"""Fingers that slide, cross, meet, tap, stop, follow and enter, each with a number as its truth; and frames of them at
-a rate, with the golden model's zones."""
+"""Fingers that slide, cross, meet, tap, stop, follow and enter, with true numbers; and their frames by the golden
+model."""
 
 from __future__ import annotations
 
@@ -19,14 +19,11 @@ from contactfpga_sim.model.scenes.scene import Scene
 
 SKIN = Skin()
 FINGER_MM = 8.0
-"""Radius of a finger's contact."""
 SECONDS = 2.0
-"""Length of a scene."""
 MIDDLE_MM = 75.0
-"""Middle of the sheet, along x and y."""
 
 BOUNCE_S = 0.003
-"""Bounce of the switches after a touch and before a lift, 1 ms open and 1 ms closed."""
+"""Bounce after a touch and before a lift: 1 ms open, 1 ms closed."""
 
 Random = np.random.Generator
 Place = tuple[float, float]
@@ -47,7 +44,7 @@ class Finger:
         return self.begins_s <= seconds < self.ends_s
 
     def cells(self, seconds: float, skin: Skin) -> np.ndarray:
-        """(rows, columns) bool: the closed switches."""
+        """(rows, columns) bool: closed switches."""
         if not self.there(seconds) or self._open(seconds):
             return np.zeros((skin.rows, skin.columns), bool)
         return Scene((self.contact,)).pressed(seconds, skin)
@@ -65,7 +62,7 @@ def _finger(x_mm: object, y_mm: object, **options: float) -> Finger:
 
 
 def sliding(rng: Random) -> Played:
-    """Three fingers that swing along lanes 50 mm apart, with peak speeds of 50 to 1000 mm/s."""
+    """Three fingers that swing along lanes 50 mm apart, with peaks of 50 to 1000 mm/s."""
     found = []
     for lane in (25.0, 75.0, 125.0):
         reach, speed = rng.uniform(20, 55), math.exp(rng.uniform(math.log(50), math.log(1000)))
@@ -75,7 +72,7 @@ def sliding(rng: Random) -> Played:
 
 
 def crossing(rng: Random) -> Played:
-    """Two fingers that swing past each other on lanes 0 to 24 mm apart, with peak speeds of 300 to 1500 mm/s."""
+    """Two fingers that swing past each other on lanes 0 to 24 mm apart, with peaks of 300 to 1500 mm/s."""
     speed, gap = rng.uniform(300, 1500), rng.uniform(0, 24)
     hertz = speed / (2 * math.pi * 55)
     phase = rng.uniform(0, 2 * math.pi)
@@ -86,7 +83,7 @@ def crossing(rng: Random) -> Played:
 
 
 def meeting(rng: Random) -> Played:
-    """Two fingers that meet, stay up to 0.4 s, and part the way they came; three times."""
+    """Two fingers that meet, stay up to 0.4 s, and part as they came; three times."""
     angle, speed = rng.uniform(0, 2 * math.pi), rng.uniform(100, 400)
     far, near = 40.0, rng.uniform(8, 11)
     travel, rest = (far - near) / speed, rng.uniform(0.02, 0.4)
@@ -101,8 +98,6 @@ def meeting(rng: Random) -> Played:
 
 
 def _along(far: Callable[[float], float], angle: float, x_mm: float = MIDDLE_MM, y_mm: float = MIDDLE_MM) -> Finger:
-    """A finger this far from a place in this direction."""
-
     def place(seconds: float, middle: float, share: float) -> float:
         return middle + share * far(seconds)
 
@@ -111,7 +106,7 @@ def _along(far: Callable[[float], float], angle: float, x_mm: float = MIDDLE_MM,
 
 
 def tapping(rng: Random) -> Played:
-    """Three fingers that tap, each within 12 mm of its place, with switches that bounce; each tap is a new contact."""
+    """Three fingers that tap within 12 mm of their places, with bouncing switches; each tap is a new contact."""
     found = []
     for home_x, home_y in ((30.0, 40.0), (75.0, 100.0), (120.0, 40.0)):
         now = rng.uniform(0, 0.2)
@@ -124,8 +119,8 @@ def tapping(rng: Random) -> Played:
 
 
 def angles(rng: Random) -> Played:
-    """Two fingers that swing through the middle on lines at any angle, with peak speeds of 300 to 1500 mm/s; one is up
-    to 20 mm behind."""
+    """Two fingers that swing through the middle on any lines, with peaks of 300 to 1500 mm/s; one is up to 20 mm
+    later."""
     turn, between, speed = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(300, 1500)
     hertz, phase = speed / (2 * math.pi * 55), rng.uniform(0, 2 * math.pi)
     late = rng.uniform(-20, 20) / 55
@@ -136,7 +131,7 @@ def angles(rng: Random) -> Played:
 
 
 def stopping(rng: Random) -> Played:
-    """Three fingers that move at 100 to 1000 mm/s, stop for 20 to 300 ms, and move on; meetings are random."""
+    """Three fingers that move at 100 to 1000 mm/s, stop for 20 to 300 ms, and move on."""
     return tuple(_finger(*_stop_and_go(rng)) for _ in range(3))
 
 
@@ -154,8 +149,7 @@ def _stop_and_go(rng: Random) -> tuple[Track, Track]:
 
 
 def row(rng: Random) -> Played:
-    """Three fingers in a row, 22 to 30 mm apart, that swing together along a line at any angle to it, with peak speeds
-    of 200 to 1500 mm/s."""
+    """Three fingers in a row, 22 to 30 mm apart, that swing together along any line, with peaks of 200 to 1500 mm/s."""
     turn, way, apart = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi), rng.uniform(22, 30)
     hertz, phase = rng.uniform(200, 1500) / (2 * math.pi * 35), rng.uniform(0, 2 * math.pi)
     swing = Swing(0.0, 35, hertz, phase)
@@ -166,7 +160,7 @@ def row(rng: Random) -> Played:
 
 
 def entering(rng: Random) -> Played:
-    """Fingers that slide in over any edge and out over another at 200 to 1500 mm/s, two or three at a time; each is a
+    """Two or three fingers at a time that slide in over an edge and out over another at 200 to 1500 mm/s; each is a
     new contact."""
     found = []
     for _ in range(3):
@@ -182,7 +176,6 @@ def entering(rng: Random) -> Played:
 
 
 def _outside(edge: int, rng: Random) -> Place:
-    """A place off the sheet where a finger enters."""
     beyond, along = (-FINGER_MM, 2 * MIDDLE_MM + FINGER_MM)[edge % 2], rng.uniform(0, 2 * MIDDLE_MM)
     return (beyond, along) if edge < 2 else (along, beyond)
 
@@ -190,7 +183,6 @@ def _outside(edge: int, rng: Random) -> Place:
 FAMILIES: dict[str, Callable[[Random], Played]] = {
     family.__name__: family for family in (sliding, crossing, meeting, tapping, angles, stopping, row, entering)
 }
-"""Every family by its name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -199,13 +191,13 @@ class FrameTruth:
 
     zones: Zones
     truth: dict[int, Place]
-    """The barycenter of each distinguishable contact, by number."""
+    """Barycenter of each distinguishable contact, by number."""
     shared: tuple[Place, ...]
-    """Zones shared by several contacts: an id on one is neither right nor wrong."""
+    """Zones of several contacts, whose ids are not judged."""
 
 
 def zones_of(cells: np.ndarray, time_us: int, skin: Skin = SKIN) -> tuple[Zones, np.ndarray]:
-    """The frame of (rows, columns) bool cells, and the number of each cell's zone, from 1."""
+    """Frame of (rows, columns) bool cells, and each cell's zone, from 1."""
     labels, count = flood(cells, skin.connectivity)
     sums = [moments(labels, number) for number in range(1, count + 1)]
     frame = Frame(
@@ -224,14 +216,14 @@ def zones_of(cells: np.ndarray, time_us: int, skin: Skin = SKIN) -> tuple[Zones,
 
 
 def played(fingers: Played, rate_hz: float, skin: Skin = SKIN, seconds: float = SECONDS) -> Iterator[FrameTruth]:
-    """All frames of a scene."""
+    """Frames of a scene."""
     for number in range(int(seconds * rate_hz)):
         now = number / rate_hz
         yield shown(fingers, now, skin)
 
 
 def shown(fingers: Played, now: float, skin: Skin = SKIN) -> FrameTruth:
-    """One frame. A bouncing contact counts as present; one between switches does not."""
+    """One frame; bouncing contacts are present, those between switches are not."""
     each = {number: finger.cells(now, skin) for number, finger in enumerate(fingers) if finger.there(now)}
     cells = np.any([np.zeros((skin.rows, skin.columns), bool), *each.values()], axis=0)
     zones, labels = zones_of(cells, round(now * 1e6), skin)

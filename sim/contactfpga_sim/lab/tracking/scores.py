@@ -1,7 +1,5 @@
-"""Scores of the tracker, two baselines and a published tracker on random scenes and recordings, at several frame rates.
-
-Ids are judged by py-motmetrics: MOTA, IDF1, id switches.
-"""
+"""Scores of the tracker, two baselines and a published tracker on random scenes and recordings: MOTA, IDF1 and id
+switches by py-motmetrics."""
 
 from __future__ import annotations
 
@@ -37,7 +35,6 @@ class Nearest:
         self._next_id = 1
 
     def update(self, zones: Zones) -> dict[int, tuple[float, float]]:
-        """The place of each id."""
         places = [(zone.x_mm, zone.y_mm) for zone in zones if zone.x_mm is not None and zone.y_mm is not None]
         pairs = sorted(
             (math.dist(place, old), index, name)
@@ -57,7 +54,7 @@ class Nearest:
 
 
 class ConstantVelocity:
-    """Baseline that extrapolates with the last speed for 0.1 s, and matches zones by least total distance."""
+    """Baseline that extrapolates speed for 0.1 s, and matches zones by least total distance."""
 
     def __init__(self, gate_mm: float = 20.0, coast_s: float = 0.1, smooth_s: float = 0.02):
         self._gate_mm, self._coast_s, self._smooth_s = gate_mm, coast_s, smooth_s
@@ -66,7 +63,6 @@ class ConstantVelocity:
         self._next_id = 1
 
     def update(self, zones: Zones) -> dict[int, Place]:
-        """The place of each id."""
         now = zones.time_us / 1e6
         self._seen = {name: one for name, one in self._seen.items() if now - one[0] <= self._coast_s}
         places = np.array([(zone.x_mm, zone.y_mm) for zone in zones if zone.x_mm is not None]).reshape(-1, 2)
@@ -88,7 +84,7 @@ class ConstantVelocity:
 
 
 def places_of(ahead: np.ndarray, places: np.ndarray, gate_mm: float) -> list[int]:
-    """For each of (n, 2) expected places the number of its place, -1 beyond the gate."""
+    """Place number of each of (n, 2) expected places, -1 beyond the gate."""
     from scipy.optimize import linear_sum_assignment
 
     apart = np.linalg.norm(ahead[:, None] - places, axis=2)
@@ -99,17 +95,15 @@ def places_of(ahead: np.ndarray, places: np.ndarray, gate_mm: float) -> list[int
 
 
 NEAR_MM = 15.0
-"""Largest distance between an id and its contact."""
 
 JUDGED_HZ = 200.0
 """Most judged frames per second; all are tracked."""
 
 Update = Callable[[Zones], dict[int, Place]]
-"""The place of each id after a frame."""
 
 
 def ours() -> Update:
-    """The tracker with default settings; ids of the zones in the frame, as for the others."""
+    """The tracker with default settings; ids of zones in the frame, as for others."""
     tracker = Tracker()
 
     def update(zones: Zones) -> dict[int, Place]:
@@ -125,14 +119,13 @@ def constant_velocity() -> Update:
 
 
 NORFAIR_HOLD = 2
-"""Frames for which Norfair keeps an unseen id: the best of 2 frames, 0.1 and 0.3 s on the tuning scenes at 100 frames
-per second."""
+"""Frames for which Norfair keeps an unseen id: the best of 2 frames, 0.1 and 0.3 s on tuning scenes."""
 
 
 def norfair() -> Update:
-    """Norfair, a published tracker: Kalman filters of constant velocity and a gate of 20 mm. Raises ImportError.
+    """Norfair, a published tracker: Kalman filters of constant velocity, a gate of 20 mm. Raises ImportError.
 
-    It requires numpy below 2 without need, so no extra has it (docs/tracking.md tells how to install it).
+    It requires numpy below 2 without need, so no extra has it (docs/tracking.md).
     """
     published: Any = importlib.import_module("norfair")
     tracker = published.Tracker("euclidean", 20.0, hit_counter_max=NORFAIR_HOLD, initialization_delay=0)
@@ -152,7 +145,6 @@ TRACKERS: dict[str, Callable[[], Update]] = {
     "constant velocity": constant_velocity,
     "Norfair": norfair,
 }
-"""The compared trackers."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,9 +156,9 @@ class Score:
     idf1: float
     switches: int
     idf1_each: tuple[float, ...] = ()
-    """IDF1 of each scene; nan if nothing could be distinguished."""
+    """IDF1 by scene; nan if nothing could be distinguished."""
     counted: tuple[float, ...] = ()
-    """Weight of each scene: its judged places, of contacts and ids."""
+    """Weight by scene: judged places of contacts and ids."""
 
     @property
     def switches_per_1000(self) -> float:
@@ -175,7 +167,7 @@ class Score:
 
     @property
     def half(self) -> float:
-        """Half of the 95 % interval of IDF1 over the scenes."""
+        """Half of IDF1's 95 % interval."""
         return half(self.pulls)
 
     @property
@@ -186,12 +178,12 @@ class Score:
 
     @property
     def cells(self) -> tuple[str, str, str]:
-        """Table cells: MOTA and IDF1 in percent, switches per thousand frames."""
+        """MOTA and IDF1 in percent, switches per thousand frames."""
         return f"{100 * self.mota:.1f}", f"{100 * self.idf1:.1f}", f"{self.switches_per_1000:.1f}"
 
 
 def half(pulls: np.ndarray) -> float:
-    """Half of the 95 % interval of a weighted mean of scenes, by Student's t; nan without any."""
+    """Half of a weighted mean's 95 % interval, by Student's t; nan without any."""
     from scipy.stats import t
 
     pulls = pulls[~np.isnan(pulls)]
@@ -204,7 +196,7 @@ Judged = tuple[dict[int, Place], dict[int, Place]]
 
 
 def followed(update: Update, frames: Iterable[FrameTruth], rate_hz: float) -> list[Judged]:
-    """A tracker's output on the judged frames."""
+    """A tracker's output on judged frames."""
     every = max(1, round(rate_hz / JUDGED_HZ))
     found = []
     for number, shown in enumerate(frames):
@@ -216,7 +208,7 @@ def followed(update: Update, frames: Iterable[FrameTruth], rate_hz: float) -> li
 
 
 def score(histories: Sequence[Sequence[Judged]], near_mm: float = NEAR_MM) -> Score:
-    """The score of several scenes together. Raises :class:`MissingExtra` without py-motmetrics."""
+    """Score of several scenes. Raises :class:`MissingExtra` without py-motmetrics."""
     try:
         import motmetrics
     except ModuleNotFoundError as error:
@@ -242,7 +234,6 @@ def _near(distance: float, limit: float) -> float:
 
 
 MOST = 1500
-"""Most frames used of a recording."""
 
 
 def skin_of(recording: Recording) -> Skin:
@@ -253,7 +244,7 @@ def skin_of(recording: Recording) -> Skin:
 
 
 def histories(path: Path, every: int) -> list[list[FrameTruth]]:
-    """The stretches of a recording between jumps of the scene, one of ``every`` frames, with the truth from all."""
+    """Stretches of a recording between jumps, one of ``every`` frames, with the truth from all."""
     recording = Recording.load(path)
     skin = skin_of(recording)
     pressed = recording.pressed[:MOST]
@@ -265,7 +256,6 @@ def histories(path: Path, every: int) -> list[list[FrameTruth]]:
 
 
 def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[FrameTruth]:
-    """The frames with a name per zone."""
     linker = _Linker(frames.shape[1:])
     for number, cells in enumerate(frames):
         zones, labels = zones_of(cells, round(number * step_us), skin)
@@ -283,12 +273,12 @@ class _Linker:
         self._before = np.zeros(size, int)
         self._names: dict[int, int] = {}
         self._inside: dict[int, dict[int, np.ndarray]] = {}
-        """By name: the zones merged into this one, with their last cells."""
+        """Zones merged into this one, by name, with last cells."""
         self._fresh = 0
 
     def take(self, labels: np.ndarray) -> dict[int, int]:
-        """The name of each label: the previous zone with most shared cells, the largest share first; a merged zone's
-        name when it reappears in place; else a new one."""
+        """Name of each label: the previous zone with most shared cells, largest share first; a merged zone's name
+        when it reappears in place; else a new one."""
         before, both = self._before, (self._before > 0) & (labels > 0)
         shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
         ranked = shares.T[np.argsort(-counts, kind="stable")].tolist()
@@ -322,22 +312,18 @@ class _Linker:
 
 
 RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
-"""Frames per second of a scene."""
 
 JUDGED_RATES = RATES_HZ[1:]
-"""Rates at which the tracker must not be worse than another."""
+"""Rates at which the tracker must not be worse."""
 
 MOST_FRAMES = 6_000
-"""Most frames of a scene."""
 
 SCENES = 12
-"""Scenes per family. The tracker was tuned on others, numbered from 1000."""
+"""Scenes per family; the tracker was tuned on those from 1000 on."""
 
 EVERY = (1, 4)
-"""One of this many frames of a recording is used."""
 
 Scores = dict[str, Score]
-"""Scores by tracker name."""
 
 
 @functools.cache
@@ -360,13 +346,13 @@ def _scored(family: str, rate_hz: float, count: int, names: Iterable[str]) -> di
 
 
 def ahead(ours: Score, other: Score) -> tuple[float, float]:
-    """Excess of the first IDF1 over the other's on the same scenes, and half of its 95 % interval."""
+    """Excess of the first IDF1, and half of its 95 % interval."""
     return ours.idf1 - other.idf1, half(ours.pulls - other.pulls)
 
 
 @functools.cache
 def of_recording(path: Path, every: int) -> Scores:
-    """Scores on the stretches of a recording between jumps of the scene."""
+    """Scores on stretches of a recording."""
     stretches = histories(path, every)
     return {
         tracker: score([followed(make(), stretch, JUDGED_HZ) for stretch in stretches])
@@ -375,7 +361,7 @@ def of_recording(path: Path, every: int) -> Scores:
 
 
 def all_scenes() -> dict[tuple[str, float], Scores]:
-    """Scores of every family at every rate."""
+    """Scores by family and rate."""
     keys = list(itertools.product(scenes.FAMILIES, RATES_HZ))
     with pool.executor() as workers, pool.progress() as step:
         for one in [workers.submit(of_family, *key) for key in keys]:

@@ -1,4 +1,4 @@
-"""Speed of a tracker on this machine; the tables and the picture of docs/tracking.md."""
+"""Speed of the tracker; tables and picture of docs/tracking.md."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class FrameRates(NamedTuple):
     """Frames per second of processor time."""
 
     decoded: float
-    """Frames from bytes to zones with places, one by one."""
+    """Rate from bytes to zones with places."""
     tracked: float
-    """Frames from zones to tracks."""
+    """Rate from zones to tracks."""
 
     @property
     def ratio(self) -> float:
@@ -35,7 +35,7 @@ class FrameRates(NamedTuple):
 
 
 def measure(contacts: int, frames: int = FRAMES) -> FrameRates:
-    """Rates with this many moving contacts, the best of some rounds."""
+    """Rates with moving contacts, the best of rounds."""
     chunks = [frame(number, 1, contacts) for number in range(frames)]
     rounds = [_round(chunks) for _ in range(4)]
     return FrameRates(*(max(found) for found in zip(*rounds)))
@@ -95,7 +95,7 @@ def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
 
 
 def ahead_table() -> str:
-    """The tracker's lead over each other one, if it may be behind."""
+    """The tracker's lead over others, if uncertain."""
     names = [name for name in scores.TRACKERS if name != "`Tracker`"]
     rows = [("scenes", "frames per second", *(f"ahead of {name}, %" for name in names))]
     for (family, rate), found in scores.all_scenes().items():
@@ -153,14 +153,13 @@ def reflex_table() -> str:
 
 
 SCORES = Path("docs/tables/tracking-scores.csv")
-"""The whole table of scores."""
 
 SHOWN = tuple(family for family in scenes.FAMILIES if family != "tapping")
-"""Families with a panel: on taps all trackers are alike."""
+"""Families with a panel; on taps all are alike."""
 
 
 def draw(folder: Path) -> Path:
-    """Share of correct ids by family, rate and tracker, from :data:`SCORES`."""
+    """Share of correct ids by family, rate and tracker."""
     import matplotlib
 
     with SCORES.open(newline="", encoding="utf-8") as file:

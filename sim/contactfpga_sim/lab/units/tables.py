@@ -1,4 +1,4 @@
-"""The table of the page on pressure units: times of a sweep, and its share of the line."""
+"""The table of docs/units.md: times of a sweep, and its share of the line."""
 
 from __future__ import annotations
 

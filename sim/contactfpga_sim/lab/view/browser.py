@@ -53,8 +53,7 @@ WATCH = """
     };
 }
 """
-"""``watch(x, y)``: check each drawn frame until a zone's barycenter, by its unique color, is at that share of the
-canvas."""
+"""``watch(x, y)``: wait for a zone's barycenter, by its unique color, at that share of the canvas."""
 
 
 def program() -> str | None:
@@ -77,32 +76,29 @@ class Visitor:
         page.wait_for_timeout(500)
 
     def place(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
-        """A place of the sheet as shares of the canvas' width and height; ``link``: of a robot."""
+        """A place of the sheet as shares of the canvas; ``link``: of a robot."""
         view = self._shown.view
         stage = view.stage if isinstance(view, View) else view.stage.stages[link]
         point, _ = stage.tiles.surface.place(x_mm, y_mm)
         return self._seen(stage.rotation @ np.array(point) * MM + stage.point_m)
 
     def _seen(self, point_m: np.ndarray) -> tuple[float, float]:
-        """A place in the scene as shares of the canvas' width and height."""
         camera = next(iter(self._shown.web.get_clients().values())).camera
         x, y, z = turned(camera.wxyz, point_m - camera.position)
         scale = 0.5 / np.tan(camera.fov / 2) / z
         return 0.5 + x * scale / camera.aspect, 0.5 + y * scale
 
     def click(self, x_mm: float, y_mm: float, link: str = "") -> None:
-        """Click with the mouse."""
         self.page.mouse.move(*self._pixel(self.place(x_mm, y_mm, link)))
         self.page.wait_for_timeout(100)
         self.page.mouse.down()
         self.page.mouse.up()
 
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
-        """Drag from the first to the last place, which is held for a while; the button stays down."""
+        """Drag from first to last place and hold; the button stays down."""
         self._drag([self.place(*place) for place in places], hold_ms)
 
     def drag_in_space(self, *points_m: np.ndarray, hold_ms: int = 300) -> None:
-        """Drag along places in the scene."""
         self._drag([self._seen(point) for point in points_m], hold_ms)
 
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
@@ -121,11 +117,11 @@ class Visitor:
         self.page.get_by_role("option", name=now, exact=True).click()
 
     def watch(self, x_mm: float, y_mm: float) -> None:
-        """Start waiting, in the page, until a barycenter is drawn there."""
+        """Start waiting in the page for a barycenter there."""
         self.page.evaluate("([x, y]) => window.watch(x, y)", list(self.place(x_mm, y_mm)))
 
     def drawn_s(self, seconds: float = PATIENCE_S) -> tuple[float, float]:
-        """Times of the mouse release and of the drawn barycenter, on ``time.time()``."""
+        """Times of mouse release and drawn barycenter, on ``time.time()``."""
         self.page.wait_for_function("() => window.drawn_ms", timeout=seconds * 1e3)
         clicked, drawn = self.page.evaluate("[window.clicked_ms, window.drawn_ms]")
         return clicked / 1e3, drawn / 1e3
@@ -136,7 +132,7 @@ class Visitor:
 
 
 def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """A world vector in the camera's view: x to the right, y down, z ahead."""
+    """A world vector in the camera's view: x right, y down, z ahead."""
     w, axis = wxyz[0], -np.asarray(wxyz[1:])
     found: np.ndarray = vector + 2 * np.cross(axis, np.cross(axis, vector) + w * vector)
     return found
@@ -144,7 +140,7 @@ def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 @contextlib.contextmanager
 def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = False) -> Iterator[Visitor]:
-    """Open a view in a browser while a thread runs it; ``dark``: whether its user prefers dark pages."""
+    """Open a view in a browser while a thread runs it; ``dark``: its user prefers dark pages."""
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""The figures of docs/view.md and the picture of the view, from a headless browser."""
+"""Figures and pictures of docs/view.md, from a headless browser."""
 
 from __future__ import annotations
 
@@ -29,31 +29,27 @@ from contactfpga_sim.lab.view import browser
 CLICKS = 20
 PACED_S = 4.0
 WAIT_S = 0.7
-"""Time between two clicks, long enough that they are no drag."""
+"""Time between clicks, long enough that they are no drag."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Click:
-    """Times of one click, in s of ``time.time()``, and those spent in board and driver."""
+    """Times of a click, in s of ``time.time()``, with those spent in board and driver."""
 
     released: float
-    """Mouse release in the browser."""
     touched: float
-    """The finger is on the virtual board."""
+    """Finger on the virtual board."""
     gateware_s: float
-    """Board time from the touch to the last byte of the first frame with the zone."""
+    """Time from touch to last byte of its first frame."""
     driver_s: float
-    """Driver time from bytes to zones."""
+    """Time from bytes to zones."""
     read: float
-    """The view has the zones."""
     queued: float
-    """The zones are on their way to the browser."""
+    """The zones leave for the browser."""
     drawn: float
-    """The zones are drawn in the browser."""
 
     @property
     def parts_s(self) -> dict[str, float]:
-        """The click's time by part."""
         board = self.read - self.touched
         return {
             "browser and viser: from the mouse to the view": self.touched - self.released,
@@ -67,7 +63,7 @@ class Click:
 
 
 class Stopwatch:
-    """Notes a click's passage through the view, in :attr:`times`."""
+    """Notes a click's passage through the view."""
 
     def __init__(self, shown: ServedView):
         assert shown.hand is not None
@@ -168,16 +164,15 @@ def click_table(found: list[Click]) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class ProcessorLoad:
-    """CPU time per second of board time, in s."""
+    """CPU time per second of board time."""
 
     board: float
-    """Simulating the board."""
     rest: float
     """Driver and view, without a browser."""
 
 
 def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
-    """Load under these fingers, in CPU time, which other load does not affect."""
+    """CPU load under these fingers."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
     spent, read = [0.0], virtual.read
@@ -201,7 +196,7 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
 
 
 def load_table(shown: ServedView) -> str:
-    """Load untouched and touched."""
+    """Load with and without touches."""
     rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
     for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
         load = load_of(shown, fingers)
@@ -211,25 +206,21 @@ def load_table(shown: ServedView) -> str:
 
 
 FRAMES, FRAME_MS = 32, 120
-"""Frames of the looping clip, and their duration."""
+"""Frames of the clip, and their duration."""
 SWING_RAD = 0.22
-"""Swing of the camera to either side."""
 STEP_MS = 350
-"""Time between two frames for board and browser to follow."""
+"""Time to follow a frame."""
 QUALITY = 50
-"""Quality of a frame, of 100."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Shot:
-    """Content of a frame of the clip."""
+    """Content of a clip frame."""
 
     strokes: tuple[float, float]
-    """Place of the moving finger, in columns and rows."""
+    """Moving finger, in columns and rows."""
     presses: bool
-    """Whether the other one presses."""
     turn_rad: float
-    """Angle of the camera from its first place."""
 
 
 def shot(share: float) -> Shot:
@@ -240,7 +231,7 @@ def shot(share: float) -> Shot:
 
 
 def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
-    """Move fingers and camera, and wait until it is drawn."""
+    """Move fingers and camera, and wait until drawn."""
     hand, view, sheet = shown.hand, shown.view, sheet_of(shown)
     assert hand is not None
     assert isinstance(view, View)
@@ -260,7 +251,6 @@ def play(shown: ServedView, visitor: browser.Visitor, one: Shot) -> None:
 
 
 PRESSED = 0.4, 11.6
-"""Place of the other finger, in columns and rows."""
 
 
 def record(shown: ServedView, visitor: browser.Visitor, image: Path, clip: Path) -> None:
@@ -301,7 +291,7 @@ class ViewTimes(NamedTuple):
 
 
 def compute() -> ViewTimes:
-    """Open the view twice: without a browser, and with one that clicks."""
+    """Open the view without a browser, then with one that clicks."""
     flat = opening.ViewRequest(flat=True)  # all of its cells can be clicked from one side
     with opening.opened(flat, http_port=0) as shown:
         loads = load_table(shown)
@@ -320,7 +310,7 @@ def clicks_table(times: ViewTimes) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The view in a browser, at rest and in motion, and the picture of a recording."""
+    """The view at rest and in motion, and a recording's picture."""
     image, clip, drawn = folder / "view.png", folder / "view.webp", folder / "plot.svg"
     plotted(drawn)
     with opening.opened(http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:
@@ -329,4 +319,3 @@ def draw(folder: Path) -> list[Path]:
 
 
 SIZE = 1120, 660
-"""Size of picture and clip, in pixels."""

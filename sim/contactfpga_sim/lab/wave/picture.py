@@ -1,4 +1,4 @@
-"""The picture of docs/wave.md: the output of `contactfpga wave` for the reference Skin."""
+"""Picture of docs/wave.md: `contactfpga wave` for the reference Skin."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LANES = (
 
 
 def draw(folder: Path) -> list[Path]:
-    """One touch of the reference Skin, from a scan before it until its frame is sent."""
+    """One touch, from a scan before it until its frame is sent."""
     skin = Skin()
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as work:
         touch = wave.simulate(skin, wave.finger(skin), Path(work) / "touch.vcd")
@@ -59,7 +59,6 @@ def _ticks(lane: int) -> dict[str, Any]:
 
 
 def _level(axes: Any, lane: int, changes: Sequence[tuple[float, int]], end: float) -> None:
-    """A changing level, from the last change before 0 on."""
     before = [level for at, level in changes if at <= 0]
     shown = [(0.0, before[-1]), *((at, level) for at, level in changes if at > 0)]
     times, levels = [at for at, _ in shown], [lane + 0.3 - 0.6 * level for _, level in shown]

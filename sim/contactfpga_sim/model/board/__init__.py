@@ -1,1 +1,1 @@
-"""The virtual board: the gateware as native code, in a sheet, behind a port."""
+"""The virtual board: gateware as native code, with its sheet, at a serial port."""

@@ -1,5 +1,5 @@
-"""The folder of compiled gateware and cached results. Its content is executed: only files that this user alone, or
-root, can write are used."""
+"""The folder of compiled gateware and cached results. Its files are executed, so only those that the user or root alone
+can write are used."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ FOLDER_MODE, FILE_MODE = 0o700, 0o600
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOCK, _TAKEN = "lock", "taken"
 _FRESH_S = 60.0
-"""Grace period for a folder without a lock."""
+"""Grace period of a folder without a lock."""
 
 
 class CacheError(ContactFPGAError):
-    """The cache cannot be used, or somebody else could have written into it."""
+    """The cache cannot be used, or another user could have written it."""
 
 
 def cache_folder() -> Path:
-    """The cache folder: ``CONTACTFPGA_CACHE``, or in the user's cache folder."""
+    """``CONTACTFPGA_CACHE``, or a folder in the user's cache folder."""
     if chosen := os.environ.get("CONTACTFPGA_CACHE"):
         return Path(chosen).absolute()
     try:
@@ -61,7 +61,7 @@ def ready(folder: Path) -> Path:
 
 
 def trusted(file: Path) -> bool:
-    """Whether the file exists; raises :class:`CacheError` if somebody else could have written it."""
+    """Whether the file exists. Raises :class:`CacheError` if another user could have written it."""
     try:
         found = file.lstat()
     except FileNotFoundError:
@@ -73,8 +73,8 @@ def trusted(file: Path) -> bool:
 
 
 def whole(file: Path, tell: bool = False) -> bool:
-    """Whether the file matches the sum beside it, written by :func:`put`; with ``tell`` a damaged one is named on
-    stderr. Raises :class:`CacheError` if somebody else could have written either."""
+    """Whether the file matches its checksum; ``tell`` reports a damaged file on stderr. Raises :class:`CacheError` like
+    :func:`trusted`."""
     if not trusted(file):
         return False
     total = _sum(file)
@@ -86,7 +86,7 @@ def whole(file: Path, tell: bool = False) -> bool:
 
 
 def put(made: Path, file: Path) -> None:
-    """Move a file from a folder of :func:`scratch` to its place, whole or not at all."""
+    """Move a file from a :func:`scratch` folder to its place, atomically, with its checksum."""
     total = made.with_name(f"{made.name}.sum")
     total.write_bytes(_sum_of(made))
     # The sum goes first: a file without its own is never taken.
@@ -105,7 +105,7 @@ def _sum_of(file: Path) -> bytes:
 
 @contextlib.contextmanager
 def locked(file: Path) -> Iterator[None]:
-    """Hold a lock for one process at a time; its file stays."""
+    """Hold a lock between processes. The lock's file stays."""
     with _opened(file) as descriptor:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
@@ -152,7 +152,6 @@ def _check(path: Path, found: os.stat_result, advice: str) -> None:
 
 
 def _replaces(above: os.stat_result) -> str:
-    """Who else can replace the content of a folder; empty for nobody."""
     if above.st_mode & stat.S_ISVTX:
         return ""
     if above.st_mode & stat.S_IWOTH:
@@ -164,7 +163,7 @@ def _replaces(above: os.stat_result) -> str:
 
 @contextlib.contextmanager
 def _opened(file: Path, mode: int = os.O_RDWR | os.O_CREAT) -> Iterator[int]:
-    """A descriptor of the file, created by default if missing; links are not followed."""
+    """A descriptor of the file; links are not followed."""
     try:
         flags = mode | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         descriptor = os.open(file, flags, FILE_MODE)

@@ -1,4 +1,4 @@
-"""Compiled boards of one or several sheets: gateware as native code with its switches, stepped by the clock."""
+"""Compiled boards of one or several sheets: native gateware with its switches."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from contactfpga_sim.model.sheet.line import ColumnLine, RowLine
 from contactfpga_sim.model.sheet.matrix import Contention, Shorts
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
-"""An event: cycle (of a received byte: the first after its stop bit); data: a row's cells, a record as on the wire, a
-byte, a level or driven lines, whose 65th is the mark; and for a row whether it is the frame's last, for a record or
-item whether it is the end mark."""
+"""Dtype of an event. ``cycle``: of a received byte the first after its stop bit. ``data``: cells of a row, a record as
+on the wire, a byte, or levels of lines. ``mark``: a frame's last row, an end mark, or the 65th driven line."""
 
 
 Library = native.Library | webassembly.WebAssemblyLibrary
 
 
 class CompiledModel:
-    """A model stepped by the clock; cycle 0 is the first after power-up, as in docs/timing.md. Thread-safe.
+    """A thread-safe model, stepped by the clock; cycle 0 is the first after power-up. Inputs hold from the next cycle
+    on.
 
-    ``events``: those that the driver can record, in its order.
+    ``events``: events that the driver can record, in its order.
     """
 
     def __init__(self, library: Library, events: tuple[str, ...]):
@@ -46,7 +46,6 @@ class CompiledModel:
         self._board: ctypes.c_void_p | None = ctypes.c_void_p(library.board_new())
 
     def _call(self, name: str, *arguments: Any) -> Any:
-        """Call the driver's function of this name; raises :class:`BoardClosed` after :meth:`close`."""
         with self._lock:
             if self._board is None:
                 raise BoardClosed("the virtual board was closed; make another one")
@@ -54,19 +53,19 @@ class CompiledModel:
 
     @property
     def cycle(self) -> int:
-        """The next cycle to run."""
+        """Next cycle to run."""
         return self._call("cycle")
 
     def run(self, cycles: int) -> None:
-        """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
+        """Run clock cycles. Other Python threads run meanwhile; other calls of this board wait."""
         self._call("run", ctypes.c_uint64(cycles))
 
     def send(self, data: bytes) -> None:
-        """Put bytes on the board's receive pin, back to back, from the next cycle on."""
+        """Send bytes back to back to the receive pin."""
         self._call("send", data, ctypes.c_size_t(len(data)))
 
     def take(self, boundary: str) -> np.ndarray:
-        """Events of a boundary since the last call, dtype :data:`EVENT`."""
+        """Events at a boundary since the last call, dtype :data:`EVENT`."""
         index = ctypes.c_uint(self._events.index(boundary))
         with self._lock:  # the address holds until the model runs on
             if not (count := self._call("count", index)):
@@ -80,7 +79,7 @@ class CompiledModel:
         return self.take("received")["data"].astype(np.uint8).tobytes()
 
     def close(self) -> None:
-        """Free the model; every later call raises :class:`BoardClosed`. May be called twice."""
+        """Free the model; later calls of other methods raise :class:`BoardClosed`."""
         with self._lock:
             if self._board is not None:
                 self._call("free")
@@ -98,17 +97,16 @@ class CompiledModel:
 _DRIVER = "board.cpp"
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
-"""Events that a board can record: transfers of rows, zone records, divided records and bytes; changes of the pins
-transmit, contact and alive, of the rows driven to the selecting level and of the driven columns; bytes decoded from the
-line. The order is the driver's."""
+"""Events that a board can record, in the driver's order: transfers of rows, zone records, divided records and bytes;
+changes of the transmit, contact and alive pins, of rows driven to the selecting level, and of driven columns; bytes
+decoded from the line."""
 
 
 class CompiledBoard(CompiledModel):
     """A compiled board of one sheet.
 
-    ``capture`` names the :data:`CAPTURABLE` to record, besides ``received``. ``model`` is the source of native code;
-    the default is the board of :func:`library_of`. The first native board of a Skin needs some seconds to build; for
-    errors see :mod:`contactfpga_sim.model.board.native`.
+    ``capture``: names of :data:`CAPTURABLE` to record besides ``received``. ``model``: source of native code, default
+    that of :func:`library_of`.
     """
 
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
@@ -121,28 +119,26 @@ class CompiledBoard(CompiledModel):
 
     @property
     def broken(self) -> int:
-        """Bytes on the line without a stop bit."""
+        """Number of bytes on the line without a stop bit."""
         return self._call("broken")
 
     def press(self, cells: np.ndarray) -> None:
-        """Press these (rows, columns) bool cells from the next cycle on."""
+        """Press these (rows, columns) bool cells."""
         self.hold(cells[None], 0)
 
     def restart(self, mutant: int = 0) -> None:
-        """Power up again, as this mutant (:mod:`contactfpga_sim.verify.mutants`); 0 is the gateware itself."""
+        """Power up again, as a mutant of :mod:`contactfpga_sim.verify.mutants` if not 0."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:
-        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven; a guard column may
-        follow them."""
+        """Set the (columns,) bool stuck columns; a guard column may follow."""
         stuck = np.zeros(self.skin.column_lines, np.uint8)
         if columns is not None:
             stuck[: len(columns)] = columns
         self._call("stick", stuck.tobytes())
 
     def cut(self, rows: Mapping[int, int], columns: Mapping[int, int]) -> None:
-        """From the next cycle on cut these lines, and no others: in ``rows`` the switches from a column on, in
-        ``columns`` those from a row on, do not reach the pin. Guard lines are the last."""
+        """Set the cut lines, as in :class:`contactfpga_sim.model.golden.trace.Cuts`."""
         skin = self.skin
         ends = (
             bytes(cut.get(line, whole) for line in range(lines))
@@ -154,7 +150,7 @@ class CompiledBoard(CompiledModel):
         self._call("cut", *ends)
 
     def join(self, shorts: Shorts | None) -> None:
-        """From the next cycle on join these lines and bridge these diodes, and no others."""
+        """Set the joined lines and bridged diodes."""
         self._call("part")
         shorts = shorts or Shorts()
         supplied, pulled = ((row, 0) for row in shorts.supplied), ((0, column) for column in shorts.pulled)
@@ -164,8 +160,7 @@ class CompiledBoard(CompiledModel):
                 self._call("join", *map(ctypes.c_uint, (kind, one, other)))
 
     def settle(self, line: ColumnLine, rows: RowLine | None = None) -> None:
-        """From the next cycle on columns, and released ``rows``, settle like this line; by default they settle at
-        once."""
+        """Set how columns, and released ``rows``, settle; initially at once."""
         self._settle("settle", line.press_s, line.pulled, line.release_s, line.threshold)
         if rows is not None:
             self._settle("settle_rows", rows.rise_s, rows.lifted, rows.fall_s, rows.threshold)
@@ -179,8 +174,8 @@ class CompiledBoard(CompiledModel):
         self._call(name, *arrays, *map(ctypes.c_double, (ColumnLine.share(back_s, clock_s), at)))
 
     def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
-        """From the next cycle on, with :meth:`settle`, columns take longer by these factors: all while one of ``rows``
-        pulls them, and each of ``columns``. Guard lines are the last."""
+        """Multiply settling times: of all columns while one of ``rows`` pulls them, and of each of ``columns``. Guard
+        lines are last."""
         skin = self.skin
         factors = (
             np.array([given.get(line, 1.0) for line in range(lines)])
@@ -189,18 +184,18 @@ class CompiledBoard(CompiledModel):
         self._call("slow", *(each.tobytes() for each in factors))
 
     def load(self, readings: Iterable[int]) -> None:
-        """Set the converter's inputs from the next cycle on, one value per pressure unit; 0 at first."""
+        """Set the converter's input of each pressure unit; initially 0."""
         codes = np.array(list(readings), np.uint32)
         if len(codes) != self.skin.units:
             raise ValueError(f"{len(codes)} readings; the board has {self.skin.units} pressure units")
         self._call("load", codes.tobytes())
 
     def run(self, cycles: int) -> None:
-        """:meth:`CompiledModel.run`; raises :class:`Contention` if a column was driven against a row."""
+        """Run clock cycles. Raises :class:`Contention` if a column was driven against a row."""
         self._check_pins(self._call("run", ctypes.c_uint64(cycles)))
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
-        """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
+        """Press each of (n, rows, columns) bool frames for ``cycles``, by default one scan."""
         if frames.shape[1:] != (self.skin.rows, self.skin.columns):
             raise ValueError(f"cells of {frames.shape[1:]}; the sheet is {self.skin.rows}x{self.skin.columns}")
         each = ctypes.c_uint64(self.skin.derived.frame_clocks if cycles is None else cycles)
@@ -212,7 +207,7 @@ class CompiledBoard(CompiledModel):
         return int(self._call("fights"))
 
     def pull_low(self, cycles: int) -> None:
-        """Hold the board's receive pin low for this many cycles from the next one on, like noise or a break."""
+        """Hold the receive pin low, like noise or a break."""
         self._call("pull_low", ctypes.c_uint64(cycles))
 
     def _check_pins(self, fights: int) -> None:
@@ -221,7 +216,7 @@ class CompiledBoard(CompiledModel):
 
 
 def library_of(skin: Skin) -> Library:
-    """The board of a Skin: the packaged WebAssembly, or native code."""
+    """Library of a Skin's board: packaged WebAssembly, or native code."""
     check_simulated(skin)
     return webassembly.load(carried_key(skin)) or native.load(model_of(skin))
 
@@ -232,13 +227,12 @@ def carried_key(skin: Skin) -> str:
 
 
 def design_key(skin: Skin) -> str:
-    """Key of the elaborated gateware, whatever its text."""
+    """Key of the elaborated gateware, independent of its text."""
     return webassembly.board_key(native.component_key(model_of(skin).elaborate()), _DRIVER, _defines(skin))
 
 
 def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
-    """The source of a Skin's board: its gateware, or a netlist with the gateware's pins and no probes, which records no
-    rows, records or bytes."""
+    """Source of a Skin's board: its gateware, or a netlist with the gateware's pins but no probes."""
     check_simulated(skin)
 
     def elaborate() -> Any:
@@ -256,7 +250,6 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
 
 
 def _defines(skin: Skin, probes: bool = True) -> dict[str, int | str]:
-    """Constants of the driver."""
     return {
         "ROWS": skin.rows,
         "COLUMNS": skin.columns,
@@ -279,13 +272,13 @@ def _defines(skin: Skin, probes: bool = True) -> dict[str, int | str]:
 
 
 SHEETS_CAPTURED = ("line", "contact", "received")
-"""Changes of the transmit and contact pins, and bytes decoded from the line, in the driver's order."""
+"""Events recorded of several sheets, in the driver's order."""
 
 
 class CompiledSheets(CompiledModel):
-    """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on.
+    """The compiled gateware of several sheets.
 
-    ``model`` is the gateware, by default that of :func:`sheets_model`.
+    ``model``: default that of :func:`sheets_model`.
     """
 
     def __init__(self, several: Several, model: native.Model | None = None):
@@ -293,11 +286,10 @@ class CompiledSheets(CompiledModel):
         super().__init__(native.load(model or sheets_model(several)), SHEETS_CAPTURED)
 
     def restart(self, mutant: int = 0) -> None:
-        """Power up again, like :meth:`CompiledBoard.restart`."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def press(self, number: int, cells: np.ndarray) -> None:
-        """Press these (rows, columns) bool cells of a sheet from the next cycle on."""
+        """Press these (rows, columns) bool cells of a sheet."""
         skin = self.several.skins[number]
         if cells.shape != (skin.rows, skin.columns):
             raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
@@ -305,7 +297,7 @@ class CompiledSheets(CompiledModel):
 
 
 def sheets_model(several: Several) -> native.Model:
-    """The source of a board of several sheets."""
+    """Source of a board of several sheets."""
 
     def elaborate() -> Any:
         from contactfpga_hdl.several import SeveralTop
@@ -326,12 +318,11 @@ def sheets_model(several: Several) -> native.Model:
 
 
 def _sheet_entry(number: int, skin: Skin) -> str:
-    """A sheet's entry in the driver's list."""
     sizes = (number, skin.rows, skin.columns, skin.row_chains, skin.column_chains, int(skin.selects_low))
     lines = (f"LINES({initializer(line_of)[1:-1]})" for line_of in (skin.line_of_row, skin.line_of_column))
     return f"SHEET({', '.join((*map(str, sizes), *lines))})"
 
 
 def initializer(numbers: Iterable[int]) -> str:
-    """Initializer of a C++ array."""
+    """C++ initializer of an array."""
     return "{" + ",".join(map(str, numbers)) + "}"

@@ -1,4 +1,4 @@
-"""A FlexiTac sheet on a pseudo-terminal: its firmware's bytes for a scene, some lost and some wrong."""
+"""A simulated FlexiTac sheet on a pseudo-terminal, with losses and errors."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import numpy as np
 ROWS, COLUMNS = 16, 32
 MARK = b"\xaa\x55"
 LOOK_S = 0.05
-"""How often it looks whether it has to end, while nobody reads."""
+"""Interval in s of checks for the end while nobody reads."""
 
 
 class FlexitacSheet:
-    """Sends ``hz`` frames per second to :attr:`port` inside ``with FlexitacSheet(scene) as sheet:``.
+    """Sends ``hz`` frames per second to :attr:`port` in a ``with`` block.
 
-    ``scene``: maps the time in s to the (16, 32) force at each cell, 0 to 1. A cell reads its own rest, up to 40, noise
-    of 2, and 150 at force 1. ``lost``, ``wrong``: shares of bytes lost or changed.
+    ``scene``: function from time in s to the (16, 32) force at each cell, 0 to 1. A cell reads its rest value, up to
+    40, noise of 2, and 150 times force. ``lost``, ``wrong``: shares of bytes lost or changed.
     """
 
     def __init__(
@@ -40,12 +40,12 @@ class FlexitacSheet:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
-        """Path of the serial port."""
+        """Path of the port."""
         self.seconds = 0.0
-        """Time of the scene, which stops while nobody reads."""
+        """Time of the scene in s, which stops while nobody reads."""
 
     def frame(self, seconds: float) -> bytes:
-        """The bytes of one frame, with random losses and errors."""
+        """Bytes of one frame, with random losses and errors."""
         noise = self._rng.normal(0, 2, (ROWS, COLUMNS))
         readings = np.clip(self._rest + noise + 150 * self._scene(seconds), 0, 255).astype(np.uint8)
         sent = np.frombuffer(MARK + readings.tobytes(), np.uint8)

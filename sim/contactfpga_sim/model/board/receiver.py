@@ -1,4 +1,4 @@
-"""The frames in a board's bytes, with arrival times."""
+"""Frames in a board's bytes, with arrival times."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from contactfpga.wire.units import KIND_UNITS
 
 
 class ReceivedFrame(NamedTuple):
-    """A frame with arrival times, on the receiver's clock."""
+    """A frame with arrival times on the receiver's clock."""
 
     frame: Frame
     first: int
@@ -22,12 +22,11 @@ class ReceivedFrame(NamedTuple):
     last: int
     """Time of the delimiter."""
     size: int
-    """Number of bytes with the delimiter."""
+    """Number of bytes, with the delimiter."""
 
 
 class Receiver:
-    """Splits the bytes of this Skin's board into packets and reads the frames; counts hellos, and skips fault reports
-    and unit readings."""
+    """Splits a board's bytes into packets, reads the frames and counts the hellos."""
 
     def __init__(self, skin: Skin) -> None:
         self._prefix = protocol.check_prefix(skin)
@@ -54,5 +53,5 @@ class Receiver:
 
 
 def frames_in(skin: Skin, stream: Iterable[tuple[int, int]]) -> Iterator[ReceivedFrame]:
-    """All whole frames in the (time, byte) pairs of a board of this Skin since power-up."""
+    """Whole frames in the (time, byte) pairs of a board since power-up."""
     return Receiver(skin).take(stream)

@@ -22,7 +22,7 @@ from contactfpga_sim.model.board.receiver import Receiver
 from contactfpga_sim.model.scenes.recordings import Recording
 
 CHUNK = 256
-"""Frames simulated while earlier ones are decoded."""
+"""Frames simulated between two decodings."""
 
 BIT_CLOCKS = 2
 """Clocks per bit of the fastest UART of a Skin."""
@@ -34,12 +34,11 @@ class ReplayError(ContactFPGAError):
 
 @dataclasses.dataclass(frozen=True)
 class ReplayedFrame:
-    """The gateware's result for one input frame."""
+    """Result of one input frame."""
 
     frame: Frame
     first_record: int | None
-    """Clocks from the transfer of the frame's last row to its first record, negative if earlier; None without a
-    zone."""
+    """Clocks from the transfer of the frame's last row to its first record, maybe negative; None without a zone."""
     last_record: int | None
     """Clocks from the transfer of the frame's last row to its last record; None without a zone."""
     duration: int
@@ -54,9 +53,9 @@ def load(
     barycenter_bits: int | None = None,
     closed: bool = False,
 ) -> tuple[np.ndarray, Skin]:
-    """The (frames, rows, columns) bool array of a recording, and a Skin for it whose board is compiled.
+    """A recording as (frames, rows, columns) bool, and a Skin for it with a compiled board.
 
-    ``closed``: a cylinder, whose last column is a neighbor of the first.
+    ``closed``: whether the last column is a neighbor of the first.
     """
     frames = Recording.load(path, threshold).pressed
     _, rows, columns = frames.shape
@@ -67,7 +66,7 @@ def load(
 
 
 def zones_bound(frames: np.ndarray, connectivity: int) -> int:
-    """An upper bound on the zones of any frame: runs that touch nothing in the row above."""
+    """Upper bound on the zones of any frame."""
     above = np.pad(frames, ((0, 0), (1, 0), (1, 1)))[:, :-1]
     touched = above[:, :, 1:-1]
     if connectivity == 8:
@@ -89,10 +88,10 @@ def skin_for(
     barycenter_bits: int | None = None,
     closed: bool = False,
 ) -> Skin:
-    """A sheet of this size, scanned as fast as the link can carry frames of this many zones without drops.
+    """A Skin of this size, scanned as fast as the link can carry frames of this many zones.
 
-    With ``barycenter_bits`` the board divides, and reports that many fraction bits. Capacity steps are at most a third,
-    so that recordings of one sheet share builds.
+    ``barycenter_bits``: fraction bits of a board that divides. Capacities are coarse, so that recordings of one sheet
+    share builds.
     """
     shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
     if closed:
@@ -116,9 +115,9 @@ def skin_for(
 
 
 def replay(frames: np.ndarray, skin: Skin) -> Iterator[ReplayedFrame]:
-    """Hold each (rows, columns) bool frame for exactly one scan of a board of ``skin``; results are in order.
+    """Hold each (rows, columns) bool frame for one scan of a board of ``skin``; results are in order.
 
-    The first scans, and those with a hello, have an untouched sheet. Raises :class:`ReplayError` if a frame does not
+    The sheet is untouched in the first scans and in those with a hello. Raises :class:`ReplayError` if a frame does not
     come out exactly once.
     """
     plan = _Plan(skin, len(frames))
@@ -135,8 +134,6 @@ def replay(frames: np.ndarray, skin: Skin) -> Iterator[ReplayedFrame]:
 
 
 class _Plan:
-    """Assignment of input frames to scans."""
-
     def __init__(self, skin: Skin, count: int):
         derived = skin.derived
         hello = len(protocol.encode_hello(skin)) * 10 * derived.bit_clocks
@@ -184,7 +181,7 @@ class _Collector:
         return _Events(*(self._board.take(name) for name in ("rows", "records", "received")))
 
     def collect(self, events: _Events) -> Iterator[ReplayedFrame]:
-        """Input frames whose last byte is among the events."""
+        """Results of input frames whose last byte is among the events."""
         self._note_times(events)
         stream = zip(events.received["cycle"].tolist(), events.received["data"].tolist())
         for got in self._receiver.take(stream):
@@ -206,7 +203,6 @@ class _Collector:
                 self._pending.append(cycle)
 
     def _place(self, frame: Frame, end: int) -> Iterator[ReplayedFrame]:
-        """Find the scan by its time; frames of an untouched sheet may replace each other."""
         scan = self._next
         while self._time(scan) != frame.time_us:
             if scan >= self._plan.scans or self._plan.frame_of[scan] is not None:
@@ -230,8 +226,7 @@ class _Collector:
 
 
 def to_json(index: int, result: ReplayedFrame, skin: Skin) -> dict[str, object]:
-    """One input frame as ``contactfpga replay --json`` prints it: the output of ``contactfpga zones --json``, its input
-    number and, under ``cycles``, the clocks of :class:`ReplayedFrame`."""
+    """One frame as ``contactfpga replay --json`` prints it."""
     cycles = {
         "last_row_to_first_record": result.first_record,
         "last_row_to_last_record": result.last_record,

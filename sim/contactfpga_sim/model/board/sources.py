@@ -1,7 +1,4 @@
-"""Keys for cached results: hashes of modules with all their imports, and of the packages they use.
-
-Imports are read from the text, without importing.
-"""
+"""Keys of cached results: hashes of modules with all their imports, read from the text."""
 
 from __future__ import annotations
 
@@ -30,15 +27,14 @@ _WORD = re.compile(r"\bimport\b")
 _PLACE = re.compile(r"""\b(contactfpga\w*(?:\.\w+)+):\w+["']""")
 
 _taken: dict[tuple[str, tuple[str, ...], bool], str] = {}
-"""Digests by arguments; a process reads each module once."""
+"""Digests by arguments: a process reads each module once."""
 _read: dict[Path, object] = {}
-"""Our modules read so far, with stamps that reveal later writes."""
+"""Modules of the project read so far, with stamps that reveal later writes."""
 
 
 def digest(root: str, packages: tuple[str, ...] = PACKAGES, documented: bool = True) -> str:
-    """Hash of a module, or all modules of a package, with their imports: text of ``packages`` and of data in folders
-    beside their modules, versions of others. Unless ``documented``, docstrings do not count, which takes three times
-    as long."""
+    """Hash of a module, or all modules of a package, with imports: text of ``packages`` and of data beside their
+    modules, versions of other packages. ``documented=False`` ignores docstrings, in three times the time."""
     key = root, packages, documented
     if key not in _taken:
         _taken[key] = _digest(*key)
@@ -47,32 +43,32 @@ def digest(root: str, packages: tuple[str, ...] = PACKAGES, documented: bool = T
 
 @functools.cache
 def texts(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
-    """Hash like :func:`digest` over our modules alone: the same in a clone and a wheel, for every Python and other
+    """Hash like :func:`digest` of the project's modules alone, equal in clone and wheel, for every Python and other
     versions."""
     folders = _folders(packages)
     return _sha(_texts(_closure([root], folders), folders, _hash))
 
 
 def changed() -> bool:
-    """Whether one of our modules was written since it was read: the running code may be neither version."""
+    """Whether a module was written since it was read."""
     return any(_stamp(file) != before for file, before in _read.items())
 
 
 def own(files: Iterable[Path]) -> str:
-    """Hash of a user's own files, with imports from our packages and from beside themselves."""
+    """Hash of a user's files, with imports from the project's packages and from beside themselves."""
     files = sorted(files)
     return _hashed([*map(_hash, files), *_marks(map(_name, files), _folders(PACKAGES) | _beside(files))])
 
 
 def files(modules: Iterable[str], scripts: Iterable[Path] = ()) -> set[Path]:
-    """All our files that modules and scripts reach: imports, and data in folders beside them."""
+    """Project files that modules and scripts reach: imports, and data in folders beside them."""
     folders = _folders(PACKAGES) | _beside(scripts)
     found = {file for file in _closure({*modules, *map(_name, scripts)}, folders).values() if file}
     return found | {data for folder in {file.parent for file in found} for data in _data(folder)}
 
 
 def package(name: str) -> Path:
-    """Folder of a package, without importing it. Raises :class:`MissingExtra`."""
+    """Folder of a package. Raises :class:`MissingExtra`."""
     spec = importlib.util.find_spec(name)
     if spec is None or not spec.submodule_search_locations:
         raise MissingExtra("the virtual board", "sim")
@@ -81,7 +77,7 @@ def package(name: str) -> Path:
 
 @functools.cache
 def version(name: str) -> str:
-    """Version of an installed package; empty if there is none."""
+    """Version of an installed package; empty without it."""
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
@@ -106,12 +102,11 @@ def _sha(marks: Iterable[str]) -> str:
 
 
 def _folders(packages: Iterable[str]) -> dict[str, Path]:
-    """Folder of each package."""
     return {name: package(name).parent for name in packages}
 
 
 def _beside(files: Iterable[Path]) -> dict[str, Path]:
-    """Folders of packages that users' files reach: their own and uninstalled neighbors."""
+    """Folders of packages that users' files reach, including uninstalled neighbors."""
     installed = {Path(path).resolve() for path in sysconfig.get_paths().values()}
     found = {}
     for file in files:
@@ -123,20 +118,17 @@ def _beside(files: Iterable[Path]) -> dict[str, Path]:
 
 
 def _top(file: Path) -> Path:
-    """The folder of the outermost package that a file is in, or the file itself."""
     while (file.parent / "__init__.py").is_file():
         file = file.parent
     return file
 
 
 def _name(file: Path) -> str:
-    """Name of a module."""
     parts = file.relative_to(_top(file).parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
-    """The file of a module; None if these folders lack it."""
     top = name.partition(".")[0]
     if top not in folders:
         return None
@@ -147,7 +139,6 @@ def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
 def _marks(
     roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False, hashed: Callable[[Path], str] | None = None
 ) -> list[str]:
-    """A line per reached module and other package; for ``ours`` also per data file beside a module."""
     found = _closure(roots, folders, _noted if ours else lambda _: None)
     marks = _texts(found, folders, hashed or _hash)
     for folder in {file.parent for file in found.values() if file} if ours else ():
@@ -157,7 +148,6 @@ def _marks(
 
 
 def _texts(found: Mapping[str, Path | None], folders: Mapping[str, Path], hashed: Callable[[Path], str]) -> list[str]:
-    """A line per reached module and enclosing package."""
     marks = [f"{name} {hashed(file)}" for name, file in found.items() if file]
     marks += (f"{top} {hashed(file)}" for top in _tops(found) - set(found) if (file := _find(top, folders)))
     return sorted(marks)
@@ -170,7 +160,6 @@ def _tops(found: Iterable[str]) -> set[str]:
 def _closure(
     roots: Iterable[str], folders: Mapping[str, Path], about_to_read: Callable[[Path], None] = lambda _: None
 ) -> dict[str, Path | None]:
-    """The file of each reached module, by name; None outside these folders."""
     todo, found = set(roots), dict[str, Path | None]()
     while todo:
         name = todo.pop()
@@ -203,7 +192,6 @@ def _hash(file: Path) -> str:
 
 @functools.cache
 def _undocumented(file: Path) -> str:
-    """Hash of a module's text without docstrings and empty lines."""
     text = file.read_bytes().decode(errors="replace")
     lines = text.splitlines()
     with contextlib.suppress(SyntaxError):  # nothing can import it
@@ -213,7 +201,7 @@ def _undocumented(file: Path) -> str:
 
 
 def _docstrings(block: ast.AST) -> Iterator[int]:
-    """Lines, from 0, of strings that are statements. By this project's style they share no line with another."""
+    """Lines, from 0, of docstrings, which in this project share no line with code."""
     for name in ("body", "orelse", "finalbody", "handlers"):
         for statement in getattr(block, name, ()):
             if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
@@ -222,7 +210,6 @@ def _docstrings(block: ast.AST) -> Iterator[int]:
 
 
 def _data(folder: Path) -> Iterator[Path]:
-    """Files in subfolders of a package that are no packages."""
     with os.scandir(folder) as entries:
         inner = [Path(entry) for entry in entries if entry.is_dir() and entry.name != "__pycache__"]
     for each in inner:
@@ -231,7 +218,6 @@ def _data(folder: Path) -> Iterator[Path]:
 
 
 def _imported(text: str, name: str, is_package: bool) -> set[str]:
-    """Names of modules imported anywhere or loaded as a choice, and of imported attributes."""
     found = set(_PLACE.findall(text))
     for statement in _statements(text):
         if isinstance(statement, ast.Import):
@@ -245,7 +231,7 @@ def _imported(text: str, name: str, is_package: bool) -> set[str]:
 
 
 def _statements(text: str) -> Iterator[ast.AST]:
-    """All import statements by text search, ten times faster than parsing; ambiguous files are parsed."""
+    """Import statements, by a text search ten times faster than parsing; ambiguous files are parsed."""
     parts = _IMPORT.split(_TYPES.sub("", text))
     try:
         if any(map(_WORD.search, parts[::2])):

@@ -1,4 +1,4 @@
-"""A compiled board with flips of single flip-flops and memory bits, and checkpoints."""
+"""A compiled board with bit flips and checkpoints."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _MEMORY = re.compile(r"^\tmemory<\d+> (\w+) \{ (\d+)u };", re.MULTILINE)
 
 
 class Storage(NamedTuple):
-    """A register or a memory of the gateware."""
+    """A register or memory of the gateware."""
 
     name: str
-    """Name with the enclosing submodules, joined by dots."""
+    """Name after its submodules, joined by dots."""
     width: int
     """Bits per word."""
     depth: int
@@ -33,7 +33,7 @@ class Storage(NamedTuple):
 
 
 class Bit(NamedTuple):
-    """A bit of a storage."""
+    """One bit of a storage."""
 
     place: int
     word: int
@@ -41,7 +41,7 @@ class Bit(NamedTuple):
 
 
 class Checkpoint:
-    """A board's state at one clock; valid while its board is open."""
+    """A board's state at one clock, valid while the board is open."""
 
     def __init__(self, board: StateBoard) -> None:
         self._board = board
@@ -53,7 +53,7 @@ class Checkpoint:
 
 
 class StateBoard(CompiledBoard):
-    """A compiled board with access to its state between calls, hence between clocks."""
+    """A compiled board with access to its state between clocks."""
 
     def __init__(self, skin: Skin, capture: Iterable[str] = ()):
         super().__init__(skin, capture, _model(skin))
@@ -78,11 +78,11 @@ class StateBoard(CompiledBoard):
         return Checkpoint(self)
 
     def go_to(self, moment: Checkpoint) -> None:
-        """Restore this state; captured events stay."""
+        """Restore a state; captured events stay."""
         self._call("go_to", ctypes.c_void_p(moment.address))
 
     def same(self, moment: Checkpoint) -> bool:
-        """Whether the future is the same as from this state."""
+        """Whether the board's future is the same as from this state."""
         return bool(self._call("same", ctypes.c_void_p(moment.address)))
 
     def drop(self, moment: Checkpoint) -> None:
@@ -115,8 +115,7 @@ def _model(skin: Skin) -> Model:
 
 
 def places(model: str) -> str:
-    """``places.inc`` for a generated model: its registers, and memories except those never written, which are logic or
-    configuration."""
+    """Text of ``places.inc``: registers and written memories of a generated model."""
     lines = [f'PLACE("{_plain(name)}", {name})' for name in _WIRE.findall(model)]
     lines += [
         f'MEMORY("{_plain(name.removeprefix("memory_"))}", {name}, {depth})'
@@ -127,5 +126,4 @@ def places(model: str) -> str:
 
 
 def _plain(mangled: str) -> str:
-    """The original of a C++ name."""
     return re.sub(r"__|_([0-9a-f]+)_", lambda match: chr(int(match[1], 16)) if match[1] else "_", mangled[2:])

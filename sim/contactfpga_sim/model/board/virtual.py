@@ -28,11 +28,11 @@ CHUNK_S = 0.2e-3
 
 
 UnitSource = Callable[[float], Sequence[int]]
-"""Readings of each pressure unit, in converter steps, by simulated time in s."""
+"""A function from simulated time in s to each pressure unit's reading, in converter steps."""
 
 
 def _unit_source(skin: Skin, scene: Source, units: UnitSource | LoadCells | None) -> UnitSource:
-    """The source of readings. Raises ValueError for units that the Skin or the scene cannot use."""
+    """Raises ValueError for units that do not fit the Skin or the scene."""
     if not isinstance(units, LoadCells):
         return units or _at_rest(skin)
     if len(units.units) != skin.units:
@@ -58,17 +58,16 @@ def _at_rest(skin: Skin) -> UnitSource:
 
 
 class VirtualBoard:
-    """A board in simulated time, with the interface of a serial port: time passes only in :meth:`read`.
+    """A board in simulated time, with the interface of a serial port. Time passes only in :meth:`read`.
 
     skin: default the reference Skin; scene: any argument of :func:`contactfpga_sim.model.scenes.scene.scene`, for
-    instance a function from simulated time in s to pressed (rows, columns) bool cells; cover: through which its
-    contacts press, default none; circuit: the sheet's, for settling times, default none; slow_rows, slow_columns:
-    factors of settling time by line; units: a function from simulated time in s to the pressure units' readings,
-    default half of full scale, or the LoadCells under a scene with contacts; look_s: simulated time between two samples
-    of the scene.
+    instance a function from simulated time in s to pressed (rows, columns) bool cells; cover: default none; circuit:
+    the sheet's, for settling times, default none; slow_rows, slow_columns: factors of settling time by line; units: a
+    function from simulated time in s to the pressure units' readings, default half of full scale, or the LoadCells
+    under a scene with contacts; look_s: simulated time between two samples of the scene.
 
-    ``contactfpga.open(VirtualBoard())`` opens it like any port. The function's exceptions come out of the call that
-    waits for a frame.
+    ``contactfpga.open(VirtualBoard())`` opens it like any port. Exceptions of a scene's function come out of the call
+    that waits for a frame.
     """
 
     def __init__(
@@ -89,7 +88,7 @@ class VirtualBoard:
         self._cover = cover
         self._touch: CellsAt | None = None
         self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
-        """(rows, columns) bool: the closed switches since the last :meth:`advance`."""
+        """(rows, columns) bool: switches closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
         if circuit is not None:
             self._board.settle(*lines_of(circuit, self.skin))
@@ -114,11 +113,12 @@ class VirtualBoard:
 
     @property
     def by_force(self) -> bool:
-        """Whether a finger's force matters: the cover depends on stress."""
+        """Whether a contact's force matters, as the cover depends on stress."""
         return self._cover is not None and self._cover.model != "patch"
 
     def touch(self, fingers: Iterable[RoundContact]) -> None:
-        """Touch the sheet with these fingers, besides its scene, until the next call; from any thread."""
+        """Touch the sheet with these fingers, besides its scene, until the next call. Any thread may call this
+        method."""
         placed = [
             contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
             for one in fingers
@@ -152,9 +152,9 @@ class VirtualBoard:
 
 
 class VirtualSheets:
-    """A board of several sheets in simulated time, which passes only in :meth:`read`.
+    """A board of several sheets, with the interface of :class:`VirtualBoard`.
 
-    several: the sheets; scenes: touches of each, for :func:`contactfpga_sim.model.scenes.scene.scene`.
+    several: the sheets; scenes: an argument of :func:`contactfpga_sim.model.scenes.scene.scene` for each.
     """
 
     def __init__(self, several: Several, scenes: Sequence[Source]):
@@ -164,11 +164,9 @@ class VirtualSheets:
         self._chunk = max(1, round(CHUNK_S * several.clock_hz))
 
     def write(self, data: bytes) -> None:
-        """Send bytes to the board."""
         self._board.send(data)
 
     def read(self, seconds: float) -> bytes:
-        """Let simulated time pass until bytes arrive, at most ``seconds``; returns them."""
         left = round(seconds * self.several.clock_hz)
         while True:
             data = self._board.receive()
@@ -179,22 +177,19 @@ class VirtualSheets:
             left -= cycles
 
     def advance(self, cycles: int) -> None:
-        """Run clock cycles with the current scenes."""
         for number, scene in enumerate(self._scenes):
             self._board.press(number, scene(self.clock()))
         self._board.run(cycles)
 
     def clock(self) -> float:
-        """Simulated seconds since power-up."""
         return self._board.cycle / self.several.clock_hz
 
     def close(self) -> None:
-        """Free the board."""
         self._board.close()
 
 
 def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:
-    """The board of ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default without a file.
+    """The board at ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default without a file.
     Raises :class:`~contactfpga.AddressError`, and the errors of its files."""
     address = Sim.parse(name)
     cover, circuit, units = None, None, None
@@ -214,7 +209,6 @@ def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheet
 
 
 def _compared(scene: str | None, threshold: float | None) -> str | Recording | None:
-    """The scene; with a threshold the recording in its file."""
     if threshold is None:
         return scene
     if scene is None or not scene.endswith((".npy", ".npz")):

@@ -1,8 +1,4 @@
-"""Boards that the package carries as WebAssembly, which wasmtime runs without a compiler.
-
-Each is listed with a key of its sources. Without a matching file, as for other Skins or changed gateware, there is
-none.
-"""
+"""Boards packaged as WebAssembly, which wasmtime runs without a compiler."""
 
 from __future__ import annotations
 
@@ -25,14 +21,13 @@ from contactfpga_sim.model.board import native, sources
 
 FOLDER = Path(__file__).parent / "wasm"
 LIST = FOLDER / "files.json"
-"""By file name its key, its design's key (unchanged by text alone), and its sum; and the versions of the building
-tools."""
+"""By file name its key, its design's key (unchanged by text alone) and checksum; and versions of the tools."""
 
 NATIVE = "CONTACTFPGA_NATIVE"
-"""Environment variable that, if set, requests native code, which is faster."""
+"""Environment variable that requests native code, which is faster."""
 
 FASTER = 1.4
-"""Speed of native code over WebAssembly."""
+"""Speed of native code, relative to WebAssembly."""
 
 _ALIGNED = 16  # bytes, as malloc's
 _ZIG = (sys.executable, "-m", "ziglang")
@@ -47,8 +42,7 @@ _C_FLAGS = (*_TARGET, "-std=c99", "-Os")
 
 
 class WebAssemblyLibrary:
-    """A board in memory of its own, used like a ctypes library: functions take bytes and ctypes numbers, and return
-    their ``restype``."""
+    """A board in its own memory, used like a ctypes library; functions take bytes and ctypes numbers."""
 
     def __init__(self, file: Path):
         import wasmtime
@@ -68,13 +62,11 @@ class WebAssemblyLibrary:
         return function
 
     def string_at(self, address: int, size: int) -> bytes:
-        """Replacement of ctypes' ``string_at``."""
+        """ctypes' ``string_at`` for this memory."""
         return self._memory.read(address, size)
 
 
 class _Memory:
-    """A board's memory."""
-
     def __init__(self, store: Any, exports: Any):
         self._store, self._exports, self._bytes = store, exports, exports["memory"]
         self._room = self._room_bytes = 0
@@ -83,7 +75,7 @@ class _Memory:
         return bytes(self._bytes.read(self._store, address, address + size))
 
     def placed(self, datas: Sequence[bytes]) -> list[int]:
-        """Addresses of these data until the next call."""
+        """Addresses of these data, valid until the next call."""
         if not datas:
             return []
         *starts, size = itertools.accumulate((-len(data) % _ALIGNED + len(data) for data in datas), initial=0)
@@ -96,7 +88,7 @@ class _Memory:
 
 
 class _Function:
-    """A library function called by C convention: wasmtime's usual call costs 500 board clocks."""
+    """A library function called by C convention, as wasmtime's usual call costs 500 board clocks."""
 
     restype: Any = ctypes.c_int
 
@@ -132,7 +124,7 @@ class _Function:
 
 
 def load(key: str) -> WebAssemblyLibrary | None:
-    """The packaged board with a key, or None; also None if the user requests native code by :data:`NATIVE`."""
+    """Packaged board with a key, if any, unless :data:`NATIVE` is set."""
     if os.environ.get(NATIVE) or importlib.util.find_spec("wasmtime") is None:
         return None
     found = file(key)
@@ -143,7 +135,6 @@ def load(key: str) -> WebAssemblyLibrary | None:
 
 @functools.cache
 def _tell() -> None:
-    """Report WebAssembly on a terminal, once."""
     if terminal.of(sys.stderr).live:
         faster = f"native code, which {NATIVE}=1 compiles, is {FASTER} times as fast"
         terminal.say(f"contactfpga: the virtual board runs as WebAssembly; {faster}", sys.stderr, hang=2)
@@ -151,13 +142,11 @@ def _tell() -> None:
 
 @atexit.register
 def _let_go() -> None:
-    """Free the cache while wasmtime still works."""
     _compiled.cache_clear()
 
 
 @functools.cache
 def _compiled(file: Path) -> tuple[Any, Any]:
-    """An engine and a module, made in 0.2 s."""
     import wasmtime
 
     settings = wasmtime.Config()
@@ -173,13 +162,13 @@ def listed() -> dict[str, Any]:
 
 
 def write_list(files: Mapping[str, Mapping[str, str]]) -> None:
-    """Write :data:`LIST` for files by name."""
+    """Write :data:`LIST`."""
     found = {name: {**keys, "sha256": sum_of(path_of(name).read_bytes())} for name, keys in files.items()}
     LIST.write_text(json.dumps({"tools": tools(), "files": found}, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def path_of(name: str) -> Path:
-    """Path of a file."""
+    """Path of a packaged file."""
     return FOLDER / f"{name}.wasm"
 
 
@@ -194,25 +183,25 @@ def file(key: str) -> Path | None:
 
 
 def tools() -> dict[str, str]:
-    """Versions by tool: that for building a file here, or, if not installed, that of the packaged files."""
+    """Versions by tool: installed ones, else those that built the packaged files."""
     return {tool: sources.version(tool) or listed()["tools"][tool] for tool in _TOOLS}
 
 
 def board_key(gateware: str, driver: str, defines: Mapping[str, int | str]) -> str:
-    """Key of a board: of its gateware, this file and its driver's constants."""
+    """Key of a board: its gateware, the build options, and the driver with its constants."""
     options = (_FLAGS, native.FLATTEN, native.TO_CPP, sorted(defines.items()))
     drivers = (*sorted(native.DRIVERS.glob("*.h")), native.DRIVERS / driver)
     return _key(gateware, options, *(sum_of(file.read_bytes()) for file in drivers))
 
 
 def gateware_of(skin: Skin) -> str:
-    """Hash of a Skin's gateware by the text of its modules. Cheap: nothing is elaborated."""
+    """Hash of the text of a Skin's gateware modules. Cheap, as nothing is elaborated."""
     text = sources.texts("contactfpga_hdl.top", (sources.HOST, sources.GATEWARE))
     return repr((skin.fingerprint, skin.name, text))
 
 
 def c_key(source: Path) -> str:
-    """Key of a C file and its headers."""
+    """Key of a C file with its headers."""
     return _key(_C_FLAGS, *(sum_of(file.read_bytes()) for file in (source, *sorted(source.parent.glob("*.h")))))
 
 
@@ -221,19 +210,19 @@ def _key(*parts: Any) -> str:
 
 
 def build_board(model: native.Model, folder: Path) -> bytes:
-    """Build a model's file; ``folder`` holds intermediate files."""
+    """WebAssembly of a model; ``folder`` holds intermediate files."""
     made = folder / "model.wasm"
     native.compile_with([*_ZIG, "c++", *_FLAGS], model, folder, made)
     return made.read_bytes()
 
 
 def build_c(source: Path, folder: Path) -> bytes:
-    """Build a C file; ``folder`` holds intermediate files."""
+    """WebAssembly of a C file; ``folder`` holds intermediate files."""
     made = folder / "made.wasm"
     native.run([*_ZIG, "cc", *_C_FLAGS, str(source), "-o", str(made)])
     return made.read_bytes()
 
 
 def sum_of(data: bytes) -> str:
-    """A hash in hex digits."""
+    """Hash in hex digits."""
     return hashlib.sha256(data).hexdigest()

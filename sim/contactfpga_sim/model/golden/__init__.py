@@ -1,7 +1,7 @@
 """Golden model: zones by flood fill, times by docs/timing.md.
 
-It shares no code with the gateware or the host's protocol, never imports Amaranth, and reads only the declared fields
-of a Skin.
+The golden model shares no code with the gateware or the host's protocol, never imports Amaranth, and reads only a
+Skin's declared fields.
 """
 
 from contactfpga_sim.model.golden.predict import beginnings, driven, predict

@@ -1,4 +1,4 @@
-"""The adaptive scan: driven rows by slot, their samples, and the contact pin."""
+"""The adaptive scan: driven rows, samples, and contact pin."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from contactfpga_sim.model.golden.scan import Play, Scan, ScanOutput, ScanRule, 
 from contactfpga_sim.model.golden.trace import Timeline
 
 Choice = tuple[frozenset[int], bool]
-"""The rows of a slot, and whether it is one row alone; else it is a probe."""
+"""(rows of a slot, whether the slot is one row alone, not a probe)."""
 
 Choices = Generator[Choice, bool, None]
-"""Yields the choice for each slot; receives whether any column read pressed in it."""
+"""Yields each slot's choice; receives whether any column read pressed."""
 
 
 def row_choices(rows: int, listed: frozenset[int]) -> Choices:
-    """The slots of a frame with these rows on the list at its beginning."""
+    """Slots of a frame, with these rows on the list at its beginning."""
     return _RowSearch(rows, listed).slots()
 
 
@@ -93,26 +93,24 @@ class _RowSearch:
 
 @dataclasses.dataclass(frozen=True)
 class RowSlot:
-    """A row time and its driven rows."""
+    """A row time with its driven rows."""
 
     begin: int
     rows: frozenset[int]
     strobe: int
-    """The cycle in which its columns have passed the synchronizers."""
+    """Cycle in which the columns have passed the synchronizers."""
     released: int
-    """The first cycle without a driven row; the slot's end if they stay driven."""
+    """First cycle without a driven row; the slot's end if the rows stay driven."""
     end: int
-    """The first cycle of the next slot."""
 
 
 class AdaptiveScanModel:
-    """Runs through a timeline frame by frame, with the requests in order of reception."""
+    """Runs through a timeline frame by frame; requests are in order."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request]):
         self.slots: list[RowSlot] = []
-        """All slots so far."""
         self.contact: list[tuple[int, int]] = []
-        """(cycle, level) of every change of the contact pin so far."""
+        """(cycle, level) of every change of the contact pin."""
         self._facts = facts
         self._timeline = timeline
         self._changes = [piece[0] for piece in timeline.pieces]
@@ -125,7 +123,7 @@ class AdaptiveScanModel:
         self._clean: np.ndarray = ~np.any(facts.mask, axis=0)
 
     def frame(self) -> tuple[Scan, np.ndarray]:
-        """The next frame, and its debounced cells."""
+        """Next frame, and its debounced cells."""
         facts = self._facts
         cells = np.zeros((facts.rows, facts.columns), bool)
         offered = [0] * facts.rows
@@ -178,7 +176,7 @@ class AdaptiveScanModel:
         return scan, counted
 
     def _strobe(self, begin: int, rows: frozenset[int]) -> int:
-        """The cycle of the slot's sample: after its settle time; for idle rows, when a touch is seen."""
+        """Cycle of the slot's sample: after its settle time; for idle rows, when a touch is seen."""
         regular = begin + self._facts.settle + 1
         if not self._watched():
             return regular
@@ -199,7 +197,6 @@ class AdaptiveScanModel:
         return len(rows) == self._facts.rows
 
     def _columns(self, cycle: int, rows: frozenset[int]) -> np.ndarray:
-        """Columns that read pressed in a cycle with these rows driven."""
         cells, stuck = self._timeline.at(cycle)
         columns = np.zeros(self._facts.columns, bool)
         if cells is not None:
@@ -209,24 +206,20 @@ class AdaptiveScanModel:
         return columns
 
     def _released_before(self) -> np.ndarray:
-        """Columns that read pressed in the clock before this slot, if no row was driven then."""
         if not self.slots or self.slots[-1].released == self.slots[-1].end:
             return np.zeros(self._facts.columns, bool)
         return self._columns(self.slots[-1].end - 1, frozenset())
 
     def _watched(self) -> bool:
-        """Whether the last slot was idle and its rows stay driven."""
         return bool(self.slots) and self.slots[-1].released == self.slots[-1].end
 
     def _watch(self, rows: frozenset[int], strobe: int) -> None:
-        """Evaluate each cycle since the last strobe of idle rows for the pin."""
         if self._watched():
             seen = self._first_seen(self.slots[-1].strobe, strobe - 2, rows, self._clean)
             if seen is not None:
                 self._rise(seen + 3, True)
 
     def _first_seen(self, begin: int, end: int, rows: frozenset[int], counts: np.ndarray) -> int | None:
-        """The first cycle from ``begin`` to ``end`` in which one of these columns reads pressed."""
         inside = self._changes[bisect.bisect_right(self._changes, begin) : bisect.bisect_right(self._changes, end)]
         for cycle in (begin, *inside):
             if cycle <= end and (self._columns(cycle, rows) & counts).any():
@@ -238,7 +231,7 @@ class AdaptiveScanModel:
             self.contact.append((cycle, 1))
 
     def _end(self, cycle: int, pressed: bool) -> None:
-        """End a frame with or without a pressed row; if idle rows stay driven, readings count a clock earlier."""
+        """End a frame. If idle rows stay driven, readings count a clock earlier."""
         slot = self.slots[-1]
         if self._watched() and (self._columns(cycle - 3, slot.rows) & self._clean).any():
             self._rise(cycle, True)

@@ -1,4 +1,4 @@
-"""Debounce: the state of each switch, sample by sample."""
+"""Debounce of each switch, sample by sample."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from contactfpga.choices import debounces
 
 @dataclasses.dataclass(frozen=True)
 class DebounceRule:
-    """The golden rule of a debounce, for one switch."""
+    """The golden rule of a debounce for one switch."""
 
     even: Callable[[list[bool], int, int], list[bool]]
-    """A switch's states from its samples, one per scan; press and release in scan periods."""
+    """Function from samples, one per scan, and press and release in scan periods, to states."""
     timed: Callable[[TimedDebounce, SwitchState, bool, int], None]
-    """Update of a switch's state by its sample in a tick."""
+    """Function that updates a switch's state by its sample."""
 
 
 def _rule(method: object) -> DebounceRule:
@@ -26,10 +26,8 @@ def _rule(method: object) -> DebounceRule:
 
 
 def debounced(samples: np.ndarray, method: object, press: int, release: int) -> np.ndarray:
-    """Debounce (F, R, C) bool samples, one per scan and switch; ``press`` and ``release`` in scan periods.
-
-    Returns (F, R, C) bool: the state of each switch from that scan's sample on.
-    """
+    """States of (F, R, C) bool switches by samples, one per scan; ``press`` and ``release`` in scan periods. A state
+    counts from its sample on."""
     rule = _rule(method).even
     result = np.zeros_like(samples)
     for place in np.ndindex(*samples.shape[1:]):
@@ -71,9 +69,9 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
 
 
 class TimedDebounce:
-    """Debounce for samples that are not a scan apart, in ticks, row times or us.
+    """Debounce for samples that are not a scan apart; ticks are row times or us.
 
-    A time ends at the first sample ``press`` or ``release`` ticks or more after its beginning.
+    A time ends at the first sample at least ``press`` or ``release`` ticks after its beginning.
     """
 
     def __init__(self, method: object, press: int, release: int):
@@ -82,7 +80,7 @@ class TimedDebounce:
         self._switches: dict[tuple[int, int], SwitchState] = {}
 
     def take(self, cells: np.ndarray, ticks: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
-        """(R, C) bool samples of a frame; ``ticks``: sample times of the rows that were driven alone.
+        """Take (R, C) bool samples of a frame; ``ticks``: sample times of rows driven alone.
 
         Returns the switches' states, and the rows with a pressed switch or a running time.
         """
@@ -136,9 +134,9 @@ class SwitchState:
 
     pressed: bool = False
     since: int | None = None
-    """Tick since which it reads differently from its state."""
+    """Tick since which readings differ."""
     ignored_since: int | None = None
-    """Tick of its press, while readings are ignored."""
+    """Tick of the press while readings are ignored."""
 
 
 NONE = DebounceRule(lambda reads, press, release: reads, TimedDebounce.none)

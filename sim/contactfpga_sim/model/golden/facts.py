@@ -1,7 +1,5 @@
-"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, from a Skin's declared fields.
-
-Computed independently in exact fractions, so that a slip in the gateware's own table cannot hide.
-"""
+"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, in exact fractions and independent of the
+gateware's table."""
 
 from __future__ import annotations
 
@@ -23,27 +21,27 @@ if TYPE_CHECKING:
 
 
 def exact(value: float) -> Fraction:
-    """The decimal number in the Skin, without binary rounding."""
+    """The Skin's decimal number, without binary rounding."""
     return Fraction(repr(value))
 
 
 def upwards(value: Fraction) -> int:
-    """The next integer upward. An excess of a billionth does not count: 37/12 us is 37 clocks of 12 MHz."""
+    """The next integer upward, ignoring an excess of a billionth: 37/12 us is 37 clocks of 12 MHz."""
     return math.ceil(value - Fraction(1, 10**9))
 
 
 def downwards(value: Fraction) -> int:
-    """The next integer downward. A deficit of a billionth does not count."""
+    """The next integer downward, ignoring a deficit of a billionth."""
     return math.floor(value + Fraction(1, 10**9))
 
 
 class ScanTiming(abc.ABC):
-    """The part of a scan's golden rule behind clocks and widths."""
+    """The part of a scan's golden rule that clocks and widths need."""
 
     even: bool
-    """Whether every frame takes the same time, every row once."""
+    """Whether every frame takes the same time and every row once."""
     waits: bool
-    """Whether it waits for the later stages, and the link counts time, not frames."""
+    """Whether the scan waits for later stages, and the link counts time."""
 
     @abc.abstractmethod
     def choice(self, facts: Facts) -> int:
@@ -51,20 +49,20 @@ class ScanTiming(abc.ABC):
 
     @abc.abstractmethod
     def frame_slots(self, facts: Facts) -> int:
-        """The most row times that a frame takes."""
+        """Most row times of a frame."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """The quantities R, C, M, E, X, Z, S, L, T, D, P and Q of the rules, and the widths of fields on the wire."""
+    """Quantities R, C, M, E, X, Z, S, L, T, D, P and Q of the rules, and widths of fields on the wire."""
 
     skin: Skin
     place: tuple[int, int] | None = None
-    """(number, sheets) of a sheet among several on one FPGA; None: it is alone."""
+    """(number, sheets) of one of several sheets on one FPGA; None: a single sheet."""
 
     @property
     def closing(self) -> bytes:
-        """Bytes after a packet's stuffed ones: 2, and kind 11 with the sheet's number."""
+        """Bytes after a packet's stuffed ones: among several sheets 2, and kind 11 with the sheet's number."""
         return b"" if self.place is None else bytes([2, 11 * 16 + self.place[0]])
 
     @property
@@ -77,12 +75,12 @@ class Facts:
 
     @property
     def row_lines(self) -> int:
-        """Rows, including the guard row."""
+        """Rows with the guard row."""
         return self.rows + (1 if self.skin.guard else 0)
 
     @property
     def column_lines(self) -> int:
-        """Columns, including the guard column."""
+        """Columns with the guard column."""
         return self.columns + (1 if self.skin.guard else 0)
 
     @functools.cached_property
@@ -95,25 +93,24 @@ class Facts:
 
     @functools.cached_property
     def fault_bits(self) -> int:
-        """Bits of the fault word: open rows and columns, stuck columns and the guard column's bit, joined lines; 0:
-        none."""
+        """Bits of the fault word: open rows and columns, stuck columns with the guard column, joined lines; 0: none."""
         lines = [*range(self.rows), *range(self.columns), *range(self.columns + 1)] if self.skin.guard else []
         return len(lines) + int(self.skin.self_test)
 
     @property
     def commands(self) -> bytes:
-        """Command numbers of the board: 1 is the self-test, 2 moves the sample, 3 to 5 are of units."""
+        """Commands: 1 is the self-test, 2 the sample time, 3 to 5 are of units."""
         of_units = b"\x03\x04" + b"\x05" * bool(self.skin.unit_sums) if self.skin.units else b""
         return b"\x01" * self.skin.self_test + b"\x02" * self.samples_early + of_units
 
     @property
     def samples_early(self) -> bool:
-        """Whether the board can sample a row's columns before the settle time ends."""
+        """Whether columns can be sampled before the settle time ends."""
         return self.skin.report == "cells" and self.skin.scan in ("raster", "reversal")
 
     @property
     def first_sample(self) -> int:
-        """The earliest clock of a row in which columns can be sampled, counted from 1."""
+        """Earliest clock of a row, from 1, in which columns can be sampled."""
         return max(2, self.load + self.column_shift)
 
     @functools.cached_property
@@ -129,14 +126,14 @@ class Facts:
 
     @functools.cached_property
     def column_shift(self) -> int:
-        """X: clocks to shift the columns of a sample."""
+        """X: clocks to shift in a sample of the columns."""
         if self.skin.column_read == "direct":
             return 0
         return -(-self.column_lines // self.skin.column_chains) * self.shift_bit
 
     @functools.cached_property
     def row_shift(self) -> int:
-        """Z: clocks by which a row pattern is shifted before its slot, and the start of the first slot."""
+        """Z: clocks by which a row pattern is shifted before its slot."""
         if self.skin.row_drive == "direct":
             return 0
         return 1 + -(-self.row_lines // self.skin.row_chains) * self.shift_bit + self.shift_bit
@@ -158,12 +155,10 @@ class Facts:
 
     @functools.cached_property
     def choice(self) -> int:
-        """Clocks that the scan needs to choose its next rows."""
         return self.scan.choice(self)
 
     @functools.cached_property
     def frame_slots(self) -> int:
-        """The most row times that a frame takes."""
         return self.scan.frame_slots(self)
 
     @functools.cached_property
@@ -176,7 +171,7 @@ class Facts:
 
     @functools.cached_property
     def precharge(self) -> int:
-        """Minimum clocks for which columns are driven before a row."""
+        """Least clocks of driven columns before a row."""
         return upwards(exact(self.skin.precharge_us) * self.clocks_per_us)
 
     @functools.cached_property
@@ -191,7 +186,7 @@ class Facts:
 
     @functools.cached_property
     def scan_clocks(self) -> int:
-        """Clocks of one scan period: every row once, including the guard row."""
+        """Clocks of a scan period: every row once, with the guard row."""
         return self.row_lines * self.row_clocks
 
     @functools.cached_property
@@ -200,12 +195,12 @@ class Facts:
 
     @functools.cached_property
     def project(self) -> int:
-        """Clocks for which all columns are driven before the rows are sampled."""
+        """Clocks for which all columns are driven before rows are sampled."""
         return upwards(exact(self.skin.project_us) * self.clocks_per_us)
 
     @functools.cached_property
     def column_groups(self) -> int:
-        """Groups of columns in which a row is counted, at most four: of 4 columns, 8 or 16."""
+        """Number of groups of 4, 8 or 16 columns in which a row is counted."""
         group = next(width for width in (4, 8, 16) if 4 * width >= self.columns)
         return -(-self.columns // group)
 
@@ -223,7 +218,7 @@ class Facts:
 
     @functools.cached_property
     def keep_alive_slots(self) -> int:
-        """Row times after which an unchanged frame is sent; one more frame could be too late."""
+        """Row times after which an unchanged frame is sent."""
         if self.scan.even:
             return self.row_lines * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
         row_us = Fraction(self.row_clocks, self.clocks_per_us)
@@ -231,13 +226,13 @@ class Facts:
 
     @property
     def keep_alive_periods(self) -> int:
-        """Keep-alive time of a scan that waits, in periods of 1024 us."""
+        """Keep-alive time in periods of 1024 us, for a scan that waits."""
         periods = exact(self.skin.keep_alive_ms) * 1000 / 1024
         return downwards(periods) - 1 - math.ceil(2 * self.scan_clocks / Fraction(1024 * self.clocks_per_us))
 
     @functools.cached_property
     def press_ticks(self) -> int:
-        """Duration of a press if samples are not a scan apart: in row times, or us with a scan that waits."""
+        """Press time in row times; for a scan that waits in us."""
         return self._ticks(exact(self.skin.debounce_press_us), self.press_scans)
 
     @functools.cached_property
@@ -259,12 +254,12 @@ class Facts:
 
     @property
     def zones(self) -> bool:
-        """True if a frame has zone records, False if it has bitmap rows."""
+        """Whether a frame has zone records, not bitmap rows."""
         return self.skin.report in ("moments", "barycenter")
 
     @property
     def divided(self) -> bool:
-        """True when zone records hold barycenters."""
+        """Whether zone records hold barycenters."""
         return self.skin.report == "barycenter"
 
     @property
@@ -293,18 +288,18 @@ class Facts:
 
     @functools.cached_property
     def barycenter_bits(self) -> tuple[int, int, int]:
-        """Bits of area, x and y in barycenter records. Areas are 1 to R C, of which the last may wrap to 0."""
+        """Bits of area, x and y in barycenter records. The largest area, R C, may wrap to 0."""
         steps = 2**self.skin.barycenter_bits
         return bits(self.rows * self.columns - 1), bits((self.columns - 1) * steps), bits((self.rows - 1) * steps)
 
     @functools.cached_property
     def division(self) -> int:
-        """Q: clocks of a division, one for each bit of a row or column number, each fraction bit and rounding."""
+        """Q: clocks of a division: one per bit of a row or column number, one per fraction bit, and rounding."""
         return math.ceil(math.log2(max(self.rows, self.columns))) + self.skin.barycenter_bits + 1
 
     @functools.cached_property
     def item_bytes(self) -> int:
-        """Bytes of one zone record or one bitmap row."""
+        """Bytes per zone record or bitmap row."""
         if self.divided:
             width = sum(self.barycenter_bits)
         else:
@@ -324,8 +319,8 @@ class Facts:
 
     @property
     def _most_zones(self) -> int:
-        """The most zones: one per 2x2 block with 8-connectivity, the checkerboard with 4, at most half the columns
-        around a cylinder."""
+        """The most zones: one per 2x2 block with 8-connectivity, a checkerboard with 4, half the columns around a
+        cylinder."""
         if self.skin.closed:
             return self.columns // 2 * (self.rows if self.skin.connectivity == 4 else math.ceil(self.rows / 2))
         if self.skin.connectivity == 4:
@@ -350,5 +345,5 @@ def bits(largest: int) -> int:
 
 @functools.lru_cache(maxsize=64)
 def facts(skin: Skin) -> Facts:
-    """The facts of ``skin``, cached."""
+    """Facts of a Skin, cached."""
     return Facts(skin)

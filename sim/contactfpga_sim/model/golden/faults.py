@@ -1,4 +1,4 @@
-"""Fault reports: the board's report on its lines, and when one is due (docs/timing.md)."""
+"""Fault reports, and when one is due (docs/timing.md)."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ KIND, SLOT = 9, 1
 
 
 class FaultHistory:
-    """The fault word of a scan by cycle; 0 at first."""
+    """The fault word by cycle, initially 0."""
 
     def __init__(self) -> None:
         self._cycles = [0]
         self._words = [0]
 
     def change(self, cycle: int, word: int) -> None:
-        """Set the word from ``cycle`` on, not before earlier changes."""
+        """Set the word from ``cycle`` on; cycles rise."""
         assert cycle >= self._cycles[-1], "changes come in order"
         self._cycles.append(cycle)
         self._words.append(word)
 
     def at(self, cycle: int) -> int:
-        """The word in a cycle."""
+        """Word in a cycle."""
         return self._words[bisect.bisect_right(self._cycles, cycle) - 1]
 
     def between(self, first: int, last: int) -> list[tuple[int, int, int]]:
-        """(first, last, word) of each stretch of cycles, ends included."""
+        """(first, last, word) of each stretch of cycles."""
         begin = bisect.bisect_right(self._cycles, first) - 1
         ends = [*self._cycles[begin + 1 :], last + 1]
         stretches = zip(self._cycles[begin:], ends, self._words[begin:])
@@ -38,12 +38,12 @@ class FaultHistory:
 
 
 def report(facts: Facts, digits: Sequence[int] | None = None) -> bytes:
-    """A report of these digits as on the wire, by default one without faults."""
+    """A report of these digits, by default without faults."""
     return _sealed(facts, _digits(0, facts.fault_bits) if digits is None else digits, 0)
 
 
 def slot(facts: Facts, number: int, rows: int, columns: int) -> bytes:
-    """A slot of the self-test that read these rows and columns, bit 0 the first."""
+    """A self-test slot that read these rows and columns, bit 0 the first."""
     lines = _digits(rows | columns << facts.rows, facts.rows + facts.columns)
     return _sealed(facts, _digits(number, 14) + lines, SLOT)
 
@@ -59,9 +59,9 @@ def _digits(word: int, bits: int) -> list[int]:
 
 
 class Reports:
-    """When a report is due. In a report on the wire each digit is read in the cycle after the handover of the byte
-    before it. Otherwise, in cycle t the digit at t modulo a power of two is checked; if it differs from the one sent
-    last, a report is due two cycles later."""
+    """When a report is due. Each digit of a report is read in the cycle after the handover of the byte before it.
+    Between reports, cycle t checks the digit at t modulo a power of two; a difference makes a report due two cycles
+    later."""
 
     def __init__(self, facts: Facts, told: FaultHistory):
         self._facts = facts
@@ -77,12 +77,12 @@ class Reports:
         self._due = cycle + 1 if self._due is None else min(self._due, cycle + 1)
 
     def due(self, cycle: int) -> int | None:
-        """The cycle from which a report waits, if by ``cycle``."""
+        """Cycle from which a report waits, if not after ``cycle``."""
         found = [at for at in (self._due, self._differs(cycle - 2)) if at is not None and at <= cycle]
         return min(found, default=None)
 
     def send(self, handed: Sequence[int], idle: int) -> None:
-        """Send a report with bytes handed over in these cycles; the wire is idle from ``idle`` on."""
+        """Send a report with bytes handed over in these cycles."""
         self._handed = handed
         self._due, self._since = None, idle
 
@@ -95,7 +95,6 @@ class Reports:
         return report(self._facts, self._sent(handed))
 
     def _sent(self, handed: Sequence[int] | None) -> list[int]:
-        """The digits of the report with bytes handed over in these cycles; at first those without faults."""
         if handed is None:
             return [0] * self._places
         words = (self._told.at(cycle + 1) for cycle in handed[: self._places])

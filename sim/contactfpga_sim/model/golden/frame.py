@@ -1,4 +1,4 @@
-"""Frame: packing of a packet, division into barycenters, timing, and whether it is sent."""
+"""Frames: packing, division into barycenters, and which frames are sent."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Items:
 
     scan: Scan
     cells: np.ndarray
-    """(R, C) bool: the debounced cells."""
+    """(R, C) bool: debounced cells."""
     records: list[tuple[int, int]]
-    """(cycle, data) of every item, in cycle order."""
+    """(cycle, data) of every item, in order."""
     end: int
     """Cycle of the end mark."""
 
@@ -34,18 +34,18 @@ class Queue:
     """The queue of items before the packer."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
-        """Put a record in at a cycle; returns the cycle from which the packer can read it, and the item's bits."""
+        """Put a record in; returns the cycle from which the packer can read the item, and the item's bits."""
         return put + 2, data
 
     def take(self, cycle: int, item: int) -> None:
-        """The packer reads the last byte of the item offered last."""
+        """The packer reads the last byte of the latest item."""
 
     def pass_end(self, cycle: int) -> None:
         """The packer reads an end mark."""
 
 
 class Packer:
-    """Packs frame after frame, decides which are sent, and passes them to the link."""
+    """Packs frames, decides which are sent, and passes them to the link."""
 
     def __init__(self, facts: Facts, link: Link, queue: Queue):
         self._facts = facts
@@ -56,11 +56,11 @@ class Packer:
         self._since_hello = 0
         self._before: np.ndarray | None = None
         self.due = 0
-        """For a scan that waits: the cycle from which an unchanged frame is sent."""
+        """Cycle from which an unchanged frame is sent, for a scan that waits."""
         self._overwritten = 0
 
     def take(self, items: Items) -> int:
-        """Pack one frame; returns the cycle from which the next one's items can be read."""
+        """Pack one frame; returns the cycle from which the next frame's items can be read."""
         packet = Packet()
         for put, data in items.records[: self._facts.capacity]:
             offered, item = self._queue.offer(put, data)
@@ -128,15 +128,13 @@ def barycenter(total: int, area: int, fraction_bits: int) -> int:
 
 
 class Divider(Queue):
-    """Divides one zone at a time; items enter a trace when the packer reads them."""
+    """Divides one zone at a time; an item enters a trace when the packer reads it."""
 
     def __init__(self, facts: Facts, trace: Trace):
         self._facts = facts
         self._trace = trace
         self._free = 0
-        """Cycle from which a zone can begin."""
         self._gone = 0
-        """Cycle in which the previous item was read."""
 
     def offer(self, put: int, data: int) -> tuple[int, int]:
         begun = max(self._free, put + 2)
@@ -162,7 +160,7 @@ class Divider(Queue):
 
 
 def join(fields: tuple[tuple[int, int], ...]) -> tuple[int, int]:
-    """Bit fields (value, width) joined without gaps, the first lowest; and the total width."""
+    """Bit fields (value, width) joined without gaps, the first lowest; and their total width."""
     word = width = 0
     for value, field_width in fields:
         assert 0 <= value < 2**field_width, f"{value} does not fit {field_width} bits"

@@ -1,4 +1,4 @@
-"""Guard lines: their effect on the sheet, lines found faulty, and how long these are reported."""
+"""Guard lines: effect on the sheet, and reports of faulty lines."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from contactfpga_sim.model.golden.facts import Facts
 from contactfpga_sim.model.golden.trace import Timeline
 
 RETRY_US = 2**16
-"""The first whole round of checks after the clock passes a multiple of this renews the reports."""
+"""The first whole round of checks after the clock passes a multiple of this time renews the reports."""
 
 
 def closed(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
-    """(row lines, column lines) bool: closed switches with whole lines to both pins; with ``guard`` the guard lines are
-    last, and their corner is open."""
+    """(row lines, column lines) bool: closed switches with whole lines to both pins. Guard lines are last, with an open
+    corner."""
     cells, _ = timeline.at(cycle)
     shut = np.ones((facts.row_lines, facts.column_lines), bool)
     shut[-1, -1] = not facts.skin.guard
@@ -29,7 +29,7 @@ def closed(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
 
 
 def stuck(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed whatever is driven, a guard column last."""
+    """(column lines,) bool: columns that read pressed whatever is driven; a guard column is last."""
     _, columns = timeline.at(cycle)
     lines = np.zeros(facts.column_lines, bool)
     if columns is not None:
@@ -49,8 +49,8 @@ class FaultyLines:
     def check(
         self, lines: Literal["rows", "columns", "stuck"], found: np.ndarray, renews: bool, only: int | None = None
     ) -> None:
-        """Apply a check that finds these of all rows, columns or stuck columns faulty; or that checks ``only`` one row,
-        leaving the others. In a round that ``renews``, a line found good is no longer reported."""
+        """Apply a check that found these of all rows, columns or stuck columns faulty, or that checked ``only`` one
+        row. If it ``renews``, lines found good are no longer reported."""
         place = slice(None) if only is None else slice(only, only + 1)
         told = self._told[lines]
         kept = np.zeros_like(told) if renews else told
@@ -58,6 +58,6 @@ class FaultyLines:
 
     @property
     def word(self) -> int:
-        """Report word: rows in the lowest bits, then columns, then stuck columns, the guard column highest."""
+        """Report word, from the lowest bit: rows, columns, stuck columns, guard column."""
         bits = np.concatenate([self._told[name] for name in ("rows", "columns", "stuck")])
         return sum(1 << int(place) for place in np.flatnonzero(bits))

@@ -1,4 +1,4 @@
-"""Hello: a board's self-description, and the counters that it reports while it is sent (docs/protocol.md)."""
+"""Hello: a board's self-description with counters (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _units(facts: Facts) -> bytes:
 
 
 class State:
-    """The counters in a hello, by cycle."""
+    """Counters in a hello, by cycle."""
 
     def __init__(self, facts: Facts, scanned: Sequence[Scan], heard: Reception):
         self._facts = facts
@@ -64,8 +64,7 @@ class State:
         self._heard = heard
 
     def digit(self, place: int, cycle: int, sent: int, taken: int) -> int:
-        """The digit at a place of the state, read in ``cycle`` for a hello taken in cycle ``taken``, after this many
-        sent frames."""
+        """The digit at a place, read in ``cycle``, for a hello taken in cycle ``taken`` after ``sent`` frames."""
         if place < 7:
             return sent // 128**place % 128
         if place < 11:

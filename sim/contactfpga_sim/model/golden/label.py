@@ -1,6 +1,4 @@
-"""When a labeller emits its zones: where zones end is geometry, how many clocks that takes is the labeller's rule in
-docs/timing.md: clusters and steps of ``run``, columns of ``serial``. Labellers that are not exact, ``projection`` and
-``single``, have their own idea of a zone."""
+"""When labellers emit zones (docs/timing.md). ``projection`` and ``single`` define zones of their own."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labellin
 def labelling(
     cells: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> Labelling:
-    """Clocks and departures for an (R, C) bool frame."""
+    """A labeller's clocks and departures for an (R, C) bool frame."""
     cells = np.ascontiguousarray(cells, bool)
     return _labelling(cells.tobytes(), cells.shape, connectivity, labellers.find(labeller), closed)
 
@@ -31,7 +29,7 @@ def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labelle
 
 
 def exact(cells: np.ndarray, connectivity: int, strips: Strips, closed: bool = False) -> Labelling:
-    """The work of an exact labeller on an (R, C) bool frame; ``strips``: its clocks, ``LabellerRule.strips``."""
+    """Work of an exact labeller on an (R, C) bool frame; ``strips``: its clocks, as ``LabellerRule.strips``."""
     last_clock, busy, end = (clocks[0] for clocks in strips(cells[None], connectivity))
     labels, turned = closed_flood(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
     departures = []
@@ -51,12 +49,13 @@ def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[
 
 
 def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``LabellerRule.strips`` of ``run``, for every row of (N, R, C) bool frames."""
+    """``LabellerRule.strips`` of ``run``."""
     return _run_clocks(*_strips(frames, connectivity))
 
 
 def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Clocks of ``run`` on a closed sheet: one more step joins the last cluster with the first."""
+    """``LabellerRule.strips`` of ``run`` on a closed sheet, where one more step joins the last cluster with the
+    first."""
     last_step, steps = _strips(frames, connectivity)
     joined = _over_the_seam(frames, connectivity)
     steps = steps + joined
@@ -66,13 +65,13 @@ def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray
 
 def _run_clocks(last_step: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Clocks from a row to its last record, to the next row, and to the end mark. The first step is two clocks after
-    its row; an empty row below an empty one has no step."""
+    the row; an empty row below an empty one has no step."""
     busy = steps + 1 + (steps > 0)
     return last_step + 3, busy, busy + 2
 
 
 def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
+    """(N, R, C): last step of each column's cluster; (N, R): steps of each row."""
     before = _before(frames)
     taken = frames | before
     none = np.zeros(taken.shape[:2], bool)
@@ -96,7 +95,7 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
 
 
 def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``LabellerRule.strips`` of ``serial``, for every row of (N, R, C) bool frames."""
+    """``LabellerRule.strips`` of ``serial``."""
     above = _before(frames)
     above_left, left = (np.pad(cells, ((0, 0), (0, 0), (1, 0)))[..., :-1] for cells in (above, frames))
     more = above & ~above_left
@@ -113,7 +112,7 @@ def serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np
 
 
 def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """:func:`serial_clocks` where the ends meet."""
+    """``LabellerRule.strips`` of ``serial`` on a closed sheet."""
     leaves, busy, end = serial_clocks(frames, connectivity)
     seam = 2 * _over_the_seam(frames, connectivity)
     leaves[..., -1] += seam * (_before(frames) | frames)[..., -1]
@@ -121,19 +120,18 @@ def closed_serial_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndar
 
 
 def _before(frames: np.ndarray) -> np.ndarray:
-    """(N, R, C) bool: the row before each; there are no cells before the first."""
     return np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
 
 
 def _over_the_seam(frames: np.ndarray, connectivity: int) -> np.ndarray:
-    """(N, R) bool: whether the ends of a row and the one before it are joined over the seam."""
+    """(N, R) bool: whether a row and the row before are joined over the seam."""
     ends = np.stack([_before(frames)[..., [0, -1]], frames[..., [0, -1]]])  # which row, N, R, first or last column
     return np.asarray(ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
 
 
 def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
     """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band.
-    ``connectivity`` makes no difference."""
+    ``connectivity`` is ignored."""
     rows, columns = cells.shape
     pressed = np.any(cells, axis=1)
     walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
@@ -148,7 +146,7 @@ def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
 
 
 def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
-    """All pressed cells of an (R, C) bool frame as one zone. ``connectivity`` makes no difference."""
+    """All pressed cells of an (R, C) bool frame as one zone. ``connectivity`` is ignored."""
     rows, columns = cells.shape
     any_pressed = bool(cells.any())
     walks = [*np.any(cells[:-1], axis=1).tolist(), any_pressed]
@@ -157,7 +155,6 @@ def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
 
 
 def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labelling:
-    """A row that is walked takes this many clocks more; the end mark comes three clocks after the last row's walk."""
     steps = [clocks if walk else 0 for walk in walks]
     return Labelling(tuple(step + 1 for step in steps), steps[-1] + 3, tuple(departures))
 
@@ -173,7 +170,6 @@ SINGLE = LabellerRule(single)
 
 
 def _exact_rule(strips: Strips, closed: Strips) -> LabellerRule:
-    """The rule of an exact labeller with these clocks, on a plane and where the sheet's ends meet."""
     around = LabellerRule(functools.partial(exact, strips=closed, closed=True), closed)
     return LabellerRule(functools.partial(exact, strips=strips), strips, around)
 

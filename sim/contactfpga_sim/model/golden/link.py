@@ -1,5 +1,4 @@
-"""Link: hellos, fault reports, frames and unit readings share the wire; the newest complete frame waits, and the newest
-sweep of all units. Several sheets share one line, round-robin."""
+"""The link: hellos, fault reports, frames and unit readings share the wire, and several sheets a line."""
 
 from __future__ import annotations
 
@@ -20,43 +19,40 @@ class Sender(Protocol):
         """The cycle from which a packet waits, as known in ``cycle``; None: none."""
 
     def take(self, taken: int, cycle: int) -> None:
-        """Send the next packet from the cycle ``taken`` on."""
+        """Send the next packet from cycle ``taken`` on."""
 
 
 class SharedLine:
     """Asks one sheet per cycle, round-robin, until one sends a packet; then the next is asked.
 
-    Each sheet's time advances by :meth:`advance`. The line is known up to the cycle that all have reached, so a sheet's
-    thread that is ahead waits for the others.
+    A sheet's thread that is ahead waits until all sheets have reached its cycle by :meth:`advance`.
     """
 
     def __init__(self, sheets: int):
         self.links: dict[int, Sender] = {}
-        """Links by sheet number."""
         self.idle_from = 0
-        """The cycle from which a packet can be taken."""
+        """Cycle from which a packet can be taken."""
         self.uart_from = 0
-        """The cycle from which a byte can be handed over."""
+        """Cycle from which a byte can be handed over."""
         self._sheets = sheets
         self._first_asked = 0
-        """The sheet asked in the cycle ``idle_from``."""
         self._reached = [-1.0] * sheets
         self._changed = threading.Condition()
 
     def advance(self, number: int, cycle: int) -> None:
-        """Advance the line up to and including ``cycle``."""
+        """Advance the line by this sheet up to and including ``cycle``."""
         with self._changed:
             self._reach(number, cycle)
             while min(self._reached) < cycle:
                 self._changed.wait()
 
     def leave(self, number: int) -> None:
-        """A sheet has ended: nobody waits for it any more."""
+        """Stop waiting for a sheet that has ended."""
         with self._changed:
             self._reach(number, math.inf)
 
     def _reach(self, number: int, cycle: float) -> None:
-        """Advance this sheet alone to a cycle that not all have reached; all links stand still meanwhile."""
+        """Advance this sheet alone; all links stand still meanwhile."""
         before, self._reached[number] = min(self._reached), cycle
         known = min(self._reached)
         if known > before or self._sheets == 1:
@@ -75,7 +71,7 @@ class SharedLine:
             self.links[number].take(taken, known)
 
     def _first(self, number: int, known: int) -> tuple[int, int] | None:
-        """When this sheet's packet is taken, if no other's is earlier; and the sheet."""
+        """(cycle, sheet) of this sheet's next packet, if no other's is earlier."""
         wait = self.links[number].waits_from(known)
         if wait is None:
             return None
@@ -85,11 +81,11 @@ class SharedLine:
 
 
 class Link:
-    """Order of packets on the wire. Time only advances, by :meth:`advance`.
+    """Order of packets on the wire. Time only advances.
 
-    ``told``: the scan's fault words, known up to the cycle of each :meth:`advance`; finally up to that of
-    :meth:`finish`. ``units``: (cycle from which it waits, packet) of each sweep, replaced by the next. ``line``: shared
-    with other links; by default its own.
+    ``told``: the scan's fault words, known up to the cycle of each :meth:`advance`, at the end of :meth:`finish`.
+    ``units``: (cycle from which it waits, packet) of each sweep, replaced by the next. ``line``: shared with other
+    links; by default its own.
     """
 
     def __init__(
@@ -101,9 +97,8 @@ class Link:
         line: SharedLine | None = None,
     ):
         self.bytes: list[tuple[int, int]] = []
-        """(cycle, value) of every byte handed to the UART so far."""
+        """(cycle, value) of every byte handed to the UART."""
         self.sent = 0
-        """Frames sent so far."""
         self._facts = facts
         self._state = state
         self._byte_clocks = 10 * facts.bit_clocks
@@ -113,22 +108,18 @@ class Link:
         self._frame: tuple[int, bytes] | None = None
         self._reports = Reports(facts, told or FaultHistory()) if facts.fault_bits else None
         self._reported: list[int] = []
-        """Positions in ``bytes`` of reports, not yet filled in."""
         self._after_report = -1
-        """The cycle from which the wire was idle after the last report or self-test slot."""
         self._slot: tuple[int, bytes] | None = None
         self._slot_over: int | None = None
         self._units = units
         self._swept = 0
-        """Sweeps sent, or replaced by a sent one."""
         self._frames_since = 0
-        """Frames sent since the last sweep."""
         self._line = line or SharedLine(1)
         self._number = 0 if facts.place is None else facts.place[0]
         self._line.links[self._number] = self
 
     def want_hello(self, cycle: int) -> None:
-        """A hello waits from ``cycle`` on; one hello answers all requests until it is taken."""
+        """A hello waits from ``cycle`` on, and answers all requests until it is taken."""
         self._hellos.append(cycle)
 
     def offer(self, cycle: int, packet: bytes) -> None:
@@ -149,7 +140,7 @@ class Link:
         self._slot_over = None
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which the slot was completely taken, if not after ``cycle``."""
+        """Cycle in which the whole slot was taken, if not after ``cycle``."""
         self.advance(cycle)
         return self._slot_over if self._slot_over is not None and self._slot_over <= cycle else None
 
@@ -158,7 +149,6 @@ class Link:
         self._line.advance(self._number, cycle)
 
     def waits_from(self, cycle: int) -> int | None:
-        """The cycle from which a packet waits, as known in ``cycle``."""
         due = self._due(cycle)
         frame_from = [self._frame[0]] if self._frame else []
         slot_from = [self._slot[0]] if self._slot else []
@@ -166,7 +156,6 @@ class Link:
         return min((*self._hellos, *frame_from, *slot_from, *([] if due is None else [due]), *swept), default=None)
 
     def take(self, taken: int, cycle: int) -> None:
-        """Take the next packet in the cycle ``taken``, as known in ``cycle``."""
         due = self._due(cycle)
         if self._hellos and min(self._hellos) <= taken:
             self._hellos = [wait for wait in self._hellos if wait > taken]
@@ -188,8 +177,7 @@ class Link:
         return self._reports.due(cycle) if self._reports and self._line.idle_from <= cycle else None
 
     def finish(self, cycle: int) -> None:
-        """Advance the wire up to ``cycle``, and fill in the hellos' state, now that all inputs during them are
-        known."""
+        """Advance the wire up to ``cycle``, and fill in the hellos' state."""
         self.advance(cycle)
         for begin, taken, sent in self._blank:
             self._fill_in(begin, taken, sent)
@@ -199,7 +187,6 @@ class Link:
             self.bytes[begin : begin + len(handed)] = list(zip(handed, self._reports.packet(handed), strict=True))
 
     def _frame_is_next(self, cycle: int) -> bool:
-        """Whether a waiting frame is next, right after a report."""
         return cycle == self._after_report and self._frame is not None and self._frame[0] <= cycle
 
     def _send_report(self, taken: int) -> None:
@@ -211,7 +198,6 @@ class Link:
         self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._line.idle_from)
 
     def _sweep_is_next(self, cycle: int) -> bool:
-        """Whether a waiting sweep is next, after four frames."""
         waits = self._swept < len(self._units) and self._units[self._swept][0] <= cycle
         return waits and self._frames_since >= 4
 
@@ -223,7 +209,7 @@ class Link:
         self._send(taken, packet)
 
     def _send_slot(self, taken: int, packet: bytes) -> None:
-        """Send a slot; it is over in the cycle after the handover of the last byte before its check."""
+        """Send a slot, which is over in the cycle after the handover of the last byte before its check."""
         assert self._reports is not None
         begin, self._slot = len(self.bytes), None
         self._send(taken, packet)
@@ -238,7 +224,6 @@ class Link:
         self._send(taken, hello(self._facts))
 
     def _fill_in(self, begin: int, taken: int, sent: int) -> None:
-        """Fill in a hello's digits, each read in the cycle after the transfer of the byte before it."""
         before = (self.bytes[begin + place - 1][0] for place in DIGITS)
         digits = [self._state.digit(place, at + 1, sent, taken) for place, at in enumerate(before)]
         packet = hello(self._facts, digits)

@@ -1,17 +1,17 @@
-"""Packet: plain bytes to bytes on the wire, with stuffing and check."""
+"""Packing of bytes for the wire, with stuffing and check."""
 
 from __future__ import annotations
 
 
 class Packet:
-    """A packet being packed: COBS blocks fill up."""
+    """A packet being packed into COBS blocks."""
 
     def __init__(self) -> None:
         self._plain = bytearray()
         self._block = 0
 
     def push(self, plain: bytes) -> int:
-        """Pack bytes; returns the cycles that this needs."""
+        """Pack bytes; returns the number of cycles."""
         cycles = 0
         for byte in plain:
             cycles += 1
@@ -23,14 +23,14 @@ class Packet:
         return cycles
 
     def wire(self, before: bytes = b"", after: bytes = b"") -> bytes:
-        """The packet as on the wire: stuffed bytes, ``after``, check bytes, delimiter. The check covers ``before`` as
-        well."""
+        """The packet as on the wire: stuffed bytes, ``after``, check bytes, delimiter. The check also covers
+        ``before``."""
         stuffed = stuff(bytes(self._plain)) + after
         return stuffed + check(stuffed, before) + b"\0"
 
 
 def check(stuffed: bytes, before: bytes = b"") -> bytes:
-    """The check bytes."""
+    """Check bytes of a packet."""
     crc = crc16(before + stuffed)
     return bytes(128 + piece for piece in (crc % 128, crc // 128 % 128, crc // 128**2))
 

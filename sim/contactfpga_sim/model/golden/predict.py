@@ -1,4 +1,4 @@
-"""All stages together: from a Skin and the cells over time to the events at every boundary."""
+"""All stages: from a Skin and cells over time to the events at every boundary."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from collections.abc import Iterable
 
 
 def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
-    """Behavior of a board of ``skin`` in cycles 0 to ``cycles`` - 1, by docs/timing.md."""
+    """Trace of a board of ``skin`` in cycles 0 to ``cycles`` - 1, by docs/timing.md."""
     trace, link, _ = _play(facts(skin), timeline, cycles)
     trace.bytes = link.bytes
     trace.line = uart.line(link.bytes, facts(skin).bit_clocks)
@@ -33,10 +33,10 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
 
 
 def predict_several(skins: Sequence[Skin], timelines: Sequence[Timeline], cycles: int) -> list[Trace]:
-    """Traces of sheets on one FPGA; their ``line`` and ``contact`` are shared.
+    """Traces of sheets on one FPGA, which share ``line`` and ``contact``.
 
-    Received bytes are the same in all timelines. Each sheet runs in a thread of its own, which waits for the others at
-    the shared line.
+    Received bytes are the same in all timelines. Each sheet has a thread, which waits for the others at the shared
+    line.
     """
     known = [Facts(skin, (number, len(skins))) for number, skin in enumerate(skins)]
     line = SharedLine(len(skins))
@@ -63,12 +63,12 @@ def _play_one(line: SharedLine, known: Facts, timeline: Timeline, cycles: int) -
 
 
 def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
-    """(cycle, rows) of every change of the driven rows in cycles 0 to ``cycles`` - 1; bit r is row r."""
+    """(cycle, rows) of every change of the driven rows; bit r is row r."""
     return [change for change in _play(facts(skin), timeline, cycles)[2].driven if change[0] < cycles]
 
 
 def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
-    """First cycles of frames, up to ``cycles`` and one beyond."""
+    """First cycles of frames up to ``cycles``, and one beyond."""
     return _play(facts(skin), timeline, cycles)[2].beginnings
 
 
@@ -102,7 +102,7 @@ def _play(
 
 
 class Pipeline:
-    """The stages after the scan: rows are handed over, records leave, frames are packed; all recorded in a trace."""
+    """The stages after the scan, which record all events in a trace."""
 
     def __init__(
         self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: FaultHistory, link: Link
@@ -114,33 +114,28 @@ class Pipeline:
         self._packer = packer
         self._scanned = scanned
         self.told: scan.Changes = []
-        """(cycle, faults) of every change of the reported faulty lines."""
+        """(cycle, faults) of every change of reported faulty lines."""
         self.well: list[int] = []
-        """Cycles in which a whole frame was packed, or an untouched sheet was checked."""
+        """Cycles in which a frame was packed or an untouched sheet checked."""
         self._free = 0
         self._handed = -1
         self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
 
     def tell(self, cycle: int, faults: int) -> None:
-        """Report these faulty lines from a cycle on."""
         if faults != (self.told[-1][1] if self.told else 0):
             self.told.append((cycle, faults))
             self._reported.change(cycle, faults)
 
     def watch(self, cycle: int) -> None:
-        """An untouched sheet was checked."""
         self.well.append(cycle)
 
     def slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
-        """Send a slot of the self-test from a cycle on."""
         self._link.offer_slot(cycle, number, rows, columns)
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which the slot was sent, if not after ``cycle``."""
         return self._link.slot_over(cycle)
 
     def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
-        """Take all rows of a frame; ``cells`` (R, C) are the debounced samples of ``one``."""
         work = self.labelling(cells)
         handed = []
         for row, offered in enumerate(one.offered):
@@ -157,19 +152,17 @@ class Pipeline:
 
     @property
     def due(self) -> int:
-        """The cycle from which a frame is due, for a scan that waits."""
         return self._packer.due
 
     def rows(self) -> RowPipeline:
-        """The rows of the next frame, for a scan that waits for each row's transfer."""
         return RowPipeline(self._facts, self)
 
     def taken(self, offered: int) -> int:
-        """The cycle in which a row offered from a cycle on is taken; at most one per clock."""
+        """Cycle in which a row offered from a cycle on is taken, at most one per clock."""
         return max(offered, self._handed + 1)
 
     def hand_over(self, taken: int, cells: np.ndarray, alone: bool, last: bool, earliest: int = 0) -> int:
-        """Hand a taken row to the labeller, a row driven alone through the debounce; returns the cycle."""
+        """Hand over a taken row, through the debounce if driven alone; returns the cycle."""
         cycle = max(taken + self._late * alone, self._free, earliest)
         self._handed = cycle
         self._trace.rows.append((cycle, _word(cells), last))
@@ -188,7 +181,7 @@ class Pipeline:
         handed: list[int],
         work: label.Labelling,
     ) -> int:
-        """Emit the records of the ``taken`` rows at these ``places`` of the sheet, and pack the frame."""
+        """Emit the records of the ``taken`` rows at these ``places``, and pack the frame."""
         facts = self._facts
         if facts.zones:
             records = [
@@ -214,7 +207,7 @@ class Pipeline:
 
 
 class RowPipeline:
-    """A frame row by row: an empty row separates rows that are not neighbors, so that zones have no gaps."""
+    """A frame row by row. Empty rows separate rows that are not neighbors."""
 
     def __init__(self, facts: Facts, stages: Pipeline):
         self._facts = facts
@@ -224,7 +217,6 @@ class RowPipeline:
         self._handed: list[int] = []
 
     def take(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> int:
-        """Hand over a row of (C,) debounced cells; returns the cycle in which the scan's offer is taken."""
         stages = self._stages
         taken = stages.taken(offered)
         cycle = stages.hand_over(taken, cells, alone, last, self._counted() if cells.any() else 0)
@@ -236,7 +228,6 @@ class RowPipeline:
         return taken if alone and self._facts.debounced else cycle
 
     def end(self, one: scan.Scan, cells: np.ndarray) -> int:
-        """Complete the frame; returns the cycle from which the next one may begin."""
         rows = self._cells
         return self._stages.end(one, cells, np.array(rows), self._places, self._handed, self._work(rows))
 
@@ -263,7 +254,6 @@ class RowPipeline:
 
 
 def _sum_y(zone: Departure, taken: np.ndarray, places: Sequence[int]) -> int:
-    """Row sum of a zone in the ``taken`` rows at these ``places``, numbered from 0 by the labelling."""
     pressed = taken.sum(axis=1)
     if zone.area == pressed.sum():
         return int(pressed @ np.array(places))
@@ -278,7 +268,6 @@ TICK_US = 1000
 
 
 def _fault(scanned: Iterable[scan.Scan], told: scan.Changes) -> scan.Changes:
-    """(cycle, level) of every change of the board's fault state: by a frame's tag, or by reported lines."""
     marks = [(one.told, 0, one.fault) for one in scanned] + [(cycle, 1, word > 0) for cycle, word in told]
     by_tag = by_lines = False
     levels = []
@@ -289,18 +278,15 @@ def _fault(scanned: Iterable[scan.Scan], told: scan.Changes) -> scan.Changes:
 
 
 def _either(one: scan.Changes, other: scan.Changes) -> scan.Changes:
-    """Changes of the OR of two levels."""
     cycles = sorted({cycle for cycle, _ in (*one, *other)})
     return _changes((cycle, _level(one, cycle) | _level(other, cycle)) for cycle in cycles)
 
 
 def _later(level: scan.Changes) -> scan.Changes:
-    """Changes of a registered level, one cycle later."""
     return [(cycle + 1, high) for cycle, high in level]
 
 
 def _alive(facts: Facts, well: Sequence[int], faulty: scan.Changes, cycles: int) -> scan.Changes:
-    """Changes of the alive pin, from the rising cycles in which the sheet was ``well``."""
     period, level, changes = TICK_US * facts.clocks_per_us, 0, []
     for tick in range(period - 1, cycles, period):
         last = bisect.bisect_left(well, tick) - 1  # the last time before the tick, as a later one is after more faults
@@ -321,7 +307,7 @@ def _rises(changes: scan.Changes, begin: int, end: int) -> bool:
 
 
 def _changes(levels: Iterable[tuple[int, int]]) -> scan.Changes:
-    """The effective (cycle, level) changes, the last one of each cycle; low at first."""
+    """The effective (cycle, level) changes, the last of each cycle; initially low."""
     found: scan.Changes = []
     for cycle, level in dict(levels).items():
         if level != (found[-1][1] if found else 0):

@@ -1,4 +1,4 @@
-"""The raster scan: samples and their cycles, contact pin, stuck columns, guard-line checks, device time."""
+"""The raster scan: samples, contact pin, stuck columns, guard checks, device time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga_sim.model.golden.trace import Timeline
 
 
 class Raster(ScanRule):
-    """Row after row, each of the same duration."""
+    """Row after row, each for the same time."""
 
     even = True
     waits = False
@@ -51,24 +51,23 @@ RASTER = Raster()
 
 
 def strobe(facts: Facts, slot: int) -> int:
-    """The cycle in which a slot's sample has passed shift registers and synchronizers."""
+    """Cycle in which a slot's sample has passed shift registers and synchronizers."""
     return sampled(facts, slot) + 2 + facts.column_shift
 
 
 def sampled(facts: Facts, slot: int) -> int:
-    """The cycle whose column levels count for a slot."""
+    """Cycle whose column levels a slot samples."""
     return facts.row_shift + slot * facts.row_clocks + facts.settle - 1
 
 
 def _asked_before(facts: Facts, slot: int) -> int:
-    """The cycle from which a request is too late for a frame that begins with this slot."""
     if facts.samples_early:
         return facts.row_shift + slot * facts.row_clocks
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
 
 
 def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
-    """The first ``count`` scans, with the requests in order of reception."""
+    """The first ``count`` scans; requests are in order of reception."""
     result = []
     for index in range(count):
         slots = row_slots(facts, index)
@@ -112,18 +111,16 @@ def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
 
 
 def row_slots(facts: Facts, frame: int) -> range:
-    """The slots of a frame's rows; a guard row has the slot before them."""
+    """Slots of a frame's rows; a guard row's slot is before them."""
     end = (frame + 1) * facts.row_lines
     return range(end - facts.rows, end)
 
 
 def _row(facts: Facts, slot: int) -> int:
-    """The row of a slot, a guard row counting as the last."""
     return (slot - (facts.row_lines - facts.rows)) % facts.row_lines
 
 
 def _line(facts: Facts, slot: int) -> int:
-    """The driven line of a slot."""
     return (*(facts.skin.row_order or range(facts.rows)), facts.rows)[_row(facts, slot)]
 
 
@@ -135,8 +132,8 @@ def _read(facts: Facts, timeline: Timeline, slot: int, ahead: int = 0) -> np.nda
 
 
 def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed with no row driven, from the sample before the frame's first slot
-    to the one before its last."""
+    """(column lines,) bool: columns that read pressed with no row driven, from the sample before the first slot to the
+    one before the last."""
     columns = np.zeros(facts.column_lines, bool)
     for slot in range(max(0, frame * facts.row_lines), (frame + 1) * facts.row_lines):
         if slot:
@@ -145,8 +142,7 @@ def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
 
 
 def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Request] = ()) -> list[Changes]:
-    """By frame the reported faults: (cycle, word) of each check, the last at the frame's end. A frame sampled early has
-    no row checks."""
+    """By frame (cycle, word) of each check. A frame sampled early has no row checks."""
     if not facts.skin.guard:
         return [[]] * count
     told, result = FaultyLines(facts), []
@@ -168,7 +164,8 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
 
 
 def _renews(facts: Facts, frame: int) -> bool:
-    """Whether a frame's checks end obsolete reports: the us clock passed a multiple of 2^16 in the previous frame."""
+    """Whether a frame's checks end obsolete reports, as the us clock passed a multiple of 2^16 in the previous
+    frame."""
     late = facts.column_shift + (facts.rows - 1) * facts.row_clocks
 
     def retries(ended: int) -> int:

@@ -1,4 +1,4 @@
-"""Requests and commands: the host's bytes, the board's interpretation, and the number it repeats (docs/protocol.md)."""
+"""Requests and commands of the host, and the board's answer in a hello (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ _CHECK_BYTES = 3
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """A request, accepted in ``cycle``."""
+    """A request accepted in ``cycle``."""
 
     cycle: int
     number: int
     hello: bool
-    """Whether it requests a hello."""
+    """Whether a hello is requested."""
     command: tuple[int, int] | None = None
     """(what, value) of a command."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Reception:
-    """The board's reading of the bytes at its receive pin."""
+    """The board's reading of received bytes."""
 
     requests: list[Request]
     numbers: list[tuple[int, int]]
-    """(cycle, number) of every change of the number in a hello."""
+    """(cycle, number) of every change of the hello's number."""
 
     def number(self, cycle: int) -> int:
         """The number in a hello whose digit is read in ``cycle``."""
@@ -40,10 +40,8 @@ class Reception:
 
 
 def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"", kind: int = KIND) -> bytes:
-    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit.
-
-    ``closing``: the addressed sheet's, among several. Another ``kind`` makes it no request.
-    """
+    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit. ``closing``:
+    of the addressed sheet among several. Another ``kind`` makes an invalid request."""
     return _sent(_digits(number, 3) + bytes([kind << 4 | hello]), bit_clocks, closing)
 
 
@@ -65,15 +63,14 @@ def _sent(plain: bytes, bit_clocks: int, closing: bytes = b"") -> bytes:
 
 
 def pulses(data: bytes) -> bytes:
-    """The bytes for a board whose bits are too short: a byte for each bit, lowest first, and one for each zero byte."""
+    """Bytes as pulses, for short bits: one byte per bit, lowest first, and one per zero byte."""
     mark, one, zero = b"\xf0", b"\xff", b"\x00"
     parts = [[one if bit == "1" else zero for bit in f"{value:08b}"[::-1]] if value else [mark] for value in data]
     return b"".join(b"".join(part) for part in parts)
 
 
 def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
-    """A request at each cycle, numbered as a host does, every other one for a hello. Requests that would overlap are
-    omitted."""
+    """A request at each cycle, every other one for a hello, without those that would overlap."""
     sent: list[tuple[int, bytes]] = []
     number = 129 * 128 + 1
     for cycle in cycles:
@@ -87,8 +84,8 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
 def heard(
     received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False, closing: bytes = b""
 ) -> Reception:
-    """Requests and supported ``commands`` in (cycle, bytes), which begin back to back at the pin in that cycle;
-    ``closing``: this sheet's among several."""
+    """Requests and supported ``commands`` in (cycle, bytes), back to back at the pin from that cycle on; ``closing``:
+    of this sheet among several."""
     found = Reception([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):
@@ -108,7 +105,6 @@ def heard(
 
 
 def _read(packet: list[int], cycle: int, commands: bool, closing: bytes) -> Request | None:
-    """The request in a packet, if any. With commands, bit 3 of the first byte marks them."""
     is_command = commands and packet[:1] != [] and bool(packet[0] & 8)
     stuffed, kind = (9, COMMAND_KIND) if is_command else (5, KIND)
     checked = stuffed + len(closing)

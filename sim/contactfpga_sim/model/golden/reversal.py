@@ -1,4 +1,4 @@
-"""The scan by line reversal: when rows are read, which rows are then driven, and the contact pin."""
+"""The scan by line reversal: when rows are read and driven, and the contact pin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contactfpga_sim.model.golden.scan import Changes, Play, Rows, Scan, ScanOut
 
 @dataclasses.dataclass(frozen=True)
 class Slot:
-    """A row driven from cycle ``begin`` to cycle ``end``; its columns are sampled in the last one, or earlier."""
+    """A row driven from cycle ``begin`` to ``end``, whose columns are sampled in the last one or earlier."""
 
     row: int
     begin: int
@@ -25,13 +25,13 @@ class Slot:
 
     @property
     def strobe(self) -> int:
-        """The cycle in which the sample has passed the synchronizer."""
+        """Cycle in which the sample has passed the synchronizer."""
         return self.sample + 2
 
 
 class RowOffers:
-    """Rows of a frame that are offered: with zones the driven rows, each followed by an empty one if its next neighbor
-    is not driven; otherwise all."""
+    """Offered rows of a frame: with zones the driven ones, each followed by an empty one unless its next neighbor is
+    driven; otherwise all."""
 
     def __init__(self, facts: Facts, rows: Rows):
         self.taken = 0
@@ -69,13 +69,13 @@ class RowOffers:
 
 
 class ReversalScanModel:
-    """Runs through a timeline frame by frame; the stages decide when a row and a frame are taken."""
+    """Runs through a timeline frame by frame; the stages decide when rows and frames are taken."""
 
     def __init__(self, play: Play):
         facts = play.facts
         self.slots: list[Slot] = []
         self.begun: list[int] = []
-        """For each frame the cycle in which the rows count, after the synchronizer."""
+        """By frame the cycle in which the rows count, after the synchronizer."""
         self.contact: Changes = []
         self._facts = facts
         self._timeline = play.timeline
@@ -92,7 +92,7 @@ class ReversalScanModel:
         self.test = SelfTestModel(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
 
     def frame(self) -> None:
-        """The next frame."""
+        """Run the next frame."""
         begun = self._begin()
         self._held.look(begun)
         touched = self._touched(begun - 2)
@@ -121,7 +121,7 @@ class ReversalScanModel:
     # ---- when a frame begins
 
     def _begin(self) -> int:
-        """The start of the next frame: rows were released long enough, and the last frame is packed; an untouched sheet
+        """Start of the next frame: rows were released long enough, and the last frame is packed; an untouched sheet
         waits for a touch or request."""
         project = self._facts.project
         if not self._rests:
@@ -151,14 +151,12 @@ class ReversalScanModel:
             begin = self._listens + project + 1
 
     def _after_tests(self, begin: int) -> int:
-        """The start of a frame planned for this cycle, after the self-test slots that are wanted by then."""
         while self._test_asked(begin, begin) is not None:
             self._test_at(begin)
             begin = self._listens + self._facts.project + 1
         return begin
 
     def _test_asked(self, begin: int, until: int) -> int | None:
-        """The first cycle from ``begin`` to ``until`` in which a wanted self-test slot can begin."""
         begin = max(begin, self._packed)
         asked = self.test.asked(until) if self.test and begin <= until else None
         return None if asked is None else max(asked, begin)
@@ -171,20 +169,17 @@ class ReversalScanModel:
 
     @property
     def _word(self) -> int:
-        """The current fault word."""
         joined = self.test is not None and self.test.joined
         checked = self._facts.fault_bits - 1 if joined else 0
         return (self.checks.word if self.checks else 0) | joined << checked
 
     def _watch(self, begin: int, end: int) -> None:
-        """The sheet rests in these cycles; without guard lines that is reported now and then."""
         period = reversal_lines.CHECK_US * self._facts.clocks_per_us
         if not self.checks:
             for cycle in range(-(-begin // period) * period, end + 1, period):
                 self._stages.watch(cycle)
 
     def _wake(self, touched: int) -> int:
-        """The cycle in which a touched row of this cycle is seen."""
         seen = touched + 2
         self._held.cut(seen)
         if self._touched(touched) & self._clean_rows():
@@ -192,28 +187,24 @@ class ReversalScanModel:
         return seen
 
     def _listen_after(self, checked: int, guard_is_stuck: bool) -> None:
-        """A check was sampled in this cycle."""
         if guard_is_stuck:
             self._held.guard_found(checked + 2)
         self._listens = checked + 2
         self._stages.tell(checked + 3, self._word)
 
     def _wanted(self) -> int:
-        """The first cycle in which a frame is wanted without a touch."""
         before = self.begun[-1]
         if self._facts.skin.send == "always":
             return before + 1
         return max(before + 1, min([*(one.cycle + 1 for one in self._waiting()), self._stages.due]))
 
     def _waiting(self) -> list[Request]:
-        """Requests not yet answered by a frame."""
         before = self.begun[-1] if self.begun else 0
         return [one for one in self._requests if one.cycle >= before]
 
     # ---- what the sheet shows while the board listens
 
     def _touched(self, cycle: int) -> frozenset[int]:
-        """Rows that read touched at the pins, without fully masked ones."""
         facts = self._facts
         driven = ~self._held.undriven(cycle) & ~stuck(facts, self._timeline, cycle)
         lines = closed(facts, self._timeline, cycle)[: facts.rows] & driven
@@ -224,14 +215,12 @@ class ReversalScanModel:
         return set(np.flatnonzero(~self._facts.mask.any(axis=1)).tolist())
 
     def _first_touched(self, begin: int, end: int) -> int | None:
-        """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
         changes = {begin, *self._changes, *self._held.driven_anew(begin, end)}
         return next((cycle for cycle in sorted(changes) if begin <= cycle <= end and self._touched(cycle)), None)
 
     # ---- rows that are driven
 
     def _drive(self, begun: int, todo: list[int], rows: Rows, cells: np.ndarray) -> np.ndarray:
-        """Drive the rows and fill in ``cells``; returns the (R, C) bool debounced cells."""
         facts = self._facts
         counted = np.zeros_like(cells)
         offers = RowOffers(facts, rows)

@@ -1,5 +1,4 @@
-"""Fault knowledge of line reversal: stuck columns, which are not driven; guard checks of rows and columns; slots of the
-self-test and their readings."""
+"""Line reversal's knowledge of faults: stuck columns, guard checks, and the self-test."""
 
 from __future__ import annotations
 
@@ -17,18 +16,16 @@ from contactfpga_sim.model.golden.scan import Stages
 from contactfpga_sim.model.golden.trace import Timeline
 
 LOOKS = 4
-"""Sample times of a window, each at least ``apart`` cycles after the one before."""
+"""Samples of a window, each at least ``apart`` cycles after the one before."""
 
 
 @dataclasses.dataclass(frozen=True)
 class _State:
-    """State after a cycle."""
-
     cycle: int
     count: int
-    """Cycles of the window; it stops before each of the :data:`LOOKS` until this happens."""
+    """Cycles of the window; the count stops before each of the :data:`LOOKS` until that happens."""
     low: np.ndarray
-    """(C,) bool: columns that read pressed at each sample of the window."""
+    """(C,) bool: columns that read pressed at each sample of the window so far."""
     stuck: np.ndarray
     """(C,) bool: columns found stuck."""
     asked: bool = False
@@ -42,7 +39,7 @@ class _State:
 
 
 class StuckColumns:
-    """Runs through a timeline with the scan, which reports when it samples the columns; cycles rise."""
+    """Runs through a timeline with the scan, which reports its samples of the columns in order of cycles."""
 
     def __init__(self, facts: Facts, timeline: Timeline):
         self._facts = facts
@@ -57,7 +54,7 @@ class StuckColumns:
         self._guard: list[int] = []
 
     def rests(self, begin: int, end: int) -> None:
-        """Sample in each of these cycles."""
+        """Sample in each of these cycles of a rest."""
         if begin <= end:
             self._go_to(self._passed(begin - 1))
             self._rest(end)
@@ -110,7 +107,6 @@ class StuckColumns:
         return np.append(columns, np.full(self._facts.column_lines - self._facts.columns, held))
 
     def _passed(self, cycle: int) -> _State:
-        """The state without a sample up to this cycle."""
         state = self._states[-1]
         waits = state.count // self._apart * self._apart + self._apart - 1
         count = min(state.count + cycle - state.cycle, waits)
@@ -122,7 +118,6 @@ class StuckColumns:
             self._go_to(self._alike(self._states[-1], end))
 
     def _alike(self, state: _State, end: int) -> _State:
-        """The state after all later samples with the same reading, in this window or in windows without changes."""
         first = state.cycle + 1
         later = [cycle + 2 for cycle in self._changes[bisect.bisect_right(self._changes, first - 2) :][:1]]
         later += [cycle + 4 for cycle in self._moved[-4:] if cycle + 4 > first]
@@ -149,8 +144,8 @@ class StuckColumns:
         return _State(cycle, 0, np.ones_like(low), found, asked=wraps, tries=state.asked)
 
     def _reads(self, cycle: int) -> np.ndarray:
-        """(C,) bool: columns that read pressed after the synchronizer: stuck ones, and undriven ones that a pressed
-        switch joins to a row that no other column lifts."""
+        """(C,) bool: columns that read pressed after the synchronizer: stuck ones, and undriven ones on a row that no
+        other column lifts."""
         facts, cycle = self._facts, cycle - 2
         held = stuck(facts, self._timeline, cycle)[: facts.columns]
         undriven = self.undriven(cycle)[: facts.columns] | ~self._present
@@ -160,7 +155,7 @@ class StuckColumns:
 
 
 CHECK_US = 2**8
-"""Interval of checks of a sheet at rest, by multiples of the clock."""
+"""Interval of checks of a resting sheet, by multiples of the clock."""
 
 
 class GuardChecks:
@@ -181,25 +176,24 @@ class GuardChecks:
 
     @property
     def word(self) -> int:
-        """The fault word, from three cycles after the last check's sample on."""
+        """Fault word from three cycles after the last check's sample on."""
         return self._told.word
 
     @property
     def asked(self) -> int:
-        """The cycle from which a sheet at rest is checked."""
+        """Cycle from which a resting sheet is checked."""
         period = CHECK_US * self._facts.clocks_per_us
         return (self._last // period + 1) * period + 1
 
     def after(self, sample: int) -> tuple[int, bool]:
-        """The last row of a frame was sampled; returns the cycle of the check's sample, and whether it finds the guard
-        column stuck."""
+        """Check after the last row of a frame was sampled; returns the cycle of the sample, and whether the guard
+        column reads stuck."""
         facts = self._facts
         wait = 1 + max(facts.project, facts.settle) if self._of_rows else facts.row_clocks
         return self._check(sample, sample + wait)
 
     def at_rest(self, cycle: int) -> tuple[int, bool]:
-        """The sheet rests in this cycle, the last before the check; returns the cycle of its sample, and whether it
-        finds the guard column stuck."""
+        """Check a resting sheet after this cycle; returns as :meth:`after`."""
         return self._check(cycle, cycle + self._facts.settle + (1 if self._of_rows else 2))
 
     def _check(self, start: int, sample: int) -> tuple[int, bool]:
@@ -232,7 +226,6 @@ class GuardChecks:
         return bool(self.word >> self._facts.rows + 2 * self._facts.columns)
 
     def _guard_reads(self, sample: int) -> bool:
-        """Whether the guard column reads pressed in a row check: it is stuck, or undriven and pulled by any row."""
         pulled = closed(self._facts, self._timeline, sample)[: self._facts.rows, -1].any()
         return bool(self._stuck(sample)[-1] or (pulled and self._held.undriven(sample)[-1]))
 
@@ -244,13 +237,13 @@ COMMAND = 1
 
 
 class SelfTestModel:
-    """Self-test slots: no line, each row, each column. At once after power-up; after a command as they are sent."""
+    """Self-test slots: no line, each row, each column; at once after power-up, after a command as they are sent."""
 
     def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], stages: Stages):
         self.discharged: list[tuple[int, int]] = []
         """(cycle, rows) of every change of the rows driven to the selecting level."""
         self.joined = False
-        """Joined lines as reported from three cycles after a slot's sample on."""
+        """Joined lines, from three cycles after a slot's sample on."""
         self._facts = facts
         self._timeline = timeline
         self._stages = stages
@@ -264,7 +257,7 @@ class SelfTestModel:
         self._rises = np.zeros(facts.rows + facts.columns, bool)
 
     def asked(self, until: int) -> int | None:
-        """The cycle from which a slot is wanted, if not after ``until``."""
+        """Cycle from which a slot is wanted, if not after ``until``."""
         if self._waits:
             over = self._stages.slot_over(until)
             if over is None:
@@ -293,7 +286,6 @@ class SelfTestModel:
         return sample
 
     def _go_on(self, cycle: int) -> None:
-        """A slot ends in this cycle."""
         last = self._number == self._facts.rows + self._facts.columns
         self._number += 1
         self._asked, self._idle = (None if last else cycle + 1), cycle + 1
@@ -301,7 +293,6 @@ class SelfTestModel:
             self._start(cycle)
 
     def _start(self, cycle: int) -> None:
-        """Start a test in this cycle if commands before it request one."""
         self._commands = [one for one in self._commands if one >= cycle]
         self._number, self._tells, self._asked = 0, True, cycle + 1
 

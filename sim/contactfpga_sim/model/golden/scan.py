@@ -1,4 +1,4 @@
-"""A scan's inputs, its outputs to the later stages, and its effect on the pins."""
+"""Inputs and outputs of a scan."""
 
 from __future__ import annotations
 
@@ -24,28 +24,27 @@ class Scan:
     offered: list[int]
     """Cycle in which each row is offered to the next stage."""
     stuck: int
-    """Number of columns, without a guard column, that read pressed while no row was driven."""
+    """Number of columns that read pressed with no row driven."""
     time_us: int
-    """Device time of the first row's strobe, less the column shift; unbounded."""
+    """Device time of the first row's strobe, less the column shift, unbounded."""
     requested: bool
     """Whether a request arrived since the previous scan began."""
     heard: int
-    """The lowest three bits of the last request's number before it began; 0 without any."""
+    """Lowest three bits of the last request's number; 0 without any."""
     told: int
-    """Cycle from which a hello reports its stuck columns."""
+    """Cycle from which a hello reports the stuck columns."""
     slots: int
-    """Its duration in row times."""
+    """Duration in row times."""
     alone: frozenset[int]
-    """Rows driven alone."""
     faults: int = 0
-    """Reported faults at its end: :attr:`contactfpga_sim.model.golden.guard.FaultyLines.word`."""
+    """:attr:`contactfpga_sim.model.golden.guard.FaultyLines.word` at the end."""
 
     motion: bool = False
-    """A row read touched at the frame's beginning, but empty when driven."""
+    """Whether a row read touched at the frame's beginning, but empty when driven."""
 
     @property
     def fault(self) -> bool:
-        """Whether its frame has the fault flag."""
+        """Whether the frame has the fault flag."""
         return self.stuck > 0 or self.faults > 0
 
 
@@ -55,62 +54,60 @@ Changes = list[tuple[int, int]]
 
 @dataclasses.dataclass(frozen=True)
 class ScanOutput:
-    """A scan's pin changes in the cycles requested, and beyond."""
+    """Pin changes of a scan."""
 
     contact: Changes
-    """Changes of the contact pin."""
     driven: Changes
     """Changes of the driven rows; bit r is row r."""
     beginnings: list[int]
-    """First cycles of frames, one of them beyond."""
+    """First cycles of frames, one beyond."""
 
 
 class Rows(Protocol):
-    """A frame's rows, for a scan that waits for each transfer."""
+    """Rows of a frame, for a scan that waits for each transfer."""
 
     def take(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> int:
-        """Offer a row of the sheet, (C,) debounced cells, from a cycle on; ``alone``: it was driven. Returns the cycle
-        of the transfer."""
+        """Offer a row, (C,) debounced cells, from cycle ``offered`` on; ``alone``: whether the row was driven. Returns
+        the cycle of the transfer."""
 
     def end(self, one: Scan, cells: np.ndarray) -> int:
-        """All rows were taken, (R, C) ``cells``; returns the cycle from which the next frame may begin."""
+        """Complete a frame of (R, C) ``cells``; returns the cycle from which the next one may begin."""
 
 
 class Stages(Protocol):
-    """The stages after the scan."""
+    """Stages after the scan."""
 
     @property
     def due(self) -> int:
-        """The cycle from which a frame is due, for a scan that waits."""
+        """Cycle from which a frame is due, for a scan that waits."""
 
     def tell(self, cycle: int, faults: int) -> None:
-        """Report these faulty lines from a cycle on, no earlier than before. Call it before any frame with bytes on the
-        wire in that cycle."""
+        """Report faulty lines from a cycle on. Cycles rise, and no frame with bytes on the wire in that cycle came
+        before."""
 
     def watch(self, cycle: int) -> None:
-        """An untouched sheet was checked in a cycle, for a scan that waits."""
+        """An untouched sheet was checked, for a scan that waits."""
 
     def slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
-        """Send a self-test slot, with read lines as bits, from a cycle on."""
+        """Send a self-test slot from a cycle on; read lines are bits."""
 
     def slot_over(self, cycle: int) -> int | None:
-        """The cycle in which the slot was sent, if not after ``cycle``; everything earlier must have been reported."""
+        """Cycle in which the slot was sent, if not after ``cycle``. All earlier events must have been reported."""
 
     def frame(self, one: Scan, cells: np.ndarray) -> None:
-        """All rows of a frame, ``cells`` (R, C) debounced; the scan does not wait."""
+        """Take all rows of a frame, (R, C) debounced ``cells``, at once."""
 
     def rows(self) -> Rows:
-        """The next frame, row by row."""
+        """Next frame, row by row."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Play:
-    """Inputs of a scan."""
+    """Inputs of a scan, its cycles and the later stages."""
 
     facts: Facts
     timeline: Timeline
     requests: Sequence[Request]
-    """Requests in order of arrival."""
     cycles: int
     stages: Stages
 
@@ -120,12 +117,11 @@ class ScanRule(ScanTiming):
 
     @abc.abstractmethod
     def scan(self, play: Play) -> ScanOutput:
-        """The frames of all its cycles, or more; each is passed to its stages."""
+        """Run all cycles, or more, and pass each frame to the stages."""
 
 
 def early_clocks(facts: Facts, requests: Sequence[Request], late: int) -> int:
-    """Clocks by which a frame's samples precede the end of the settle time, by the commands received before cycle
-    ``late``."""
+    """Clocks by which a frame's samples precede the settle time's end, by commands before cycle ``late``."""
     moved = [one.command[1] for one in requests if one.cycle < late and one.command and one.command[0] == 2]
     fits = moved and facts.samples_early and facts.first_sample <= moved[-1] < facts.settle
     return facts.settle - moved[-1] if fits else 0

@@ -1,4 +1,4 @@
-"""Inputs and outputs: cells over time, and events at the stage boundaries."""
+"""Inputs of a board over time, and events at the stage boundaries."""
 
 from __future__ import annotations
 
@@ -16,39 +16,38 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact", "alive")
-"""Boundaries at which model and gateware are compared, in order of the data; see :func:`boundaries`."""
+"""Boundaries at which model and gateware are compared, in order of the data."""
 
 
 def boundaries(skin: Skin) -> tuple[str, ...]:
-    """The :data:`BOUNDARIES` of a Skin's board: items differ from records if they are divided."""
+    """:data:`BOUNDARIES` of a Skin's board."""
     has = {"items": skin.report == "barycenter", "alive": skin.alive}
     return tuple(name for name in BOUNDARIES if has.get(name, True))
 
 
 @dataclasses.dataclass(frozen=True)
 class Cuts:
-    """Cut lines; a guard row counts as the last row, a guard column as the last column."""
+    """Cut lines; guard lines count as the last row and column."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """By row the first column whose switches no longer reach the row's pin."""
+    """By row the first column whose switches do not reach the row's pin."""
     columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """By column the first row whose switches no longer reach the column's pin."""
+    """By column the first row whose switches do not reach the column's pin."""
 
     def reach(self, row: int, column: int) -> bool:
-        """Whether a switch is still connected to both pins."""
+        """Whether a switch is connected to both pins."""
         return column < self.rows.get(row, column + 1) and row < self.columns.get(column, row + 1)
 
 
 @dataclasses.dataclass(frozen=True)
 class Timeline:
-    """Inputs at the board's pins, from cycle 0 on.
+    """Inputs at the board's pins from cycle 0 on.
 
-    ``pieces`` are (start cycle, cells, stuck): from then on the (R, C) bool ``cells`` are pressed, and the (C,) bool
-    ``stuck`` columns (or None) read pressed whatever row is driven; with a guard column (C + 1,) is allowed. Starts
-    rise; before the first nothing is pressed. ``received`` are (cycle, bytes): bytes back to back at the receive pin,
-    whose first start bit begins in that cycle; cycles rise without overlap. ``units`` are (start cycle, readings) of
-    the converter's inputs, at first 0. ``cuts`` are (start cycle, :class:`Cuts`) at rising starts; at first all lines
-    are whole.
+    ``pieces``: (start cycle, cells, stuck); from then on the (R, C) bool ``cells`` are pressed, and the (C,) bool
+    ``stuck`` columns read pressed whatever row is driven; None: none; (C + 1,) with a guard column. Starts rise; before
+    the first nothing is pressed. ``received``: (cycle, bytes), back to back at the receive pin from that cycle on;
+    cycles rise without overlap. ``units``: (start cycle, readings) of the converter's inputs, initially 0. ``cuts``:
+    (start cycle, :class:`Cuts`) at rising starts; initially all lines are whole.
     """
 
     pieces: Sequence[tuple[int, np.ndarray, np.ndarray | None]]
@@ -80,7 +79,7 @@ class Timeline:
         stuck: Iterable[np.ndarray | None] | None = None,
         received: Sequence[tuple[int, bytes]] = (),
     ) -> Timeline:
-        """Each (R, C) frame, with its stuck columns if any, held for exactly one scan from power-up."""
+        """Each (R, C) frame, with its stuck columns, held for one scan from power-up."""
         held = [np.asarray(cells, bool) for cells in frames]
         lines = list(stuck) if stuck is not None else [None] * len(held)
         first, scan = facts(skin).row_shift, facts(skin).scan_clocks
@@ -106,38 +105,38 @@ class Timeline:
 
 @dataclasses.dataclass
 class Trace:
-    """Events at every boundary in cycles 0 to ``cycles`` - 1, each list in cycle order."""
+    """Events at every boundary in cycles 0 to ``cycles`` - 1, in cycle order."""
 
     cycles: int
     rows: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, cells, last): a row handed to the labeller, bit c is column c; whether it is its frame's last."""
+    """(cycle, cells, last) of rows handed to the labeller; bit c is column c."""
     records: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, data, end): a zone's exact moments or a bitmap row, in bit fields as on the wire, or the end mark."""
+    """(cycle, data, end): a zone's exact moments or a bitmap row, in bit fields as on the wire, or an end mark."""
     items: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, data, end): with ``report = "barycenter"`` the divided records, when the packer reads them."""
+    """(cycle, data, end): divided records of ``report = "barycenter"``, when the packer reads them."""
     bytes: list[tuple[int, int]] = dataclasses.field(default_factory=list)
     """(cycle, value) of each byte handed to the UART."""
     line: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the transmit pin, high before cycle 0."""
+    """(cycle, level) of changes, high before cycle 0."""
     contact: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the contact pin, low before cycle 0."""
+    """(cycle, level) of changes, low before cycle 0."""
     alive: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    """(cycle, level): a change of the alive pin, low before cycle 0."""
+    """(cycle, level) of changes, low before cycle 0."""
 
     def events(self, boundary: str) -> list[tuple[Any, ...]]:
-        """The events of one of :data:`BOUNDARIES`."""
+        """Events of one of :data:`BOUNDARIES`."""
         return getattr(self, boundary)
 
     def until(self, cycles: int) -> Trace:
-        """The trace, ended before ``cycles``."""
+        """Trace that ends before ``cycles``."""
         kept = {name: [event for event in self.events(name) if event[0] < cycles] for name in BOUNDARIES}
         return Trace(min(cycles, self.cycles), **kept)
 
     def at_the_pins(self) -> Trace:
-        """The trace without events that only probes see."""
+        """Trace of the pins alone."""
         return Trace(self.cycles, line=self.line, contact=self.contact, alive=self.alive)
 
     def since(self, cycle: int) -> Trace:
-        """The trace with ``cycle`` counted as 0."""
+        """Trace with ``cycle`` counted as 0."""
         shifted = {name: [(at - cycle, *rest) for at, *rest in self.events(name)] for name in BOUNDARIES}
         return Trace(self.cycles - cycle, **shifted)

@@ -1,4 +1,4 @@
-"""Serial: the line's level for sent bytes, and the reception of bytes."""
+"""Serial line: levels for sent bytes, and reception."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 
 def line(sent: Iterable[tuple[int, int]], bit_clocks: int) -> list[tuple[int, int]]:
-    """(cycle, level) of every change of the transmit pin for sent bytes (cycle, value)."""
+    """(cycle, level) of every change of the transmit pin for sent (cycle, value)."""
     changes = []
     level = 1
     for cycle, value in sent:
@@ -25,9 +25,9 @@ class Byte:
     """A received byte: cycles of its first data bit and of its stop bit."""
 
     value: int | None
-    """None: the byte was cut short."""
+    """None for a byte cut short."""
     first_bit: int | None
-    """None: it had no bits, like a mark among pulses."""
+    """None without bits, like a mark among pulses."""
     stop: int
 
 
@@ -37,7 +37,7 @@ def pulsed(bit_clocks: int) -> bool:
 
 
 def received(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[Byte]:
-    """Reception of (cycle, bytes), which begin back to back at the pin in that cycle."""
+    """Reception of (cycle, bytes), back to back at the pin from that cycle on."""
     starts = _starts(sent, bit_clocks)
     if pulsed(bit_clocks):
         return _of_pulses(starts, bit_clocks)
@@ -49,7 +49,6 @@ def received(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[Byte]:
 
 
 def _starts(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[tuple[int, int]]:
-    """(cycle, byte) of every start bit at the pin."""
     starts, free = [], 0
     for cycle, data in sent:
         if cycle < free:
@@ -79,6 +78,6 @@ def _of_pulses(starts: list[tuple[int, int]], bit_clocks: int) -> list[Byte]:
 
 
 def _lows(value: int) -> list[tuple[int, int]]:
-    """(end, length) in bits of each low stretch in a byte, from the beginning of its start bit."""
+    """(end, length) in bits of each low stretch of a byte, from the start bit's beginning."""
     levels = "0" + f"{value:08b}"[::-1] + "1"
     return [(match.end(), len(match[0])) for match in re.finditer("0+", levels)]

@@ -1,4 +1,4 @@
-"""Pressure units: reading times, packets, and thresholds that raise the contact pin (docs/timing.md)."""
+"""Pressure units: readings, packets and thresholds (docs/timing.md)."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ SET_ZERO, SET_THRESHOLD, SET_SUM_THRESHOLD = 3, 4, 5
 
 
 class UnitSample(NamedTuple):
-    """A unit's reading."""
+    """Reading of a unit."""
 
     sampled: int
-    """Cycle of the sampled input."""
+    """Cycle in which the input was sampled."""
     done: int
     """Cycle in which the reading is available."""
     time_us: int
-    """Time in the packet, of the sweep's first reading."""
+    """Time of the sweep's first reading."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ConverterRule:
-    """A converter that reads the units in turn; times in half periods (levels) of its clock."""
+    """A converter that reads the units in turn. Times are in levels, half periods of its clock."""
 
     bits: int
     supplies: tuple[tuple[float, int], ...]
-    """(V, Hz): maximum clock from this supply on."""
+    """(V, Hz): maximum clock from that supply voltage on."""
     least_level_ns: int
     levels: int
     """Levels from one conversion to the next."""
@@ -53,12 +53,12 @@ class ConverterRule:
         return -(-max(by_rate, by_level) // 1)
 
     def spans(self, facts: Facts) -> tuple[int, int]:
-        """Cycles from one unit to the next, and from sweep to sweep."""
+        """Cycles from unit to unit, and from sweep to sweep."""
         between = self.levels * self.level(facts)
         return between, between * facts.skin.units
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[UnitSample]]:
-        """The sweeps that begin before ``cycles``."""
+        """Sweeps that begin before ``cycles``."""
         level, begin = self.level(facts), self.first(facts)
         while begin < cycles:
             sweep = []
@@ -69,26 +69,24 @@ class ConverterRule:
             yield sweep
 
     def first(self, facts: Facts) -> int:
-        """The cycle in which the first conversion selects the converter: two levels after power-up, through a
-        register."""
+        """Cycle in which the first conversion selects the converter."""
         return 2 * self.level(facts) + 1
 
 
 @dataclasses.dataclass(frozen=True)
 class PacedRule:
-    """A converter that converts all units by itself, paced by a clock from the board, and reports completion."""
+    """A converter of all units at once, paced by a clock from the board."""
 
     bits: int
     least_level_ns: int
     pace_hz: int
     pace_level_ns: int
     periods: int
-    """Periods of that clock from one conversion to the next."""
+    """Periods of the pacing clock per conversion."""
     word_levels: int
-    """Levels of its SPI clock per word; the first word is its status."""
+    """Levels of the SPI clock per word; the first word is the converter's status."""
 
     def level(self, facts: Facts) -> int:
-        """Cycles per level of the SPI clock."""
         return -(-self.least_level_ns * facts.skin.clock_hz // 10**9)
 
     def pace(self, facts: Facts) -> int:
@@ -97,11 +95,10 @@ class PacedRule:
         return max(-(-hz // (2 * self.pace_hz)), -(-self.pace_level_ns * hz // 10**9))
 
     def spans(self, facts: Facts) -> tuple[int, int]:
-        """Cycles from one unit to the next, and from sweep to sweep."""
         return 0, 2 * self.periods * self.pace(facts)
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[UnitSample]]:
-        """Sweeps without the first two conversions; the n-th is of the input one and a half periods earlier."""
+        """Sweeps without the first two conversions; conversion n is of the input one and a half periods earlier."""
         whole, pace, level = self.spans(facts)[1], self.pace(facts), self.level(facts)
         late_us = round(1.5e6 * whole / facts.skin.clock_hz)
         ready = 3 * whole - pace
@@ -132,8 +129,6 @@ class Units:
 
 
 class _Settings:
-    """Zeros and thresholds by cycle; a command counts from the cycle after its reception."""
-
     def __init__(self, facts: Facts, bits: int, requests: Sequence[Request]):
         skin = facts.skin
         largest = max((sum(map(abs, row)) for row in skin.unit_sums), default=0) * (2**bits - 1)
@@ -149,7 +144,7 @@ class _Settings:
                 self._set.setdefault((what, place), []).append((one.cycle + 1, kept, number > 0))
 
     def at(self, what: int, place: int, cycle: int) -> tuple[int, bool]:
-        """The number, and whether it is not 0."""
+        """Number at a place, and whether it is not 0."""
         given = self._set.get((what, place), [])
         index = bisect.bisect_right(given, cycle, key=lambda one: one[0])
         return given[index - 1][1:] if index else (0, False)
@@ -173,7 +168,7 @@ class _Settings:
 
 
 def play(facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Units:
-    """Results in cycles 0 to ``cycles`` - 1, and some beyond."""
+    """Results in cycles 0 to ``cycles`` - 1, and beyond."""
     skin = facts.skin
     if not skin.units:
         return Units()

@@ -1,8 +1,4 @@
-"""Zones and labeller timing of very many frames at once, for volume tests.
-
-(N, R, C) bool frames go in. Zones are those of :mod:`zones`, found by spreading labels; clocks are the rules of
-:mod:`label`.
-"""
+"""Zones and labeller clocks of very many (N, R, C) bool frames at once, for volume tests."""
 
 from __future__ import annotations
 
@@ -19,20 +15,20 @@ _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
 
 @dataclasses.dataclass(frozen=True)
 class Departures:
-    """Zones of N frames, n in all: frame i owns the places ``offsets[i]`` to ``offsets[i + 1] - 1``."""
+    """Zones of N frames, n in all; those of frame i are at ``offsets[i]`` to ``offsets[i + 1] - 1``."""
 
     offsets: np.ndarray
     """(N + 1,) int64."""
     row: np.ndarray
-    """(n,) int64: the row that is worked while the zone leaves."""
+    """(n,) int64: row worked while the zone leaves."""
     clock: np.ndarray
-    """(n,) int64: in which clock after the one in which that row was handed over it leaves."""
+    """(n,) int64: clocks from that row's handover until the zone leaves."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave. Where the sheet's ends
-    meet (n, 4), with :func:`contactfpga_sim.model.golden.zones.turned`."""
+    """(n, 3) int64: area, sum x, sum y in cells, in order of departure within a frame; on closed sheets (n, 4), with
+    :func:`contactfpga_sim.model.golden.zones.turned`."""
 
     def sorted_moments(self) -> np.ndarray:
-        """The moments, sorted by area, sum x, sum y within each frame instead."""
+        """Moments, sorted by area, sum x, sum y within each frame."""
         area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
@@ -45,7 +41,7 @@ class Departures:
 def all_departures(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> Departures:
-    """Every zone of (N, R, C) bool frames, and when it leaves."""
+    """All zones of (N, R, C) bool frames, with their departures."""
     frames = np.asarray(frames, bool)
     count, rows, columns = frames.shape
     chunk = max(1, _AT_ONCE // (rows * columns))
@@ -62,15 +58,15 @@ def all_departures(
 def row_clocks(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(N, R) int64 each, for the rows of (N, R, C) bool frames: clocks from one to the next that can be handed over,
-    and to the end mark if it is the last."""
+    """(N, R) int64 each: clocks from a row of (N, R, C) bool frames to the next one, and to the end mark after a last
+    row."""
     return _clocks(np.asarray(frames, bool), connectivity, labeller, closed)[1:]
 
 
 def last_record_clocks(
     frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> np.ndarray:
-    """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 if none does."""
+    """(N,) int64: clocks from a frame's last row to its last later record; 0 without one."""
     found = all_departures(frames, connectivity, labeller, closed)
     result = np.zeros(len(frames), int)
     final = found.row == frames.shape[1] - 1
@@ -79,11 +75,7 @@ def last_record_clocks(
 
 
 def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
-    """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1.
-
-    The least label spreads to neighbors until nothing changes; after every round each cell also takes the
-    label of the cell its label names, which doubles the distance that labels travel.
-    """
+    """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1."""
     count, rows, columns = frames.shape
     index = np.arange(frames.size).reshape(frames.shape)
     nothing = frames.size
@@ -133,17 +125,13 @@ def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | 
 
 
 def _flat(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """On a plane all lies on one turn."""
     turns = np.zeros(frames.shape, int)
     return min_labels(frames, connectivity), turns, turns
 
 
 def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of (N, R, C) bool frames, (N, R, C) int64 each: for a pressed cell the least index, over all frames, of its
-    zone's cells, else -1; on which turn it lies, seen from that cell; and 1 where a neighbor disagrees about that.
-
-    The least label spreads to neighbors, and the turn with it, until nothing changes.
-    """
+    """:func:`min_labels` on a closed sheet; the turn of the cell with that label, seen from each cell; and 1 where a
+    neighbor disagrees. (N, R, C) int64 each."""
     nothing = frames.size
     least = np.where(frames, np.arange(nothing).reshape(frames.shape), nothing)
     turns = np.zeros(frames.shape, int)
@@ -165,8 +153,8 @@ def closed_labels(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np
 
 
 def turned(zone: np.ndarray, turns: np.ndarray, disagree: np.ndarray, most: int) -> np.ndarray:
-    """(n,) int64, of all pressed cells the number of their zone, from 0 to n - 1, and what :func:`closed_labels` says
-    of them: what the records say of the turns. ``most``: the sheet's cells."""
+    """(n,) int64: turns of each zone as in its record, from the pressed cells' zones, 0 to n - 1, and other results of
+    :func:`closed_labels`. ``most``: the sheet's cells."""
     count = int(zone.max(initial=-1)) + 1
     lowest, highest = np.full(count, len(turns)), np.full(count, -len(turns))
     np.minimum.at(lowest, zone, turns)
@@ -180,7 +168,6 @@ def turned(zone: np.ndarray, turns: np.ndarray, disagree: np.ndarray, most: int)
 
 
 def _beside(cells: np.ndarray, step: tuple[int, int], outside: int) -> np.ndarray:
-    """What lies a step further, above the first and below the last row ``outside``."""
     dy, dx = step
     found = np.roll(cells, -dx, axis=2).astype(int)
     if dy:

@@ -1,5 +1,4 @@
-"""Zones by flood fill over the frame, or over the unrolled cylinder of a sheet whose ends meet; and a labeller's work
-on one frame, with its rule."""
+"""Zones by flood fill on a frame or a cylinder, and a labeller's golden rule."""
 
 from __future__ import annotations
 
@@ -15,8 +14,7 @@ CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 def flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
     """Label the connected pieces of an (R, C) bool array.
 
-    Returns an (R, C) int array, 0 where nothing is pressed and 1 to n elsewhere, and n. Pieces are numbered
-    in the order of their first cell.
+    Returns an (R, C) int array, 0 where nothing is pressed, else 1 to n in order of the pieces' first cells, and n.
     """
     rows, columns = cells.shape
     steps = EDGES + (CORNERS if connectivity == 8 else ())
@@ -39,7 +37,7 @@ def flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
 
 
 def moments(labels: np.ndarray, zone: int) -> tuple[int, int, int]:
-    """Area, sum x and sum y, in cells, of the cells with label ``zone``."""
+    """Area, sum x and sum y, in cells, of a label's cells."""
     y, x = np.nonzero(labels == zone)
     return len(x), int(x.sum()), int(y.sum())
 
@@ -51,9 +49,9 @@ def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
 
 
 def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
-    """Label the connected pieces of an (R, C) bool array whose last column is a neighbor of the first.
+    """Label the connected pieces where the last column is a neighbor of the first.
 
-    Returns an (R, C) int array, 0 where nothing is pressed and 1 to n elsewhere, and :func:`turned` of each piece.
+    Returns an (R, C) int array as :func:`flood`, and :func:`turned` of each piece.
     """
     columns = cells.shape[1]
     labels = np.zeros(cells.shape, int)
@@ -68,8 +66,8 @@ def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list
 
 
 def turned(turns: list[int], ring: bool, most: int) -> int:
-    """Number of a piece's cells on the upper of its two turns, less than its area. Its area itself: the piece is a
-    ring; all ones, in the bits of the sheet's cell count: it needs more than two turns."""
+    """Number of a piece's cells on the upper of its two turns; for a ring its area; for more than two turns all ones,
+    in the bits of the sheet's cell count."""
     lowest = min(turns)
     if ring:
         return len(turns)
@@ -79,7 +77,7 @@ def turned(turns: list[int], ring: bool, most: int) -> int:
 
 
 def _unroll(cells: np.ndarray, connectivity: int, seed: tuple[int, int]) -> tuple[dict[tuple[int, int], int], bool]:
-    """The piece of a cell: the column of each of its cells, counted on past the seam, and whether it closes around."""
+    """A piece's cells, with columns counted on past the seam, and whether the piece closes around."""
     rows, columns = cells.shape
     unrolled = {seed: seed[1]}
     todo = [(seed[0], seed[1])]
@@ -99,7 +97,7 @@ def _unroll(cells: np.ndarray, connectivity: int, seed: tuple[int, int]) -> tupl
 
 @dataclasses.dataclass(frozen=True)
 class Departure:
-    """A zone that leaves this many clocks after the handover of row ``row``."""
+    """Zone that leaves this many clocks after the handover of row ``row``."""
 
     row: int
     clock: int
@@ -107,19 +105,18 @@ class Departure:
     sum_x: int
     sum_y: int
     turned: int = 0
-    """For a sheet whose ends meet: :func:`contactfpga_sim.model.golden.zones.turned`."""
+    """:func:`turned` of the zone on a closed sheet."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Labelling:
-    """A labeller's work on one frame."""
+    """Work of a labeller on one frame."""
 
     busy: tuple[int, ...]
     """Clocks from each row to the next handover."""
     end: int
     """Clocks from the last row to the end mark."""
     departures: tuple[Departure, ...]
-    """Zones in order of departure."""
 
 
 Strips = Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -130,9 +127,10 @@ class LabellerRule:
     """The golden rule of a labeller."""
 
     frame: Callable[[np.ndarray, int], Labelling]
-    """Work on (R, C) bool cells with this connectivity."""
+    """Function from (R, C) bool cells and connectivity to the work."""
     strips: Strips | None = None
-    """The clocks of every row of (N, R, C) bool frames at once, for volume tests: departure of a zone by its last
-    cluster's cells, next row, and end mark; (N, R, C), (N, R) and (N, R) int64. Exact labellers only."""
+    """Function from (N, R, C) bool frames and connectivity to the clocks of every row, for volume tests: departure of a
+    zone by its last cluster's cells, next row, and end mark; (N, R, C), (N, R) and (N, R) int64. Exact labellers
+    only."""
     closed: LabellerRule | None = None
-    """The rule for sheets whose ends meet; None: unsupported."""
+    """The rule for closed sheets; None: unsupported."""

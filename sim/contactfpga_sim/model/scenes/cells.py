@@ -1,4 +1,4 @@
-"""Pressed cells: their definition, and their form for the native models."""
+"""Pressed cells: definition, and form for native models."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 def pressed(values: np.ndarray, what: str, threshold: float | None = None) -> np.ndarray:
     """Bools unchanged, numbers compared with ``threshold``: the one rule for all sources of cells.
 
-    Raises ValueError that calls the array ``what`` for numbers without a threshold, NaN, and other types.
+    Raises ValueError, which calls the array ``what``, for numbers without a threshold, NaN, and other types.
     """
     if values.dtype == bool:
         return values

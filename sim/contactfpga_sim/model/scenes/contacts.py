@@ -1,6 +1,6 @@
-"""Touches as physical objects: shape, place, force and motion. Lengths in mm on the sheet laid flat.
+"""Touches as physical objects: shape, place, force and motion. Lengths are in mm on the sheet laid flat.
 
-x runs along the columns, y along the rows, cell (row 0, column 0) is at 0 mm; angles turn from x toward y.
+x runs along the columns, y along the rows; cell (row 0, column 0) is at 0 mm; angles turn from x toward y.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import numpy as np
 from contactfpga.design.cover import Ball, Ellipse, Load, Part, Rectangle
 
 Value = float | Callable[[float], float]
-"""A number, or a function of the time in s."""
+"""A number, or a function of time in s."""
 
 Shape = tuple[Part, ...]
-"""Convex parts around the origin in m, as the cover needs them. Parts may overlap or be separate."""
+"""Convex parts around the origin in m, which may overlap or be separate."""
 
 M = 1e-3
-"""Meters in a mm: a Skin counts in mm, the cover's physics in m."""
+"""Meters per mm."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Track:
-    """A piecewise linear value, constant beyond its first and last points."""
+    """A piecewise linear value, constant beyond its end points."""
 
     seconds: tuple[float, ...]
     values: tuple[float, ...]
@@ -42,7 +42,7 @@ class Track:
 
 @dataclasses.dataclass(frozen=True)
 class Swing:
-    """A value that swings around ``middle``: middle + reach cos(2 pi hertz t + phase_rad)."""
+    """A swinging value: middle + reach cos(2 pi hertz t + phase_rad)."""
 
     middle: float
     reach: float
@@ -70,28 +70,28 @@ class Contact:
     """An object that touches the sheet while its force is above 0."""
 
     shape: Shape | Callable[[float], Shape]
-    """Its parts, or a function of the time in s."""
+    """Parts, or a function of time in s."""
     x_mm: Value
-    """Position of the shape's origin along the columns."""
+    """Origin of the shape along the columns."""
     y_mm: Value
-    """Position of the shape's origin along the rows."""
+    """Origin of the shape along the rows."""
     angle_deg: Value = 0.0
     """Rotation of the shape."""
     force_n: Value = 10.0
-    """Normal force in N; at most 0: no contact."""
+    """Normal force; at most 0: no contact."""
     drag_n: tuple[Value, Value] = (0.0, 0.0)
-    """Force along the surface in N, toward rising columns and rows; felt by units, not by switches."""
+    """Force along the surface, toward rising columns and rows; felt by units, not by switches."""
     torsion_nm: Value = 0.0
-    """Moment in Nm about the outward normal; felt by units."""
+    """Moment about the outward normal; felt by units."""
 
     @property
     def still(self) -> bool:
-        """Whether it is constant over time."""
+        """Whether the contact is constant over time."""
         values = (getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "drag_n")
         return not any(map(callable, (*values, *self.drag_n)))
 
     def load(self, seconds: float) -> Load | None:
-        """Its load on the cover at that time; None without contact."""
+        """Load on the cover at a time; None without contact."""
         force = at(self.force_n, seconds)
         if not force > 0:
             return None
@@ -102,7 +102,7 @@ class Contact:
 
 
 def at(value: Value, seconds: float) -> float:
-    """A value at that time."""
+    """A value at a time."""
     return value(seconds) if callable(value) else value
 
 
@@ -122,14 +122,12 @@ def edge(length_mm: float, width_mm: float) -> Shape:
 
 
 def palm(scale: float = 1.0) -> Shape:
-    """A hand laid flat, 84 mm wide and 92 mm long, fingers toward -y: two balls, finger pads and heel, one contact
-    around a hollow."""
+    """A hand laid flat, 84 mm wide and 92 mm long, fingers toward -y: one contact around a hollow."""
     return _scaled(scale, (-24, 16, 18, 34), (26, 16, 16, 34), (0, -24, 42, 14), (0, 42, 30, 12))
 
 
 def sole(length_mm: float = 260.0) -> Shape:
-    """A bare right foot, toes toward -y: heel, outer edge and ball as one contact, and the big toe, separated by 8 mm
-    for a foot of 260 mm."""
+    """A bare right foot, toes toward -y: sole and big toe as two contacts, 8 mm apart for a foot of 260 mm."""
     scale = length_mm / 260
     outer = Rectangle(16 * M * scale, 50 * M * scale, 22 * M * scale, 25 * M * scale)
     return (*_scaled(scale, (4, 98, 30, 32), (-2, -50, 46, 36), (-26, -112, 15, 18)), outer)
@@ -155,13 +153,12 @@ class ChangingPatch:
 
 
 BODY_PA = 2e5
-"""Effective modulus E* in Pa of the touching object, a fingertip on soft foam: chosen, not measured."""
+"""Effective modulus E* of a fingertip on soft foam: chosen, not measured."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rise:
-    """A force that rises from 0 s on, then stays: force_n (t / seconds)^(3/2), as of a round body at constant speed
-    (Hertz)."""
+    """A force that rises from 0 s on: force_n (t / seconds)^(3/2), as of a round body at constant speed (Hertz)."""
 
     force_n: float
     seconds: float
@@ -172,8 +169,8 @@ class Rise:
 
 @dataclasses.dataclass(frozen=True)
 class GrowingPatch:
-    """The shape of a contact whose force is a :class:`Rise`: round parts grow as the force's cube root (Hertz), flat
-    ones are full at once."""
+    """Shape of a contact whose force is a :class:`Rise`: round parts grow as the force's cube root (Hertz), flat ones
+    are full at once."""
 
     shape: Shape
     seconds: float
@@ -190,8 +187,8 @@ def _shrunk(part: Ellipse, share: float) -> Ellipse:
 def approaching(contact: Contact, speed_mm_s: float) -> Contact:
     """The contact, of fixed shape and force, arriving at 0 s at this speed until it has its force.
 
-    Its indentation is then delta = 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5),
-    with E* = :data:`BODY_PA`; of several parts the deepest counts.
+    Its final indentation is 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5), with
+    E* = :data:`BODY_PA`; the deepest part counts.
     """
     if callable(contact.shape) or callable(contact.force_n):
         raise ValueError("the contact has a force or a shape of its own over time; it cannot approach as well")
@@ -216,8 +213,7 @@ def pressed_ball(ball: Ball, force_n: Value, x_mm: Value, y_mm: Value) -> Contac
 def pair(
     gap_mm: float, radius_mm: float, x_mm: float, y_mm: float, angle_deg: float = 0.0, force_n: Value = 10.0
 ) -> tuple[Contact, Contact]:
-    """Two fingers of this radius around a place, with a gap of ``gap_mm`` between their rims; they meet at 0 and
-    below."""
+    """Two fingers around a place, with ``gap_mm`` between their rims, at most 0 if they meet."""
     apart = gap_mm / 2 + radius_mm
     if not apart > 0:
         raise ValueError(f"gap_mm is {gap_mm}; two discs of {radius_mm} mm need more than {-2 * radius_mm:g} mm")

@@ -1,4 +1,4 @@
-"""Sheets with their zones, in the terminal and in a picture."""
+"""Sheets with their zones, in the terminal and in pictures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.golden.zones import closed_flood, flood
 
 COLORS = style.PALETTE[:6]
-"""Colors of zones, visible on dark terminals, too."""
+"""Colors of zones, visible on dark terminals."""
 
 ACROSS = 4
 
@@ -36,7 +36,7 @@ class Drawn(Protocol):
 
 
 def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
-    """Two rows of cells per line of text, each zone in its color; in ASCII one row per line."""
+    """Zones in colors, two rows of cells per line of text; in ASCII one."""
     return Columns([_sheet(out, unicode) for out in outcomes], padding=(0, 3))
 
 
@@ -76,7 +76,6 @@ _GLYPHS = {(False, False): "·", (True, False): "▀", (False, True): "▄", (Tr
 
 
 def _style(above: int, below: int) -> str:
-    """Style of a full block of one zone; between two zones the lower is the background."""
     if not above and not below:
         return "dim"
     colors = [COLORS[(number - 1) % len(COLORS)] for number in (above, below) if number]
@@ -84,7 +83,7 @@ def _style(above: int, below: int) -> str:
 
 
 def to_file(outcomes: Sequence[Drawn], path: Path) -> None:
-    """A panel per scene: cells in their zones' colors, and the received barycenters."""
+    """Write a picture with a panel per scene: cells in their zones' colors, and received barycenters."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):

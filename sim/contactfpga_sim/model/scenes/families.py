@@ -1,8 +1,7 @@
-"""Families of scenes at random places, for charts: the same seed gives the same scenes, each by its number alone.
+"""Families of scenes at random places, each scene by seed and number.
 
-A scene is wholly on the sheet if it fits; else it is in the middle, within a pitch, and `Scene.truth(t, skin)` counts
-the part on the sheet. Sheets of the same extents but another pitch get the same scenes, shifted with the sheet's
-corner.
+A scene is wholly on the sheet if it fits, else in the middle, within a pitch. Sheets of the same extents get the same
+scenes whatever their pitch, shifted with the sheet's corner.
 """
 
 from __future__ import annotations
@@ -23,10 +22,10 @@ FINGER_MM = 6.0
 """Radius of the fingers of a pair."""
 
 HALF_MM, RATIO = (5.0, 10.0), (0.6, 1.0)
-"""Least and greatest half length of a finger's ellipse, and its width over its length."""
+"""Range of half lengths of a finger's ellipse, and of its width over its length."""
 
 TRIES = 200
-"""Places tried for one more finger before the scene goes without it."""
+"""Places tried for another finger."""
 
 Random = np.random.Generator
 
@@ -34,7 +33,7 @@ Random = np.random.Generator
 def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
     """``count`` scenes of a family at random places on a sheet, from number ``first`` on.
 
-    ``family``: one of :data:`FAMILIES`; ``options``: its function's, such as ``gap_mm``. Scene n depends only on
+    ``family``: one of :data:`FAMILIES`; ``options``: those of its function, such as ``gap_mm``. Scene n depends only on
     family, options, seed, the sheet's pitch and size, and n. Raises ValueError for an unknown family or option.
     """
     if family not in FAMILIES:
@@ -49,12 +48,12 @@ def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, *
 
 
 APPROACH_MM_S = (50.0, 250.0)
-"""Speeds of approach, up to the reduced speed of ISO 10218-1 for a robot beside people: chosen."""
+"""Speeds of approach, up to the reduced speed of ISO 10218-1: chosen."""
 
 
 def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
-    """The scenes of :func:`placements` with rising forces: all contacts of a scene touch at 0 s and approach at one
-    speed, drawn from :data:`APPROACH_MM_S`. From ``settled_s`` on they are those of :func:`placements`."""
+    """:func:`placements` with rising forces: all contacts touch at 0 s and approach at one speed, drawn from
+    :data:`APPROACH_MM_S`, until ``settled_s``."""
     name = zlib.crc32(family.encode())
     scenes = placements(family, count, seed, skin, first, **options)
     speeds = (
@@ -65,15 +64,15 @@ def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **op
 
 
 def bumper(rng: Random, skin: Skin) -> Scene:
-    """One contact of a bumper: an ellipse 16 to 50 mm long, at any angle, 5 to 50 N."""
+    """An ellipse 16 to 50 mm long, at any angle, 5 to 50 N."""
     long = rng.uniform(8, 25)
     shape = contacts.ellipse(long, long * rng.uniform(0.4, 1))
     return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(5, 50)),))
 
 
 def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scene:
-    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any place and angle, at least ``gap_mm`` apart, 2 to 20 N;
-    fewer if the sheet lacks room."""
+    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any angle, at least ``gap_mm`` apart, 2 to 20 N; fewer if
+    the sheet lacks room."""
     if gap_mm < 0 or most < 2:
         raise ValueError(f"gap_mm is {gap_mm} and most is {most}; they must be at least 0 and 2")
     placed: list[tuple[float, float, float]] = []
@@ -93,7 +92,7 @@ def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scen
 def finger(
     rng: Random, skin: Skin, half_mm: tuple[float, float] = HALF_MM, ratio: tuple[float, float] = RATIO
 ) -> Scene:
-    """One finger as in :func:`fingers`; ``half_mm``: range of half lengths, ``ratio``: width over length."""
+    """One finger as in :func:`fingers`; ``half_mm``, ``ratio``: ranges of half length, and of width over length."""
     _, shape, angle, force = _finger(rng, half_mm, ratio)
     return Scene((_anywhere(rng, skin, shape, angle, force_n=force),))
 
@@ -133,7 +132,7 @@ def edge(rng: Random, skin: Skin, width_mm: float = 12.0) -> Scene:
 
 
 def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
-    """A finger that circles at ``speed_mm_s`` or at 50 to 1000 mm/s; 5 to 20 N."""
+    """A finger that circles at ``speed_mm_s``, by default 50 to 1000 mm/s; 5 to 20 N."""
     left, right, top, bottom = (end / M for end in sheet(skin))
     finger = rng.uniform(5, 10)
     most = max(1.0, min(right - left, bottom - top) / 2 - finger)
@@ -149,17 +148,16 @@ def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
 FAMILIES: dict[str, Callable[..., Scene]] = {
     family.__name__: family for family in (bumper, fingers, pair, palm, sole, edge, moving, finger)
 }
-"""Families by name; options are keyword arguments."""
+"""Families by name."""
 
 
 def _anywhere(rng: Random, skin: Skin, shape: Shape, angle_deg: float, **values: Any) -> Contact:
-    """A contact of this shape, turned, anywhere on the sheet."""
     x, y = place(rng, skin, tuple(part.placed(0.0, 0.0, math.radians(angle_deg)) for part in shape))
     return Contact(shape=shape, x_mm=x, y_mm=y, angle_deg=angle_deg, **values)
 
 
 def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
-    """Position in mm of the shape's origin for a random place on the sheet."""
+    """Position in mm of a shape's origin for a random place on the sheet."""
     left, right, top, bottom = sheet(skin)
     boxes = [(part.x_m, part.y_m, *part.half_box_m) for part in shape]
     ends = [(0.0, 0.0)] if skin.closed else [(x - half, x + half) for x, _, half, _ in boxes]  # it may lie on the seam
@@ -169,7 +167,6 @@ def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
 
 
 def _along(rng: Random, low: float, high: float, ends: list[tuple[float, float]], pitch_mm: float) -> float:
-    """A position in mm for an object that reaches from the least to the greatest of these ends, in m."""
     first, last = low - min(start for start, _ in ends), high - max(end for _, end in ends)
     if first > last:
         middle = (first + last) / 2

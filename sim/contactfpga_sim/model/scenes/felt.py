@@ -1,4 +1,4 @@
-"""Readings of pressure units under a bumper that a scene touches."""
+"""Readings of pressure units under a touched bumper."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from contactfpga_sim.model.scenes.scene import Scene
 
 
 class LoadedUnits:
-    """Readings of units under a wrench, with noise, in whole converter steps.
+    """Noisy readings of units under a wrench, in whole converter steps.
 
-    Redundant units share a load by least squares; an unloaded one reads as without preload.
+    Redundant units share a load by least squares; an unloaded unit reads as without preload.
     """
 
     def __init__(self, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
@@ -35,14 +35,14 @@ class LoadedUnits:
         return np.asarray(np.maximum(self._steps @ wrench, self._least) + self._zeros)
 
     def under(self, wrench: Floats) -> Sequence[int]:
-        """Readings of all units."""
+        """Readings under a (6,) wrench."""
         noisy = self.exactly(wrench) + self._sigma * self._rng.standard_normal(len(self._sigma))
         found: list[int] = np.clip(np.rint(noisy), 0, self._full).astype(int).tolist()
         return found
 
 
 class UnitReadings(LoadedUnits):
-    """Readings as a function of the time in s, while a scene touches the bumper."""
+    """Readings over time in s while a scene touches the bumper."""
 
     def __init__(self, scene: Scene, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
         """Raises ValueError if the cells have no surface."""
@@ -62,7 +62,7 @@ class UnitReadings(LoadedUnits):
         return sum((self._of(one, seconds) for one in contacts), np.zeros(6))
 
     def _of(self, contact: Contact, seconds: float) -> Floats:
-        """Wrench of a contact whose parts each push along the normal at their middle."""
+        """Wrench of a contact; each part pushes along the normal at its middle."""
         total, load = np.zeros(6), contact.load(seconds)
         if load is None:
             return total
@@ -76,14 +76,13 @@ class UnitReadings(LoadedUnits):
         return total
 
     def _at(self, x_m: float, y_m: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Point, normal, and directions of columns and rows at a place on the sheet laid flat."""
         x, y = x_m * self._wider + self._cells.sheet_m[0], y_m + self._cells.sheet_m[1]
         point, normal = (np.array(each) for each in self._surface.place(x, y))
         across = np.array(self._surface.place(x, y + 1.0)[0]) - point
         return point, normal, np.cross(across, normal), across
 
     def exact(self, seconds: float) -> Floats:
-        """(n,): readings without noise, rounding and limits."""
+        """(n,): readings at a time, without noise, rounding and limits."""
         return self.exactly(self.wrench(seconds))
 
     def __call__(self, seconds: float) -> Sequence[int]:

@@ -1,8 +1,6 @@
-"""Scenes in a TOML file: contacts with fixed or random shape, place, force and motion, so that one file is a family;
-each scene by its number, on a sheet of any pitch.
+"""Scenes in a TOML file: contacts with fixed or random shape, place, force and motion. docs/scenes.md lists the keys.
 
-Places are in mm from the sheet's corner, half a pitch before the first switch, independent of the pitch. docs/scenes.md
-lists the keys.
+Places are in mm from the sheet's corner, half a pitch before the first switch.
 """
 
 from __future__ import annotations
@@ -35,13 +33,13 @@ class SceneFileError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """A number drawn for each contact; fixed if both ends are equal."""
+    """Range of a number drawn for each contact."""
 
     low: float
     high: float
 
     def draw(self, rng: np.random.Generator) -> float:
-        """A random number of the range."""
+        """A random number."""
         return self.low if self.low == self.high else float(rng.uniform(self.low, self.high))
 
 
@@ -56,25 +54,25 @@ SHAPES: dict[str, tuple[Callable[..., Shape], dict[str, float | None]]] = {
     "palm": (contacts.palm, {"scale": 1.0}),
     "sole": (contacts.sole, {"length_mm": 260.0}),
 }
-"""By name: the maker of the shape, and its sizes with defaults; None: required."""
+"""By name the maker of the shape, and its sizes with defaults; None: required."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """Similar contacts: a `[[contact]]` of a file."""
+    """Similar contacts: a ``[[contact]]`` of a file."""
 
     shape: str
     sizes: tuple[tuple[str, Range], ...]
     number: tuple[int, int] = (1, 1)
     """Range of their number in a scene."""
     x_mm: Range | Track | None = None
-    """Distance from the sheet's left edge; None: anywhere on the sheet."""
+    """Distance from the sheet's left edge; None: anywhere."""
     y_mm: Range | Track | None = None
-    """Distance from the sheet's upper edge; None: anywhere on the sheet."""
+    """Distance from the sheet's upper edge; None: anywhere."""
     angle_deg: Range | Track = Range(0.0, 0.0)
     force_n: Range | Track = Range(10.0, 10.0)
     approach_mm_s: Range | None = None
-    """Speed of approach from the touch at 0 s until it has its force; None: full force at once."""
+    """Speed of approach from 0 s on; None: full force at once."""
     speed_mm_s: Range = Range(0.0, 0.0)
     heading_deg: Range = Range(0.0, 360.0)
 
@@ -85,7 +83,7 @@ class Kind:
 
 @dataclasses.dataclass(frozen=True)
 class SceneFile:
-    """The content of a file."""
+    """Content of a file."""
 
     kinds: tuple[Kind, ...]
     width_mm: float | None = None
@@ -94,9 +92,9 @@ class SceneFile:
     seconds: float = 0.0
     """Duration of a scene, which is sampled at one instant."""
     gap_mm: float | None = None
-    """Least distance of two contacts at the beginning; None: overlaps are allowed."""
+    """Least distance of two contacts at the beginning; None: any."""
     count: int = 500
-    """Scenes to choose a Skin with; as many others are for the report."""
+    """Scenes to choose a Skin with, and number of others for the report."""
     seed: int = 0
 
     @classmethod
@@ -181,7 +179,6 @@ def _count(where: str, value: Any) -> tuple[int, int]:
 
 
 def _value(name: str, value: Any, low: float, high: float) -> Range | Track:
-    """A number, a range, or a course over time."""
     if not isinstance(value, dict):
         return _range(name, value, low, high)
     _keys(name, value, ("seconds", "values"))
@@ -224,17 +221,17 @@ def _whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 DIRECTIONS = 128
-"""Directions for the distance of two shapes, which is short by at most 0.03 % of their size."""
+"""Directions for the distance of two shapes, at most 0.03 % of their size too short."""
 
 PLACES = 10
-"""Places tried for a contact beside others before the scene is drawn again."""
+"""Places tried for a contact before the whole scene is drawn again."""
 
 
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     """Scene ``number`` of a file on a sheet, and its sampling instant in s, after all approaches.
 
-    Depends on the file's content, the number, and the sheet's pitch and size. Raises SceneFileError if contacts cannot
-    be as far apart as requested.
+    The file's content, the number, and the sheet's pitch and size decide. Raises SceneFileError if contacts do not fit
+    as far apart as requested.
     """
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
@@ -250,7 +247,6 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
 
 
 def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | None:
-    """All contacts of a scene; None if one found no place far enough from the others."""
     placed: list[tuple[Shape, Contact]] = []
     for kind in file.kinds:
         for _ in range(int(rng.integers(kind.number[0], kind.number[1] + 1))):
@@ -266,7 +262,6 @@ def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | No
 
 
 def _start(contact: Contact) -> Shape:
-    """Its parts at 0 s, even if it does not press yet."""
     x, y, angle = (
         value(0.0) if callable(value) else value for value in (contact.x_mm, contact.y_mm, contact.angle_deg)
     )
@@ -299,7 +294,6 @@ def _value_of(rng: Random, value: Range | Track) -> Value:
 def _along(
     rng: Random, given: Range | Track | None, edge: float, anywhere: float, speed: float, seconds: float
 ) -> Value:
-    """A place in mm over time; ``edge`` is the beginning of the sheet."""
     if isinstance(given, Track):
         return Track(given.seconds, tuple(edge + value for value in given.values))
     start = anywhere if given is None else edge + given.draw(rng)
@@ -307,7 +301,6 @@ def _along(
 
 
 def _gap_mm(one: Shape, other: Shape, skin: Skin) -> float:
-    """Distance of two shapes on the sheet, the shorter way around a closed one."""
     if skin.closed:
         around = around_m(skin)
         ends = [end for part in one for end in widths(part, Box())]
@@ -318,8 +311,8 @@ def _gap_mm(one: Shape, other: Shape, skin: Skin) -> float:
 def distance_mm(one: Shape, other: Shape) -> float:
     """Distance of two shapes; at most 0 if they meet.
 
-    The distance of convex sets is the width of the widest strip between them: the maximum of -h_A(u) - h_B(-u) over
-    directions u, with support functions h (Boyd and Vandenberghe, Convex Optimization, 8.2).
+    For convex sets this is the maximum of -h_A(u) - h_B(-u) over directions u, with support functions h (Boyd and
+    Vandenberghe, Convex Optimization, 8.2).
     """
     ahead, back = _reach(one), np.roll(_reach(other), DIRECTIONS // 2, axis=1)
     return float((-ahead[:, None] - back[None]).max(axis=2).min()) / M

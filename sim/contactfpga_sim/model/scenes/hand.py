@@ -1,17 +1,17 @@
-"""A simulated hand for the requests of `contactfpga bringup` on a virtual sheet."""
+"""A simulated hand for ``contactfpga bringup`` on a virtual sheet."""
 
 from __future__ import annotations
 
 import numpy as np
 
 PRESS_S, MOVE_S = 1.0e-3, 0.4e-3
-"""Time of a finger on each switch, and on its way to the next."""
+"""Time of a finger on a switch, and between switches."""
 HOLD_S = 0.025
-"""Time of a ruler on each column, enough to see that its switches have stopped bouncing."""
+"""Time of a ruler on each column, enough to see that its switches stopped bouncing."""
 
 
 class Hand:
-    """Pressed cells as a function of the simulated time in s, for :class:`~contactfpga_sim.VirtualBoard`."""
+    """Pressed cells as a function of simulated time in s."""
 
     def __init__(self, rows: int, columns: int):
         self._shape = rows, columns
@@ -19,9 +19,9 @@ class Hand:
         self._since_s: float | None = None
 
     def does(self, what: str) -> float:
-        """Change the hand's action from the next sample on: ``nothing``; ``finger``: one switch after the other;
-        ``ruler``: one column after the other; ``card``: the first half of the columns; ``plate``: all. Returns the
-        duration in s; 0 for a constant action."""
+        """Set the action from the next sample on: ``nothing``; ``finger`` or ``ruler``: one switch or column after the
+        other; ``card``: the first half of the columns; ``plate``: all. Returns its duration in s; 0 for a constant
+        action."""
         if what not in DOES:
             raise ValueError(f"a hand cannot do {what!r}; take one of {', '.join(DOES)}")
         self._does, self._since_s = what, None

@@ -1,4 +1,4 @@
-"""Frames recorded from a real sheet: cells without a known truth."""
+"""Frames recorded from a real sheet."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEFAULT_HZ = 100.0
 
 
 _RANGES = {"rate_hz": (1e-3, 1e6), "pitch_mm": (MIN_PITCH_MM, MAX_PITCH_MM)}
-"""Numbers that a .npz file may give for its frames, and their limits."""
+"""Limits of numbers in a .npz file."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,16 +29,15 @@ class Recording:
     pressed: np.ndarray
     """(frames, rows, columns) bool."""
     rate_hz: float = DEFAULT_HZ
-    """Frames per second; default :data:`DEFAULT_HZ`."""
+    """Frames per second."""
     pitch_mm: float | None = None
     """Distance of rows and columns; None if unknown."""
     what: str = "the recording"
-    """Its name, for messages."""
+    """Name for messages."""
 
     @classmethod
     def of(cls, frames: np.ndarray, what: str, threshold: float | None = None) -> Recording:
-        """A recording from (rows, columns) or (frames, rows, columns), bool or numbers with a threshold
-        (:func:`cells.pressed`)."""
+        """A recording of (rows, columns) or (frames, rows, columns), bool or numbers with a threshold."""
         if frames.ndim == 2:
             frames = frames[None]
         if frames.ndim != 3:
@@ -58,7 +57,7 @@ class Recording:
         return dataclasses.replace(cls.of(held["pressed"], str(path), threshold), **facts)
 
     def on(self, skin: Skin) -> Callable[[float], np.ndarray]:
-        """A function from time in s to pressed cells, played in a loop; the sheet must have the recorded size."""
+        """A function from time in s to pressed cells, played in a loop. The sheet must have the recorded size."""
         rows, columns = self.pressed.shape[1:]
         if (rows, columns) != (skin.rows, skin.columns):
             raise ValueError(

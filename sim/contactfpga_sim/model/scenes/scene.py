@@ -1,7 +1,4 @@
-"""Touches of the sheet: contacts over time with their truth, recordings, and scenes by name.
-
-A :class:`Scene` is independent of the sheet: the same contacts press sheets of any pitch and size, through any cover.
-"""
+"""Touches of the sheet: contacts over time, recordings, and scenes by name."""
 
 from __future__ import annotations
 
@@ -22,31 +19,31 @@ from contactfpga_sim.model.scenes.shapes import SHAPES
 from contactfpga_sim.model.scenes.truth import Box, Truth, all_loads, truth_around, truth_of
 
 CellsAt = Callable[[float], np.ndarray]
-"""A function from time in s to the pressed (rows, columns) bool cells."""
+"""A function from time in s to pressed (rows, columns) bool cells."""
 
 FINGER_MM = 12.0
 """Radius of a fingertip's contact."""
 
 FOOT_MM = 260.0
-"""Length of a foot, if the sheet is long enough."""
+"""Greatest length of a foot."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """Contacts over time. On a cylinder, places are on the sheet laid flat, and the cover counts as flat. Around a
-    closed sheet places wrap: a contact beyond one end is also at the other."""
+    """Contacts over time, placed on the sheet laid flat, for sheets of any pitch and size. On a closed sheet a contact
+    beyond one end is also at the other."""
 
     contacts: tuple[Contact, ...]
 
     def loads(self, seconds: float) -> list[Load]:
-        """Loads on the cover at that time."""
+        """Loads on the cover at a time."""
         found = (contact.load(seconds) for contact in self.contacts)
         return [load for load in found if load is not None]
 
     def truth(self, seconds: float, skin: Skin | None = None) -> Truth:
-        """Number of contacts, areas in mm2 and barycenters in mm at that time, from the continuous shapes: overlapping
-        or touching parts are one contact. With a Skin, only of the part on its sheet, which ends half a pitch beyond
-        the outermost switches, or joins itself there if closed."""
+        """Contacts with areas in mm2 and barycenters in mm at a time, from the continuous shapes: overlapping or
+        touching parts are one contact. With a Skin only the part on its sheet counts, up to half a pitch beyond the
+        outermost switches."""
         parts = [part for load in self.loads(seconds) for part in load.parts]
         if skin is None:
             return truth_of(parts)
@@ -59,15 +56,15 @@ class Scene:
         return max((rise.seconds for rise in rises if isinstance(rise, contacts.Rise)), default=0.0)
 
     def approaching(self, speed_mm_s: float) -> Scene:
-        """The scene with all contacts touching at 0 s and approaching at this speed until they have their forces."""
+        """The scene with all contacts touching at 0 s and approaching at this speed."""
         return Scene(tuple(contacts.approaching(contact, speed_mm_s) for contact in self.contacts))
 
     def pressed(
         self, seconds: float, skin: Skin, cover: Cover | None = None, before: np.ndarray | None = None
     ) -> np.ndarray:
-        """(rows, columns) bool: the closed switches at that time. ``cover``: None for a bare sheet, on which switches
-        close under a contact whatever its force. ``before``: the closed ones until then, for hysteresis. ``skin.mask``
-        is ignored; the gateware applies it."""
+        """(rows, columns) bool: closed switches at a time. ``cover``: None for a bare sheet, whose switches close under
+        a contact whatever its force. ``before``: switches closed until then, for hysteresis. ``skin.mask`` is ignored,
+        as the gateware applies it."""
         loads = self.loads(seconds)
         if skin.closed:
             loads = all_loads(loads, sheet(skin).left, around_m(skin))
@@ -79,8 +76,8 @@ class Scene:
         )
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
-        """:meth:`pressed` on this sheet as a function of time. Switches with hysteresis depend on the previous call, so
-        times should rise."""
+        """:meth:`pressed` on this sheet as a function of time. Hysteresis depends on the previous call, so times should
+        rise."""
         if all(contact.still for contact in self.contacts):
             still = self.pressed(0.0, skin, cover)
             return lambda seconds: still
@@ -97,42 +94,41 @@ class Scene:
 
 
 def sheet(skin: Skin) -> Box:
-    """The sheet laid flat, in m: half a pitch beyond the outermost switches on every side."""
+    """The sheet laid flat, in m, with half a pitch beyond the outermost switches."""
     x, y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
     return Box(-x / 2, (skin.columns - 0.5) * x, -y / 2, (skin.rows - 0.5) * y)
 
 
 def around_m(skin: Skin) -> float:
-    """Length of the sheet along its columns in m, the circumference of a closed one."""
+    """Length of the sheet along its columns in m."""
     return skin.columns * skin.pitch_x_mm * contacts.M
 
 
 def _extent(skin: Skin) -> tuple[float, float]:
-    """Width and height between the outermost switches, in mm."""
     return (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm
 
 
 def fingertip(skin: Skin) -> Scene:
-    """One fingertip at rest, a third into the sheet."""
+    """A fingertip at rest, a third into the sheet."""
     width, height = _extent(skin)
     return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=width / 3, y_mm=height / 3),))
 
 
 def two_fingers(skin: Skin) -> Scene:
-    """Two fingertips side by side, with at least one free column between them; on a single column, a free row."""
+    """Two fingertips with a free column between them, on a single column a free row."""
     width, height = _extent(skin)
     gap, angle = (1.01 * skin.pitch_y_mm, 90.0) if skin.columns == 1 else (1.01 * skin.pitch_x_mm, 0.0)
     return Scene(contacts.pair(gap, FINGER_MM, width / 2, height / 2, angle))
 
 
 def palm(skin: Skin) -> Scene:
-    """A hand laid flat in the middle, around a hollow."""
+    """A hand laid flat in the middle."""
     width, height = _extent(skin)
     return Scene((Contact(shape=contacts.palm(), x_mm=width / 2, y_mm=height / 2 - 8, force_n=40.0),))
 
 
 def sole(skin: Skin) -> Scene:
-    """A bare foot in the middle, along the sheet's longer side, as long as fits."""
+    """A bare foot in the middle, along the longer side, as long as fits."""
     width, height = _extent(skin)
     along, angle = (height + 0.9 * skin.pitch_y_mm, 0.0) if height >= width else (width + 0.9 * skin.pitch_x_mm, 90.0)
     shape = contacts.sole(min(FOOT_MM, along))
@@ -140,14 +136,14 @@ def sole(skin: Skin) -> Scene:
 
 
 def edge(skin: Skin) -> Scene:
-    """A straight edge across the sheet, 20 degrees off the rows, wide enough to press a switch in each column."""
+    """A straight edge, 20 degrees off the rows, that presses a switch in each column."""
     width, height = _extent(skin)
     shape = contacts.edge(2 * (width + height) + 100, 1.1 * skin.pitch_y_mm)
     return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, angle_deg=20.0, force_n=40.0),))
 
 
 def moving(skin: Skin) -> Scene:
-    """A fingertip that circles around the middle of the sheet twice a second."""
+    """A fingertip that circles around the middle twice a second."""
     width, height = _extent(skin)
     x = Swing(width / 2, 0.3 * width, 2.0)
     y = Swing(height / 2, 0.3 * height, 2.0, -math.pi / 2)
@@ -170,8 +166,8 @@ def nothing(skin: Skin) -> Scene:
 
 
 def around(skin: Skin) -> Scene:
-    """A fingertip that circles the limb of a closed sheet twice per second, starting over the seam; on an open sheet it
-    leaves at the last column and returns at the first."""
+    """A fingertip that circles the limb of a closed sheet twice per second; on an open sheet it leaves at the last
+    column and returns at the first."""
     _, height = _extent(skin)
     start = -skin.pitch_x_mm / 2
     x = Round(start, skin.columns * skin.pitch_x_mm, 2.0)
@@ -188,27 +184,26 @@ def grip(skin: Skin) -> Scene:
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
     scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
 }
-"""Contact scenes by name, for any sheet."""
+"""Contact scenes by name."""
 
 AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}
-"""Contact scenes by name, for sheets whose ends meet."""
+"""Contact scenes for closed sheets, by name."""
 
 _BY_NAME = CONTACTS | AROUND
 
 NAMES = (*_BY_NAME, *SHAPES)
-"""Names that :func:`scene` accepts: contacts, and the shapes that break labellers."""
+"""Names that :func:`scene` accepts."""
 
 Source = str | Path | np.ndarray | Scene | Recording | CellsAt | None
 """Argument of :func:`scene`."""
 
 
 def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> CellsAt:
-    """The cells that a scene presses on a sheet, as a function of time.
+    """Pressed cells of a scene on a sheet, as a function of time.
 
     ``source``: one of :data:`NAMES` (default: fingertip); a Scene; a Recording, its .npy or .npz file, or an array
-    (rows, columns) or (frames, rows, columns), played in a loop (:mod:`contactfpga_sim.model.scenes.recordings`); or a
-    function of time. ``cover``: through which contacts press; irrelevant for recordings and functions. Raises
-    ValueError for anything else.
+    (rows, columns) or (frames, rows, columns), played in a loop; or a function of time. ``cover``: through which
+    contacts press. Raises ValueError for anything else.
     """
     if source is None:
         source = "fingertip"
@@ -232,7 +227,7 @@ def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> Cell
 
 
 def contacts_of(skin: Skin, source: Source) -> Scene | None:
-    """The contacts of a Scene or the name of one; None for other sources."""
+    """Contacts of a Scene or of its name; None for other sources."""
     if isinstance(source, Scene):
         return source
     if source is None:

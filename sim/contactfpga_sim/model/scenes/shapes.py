@@ -1,4 +1,4 @@
-"""Patterns that break labellers, for any size: each function gives (rows, columns) bool cells."""
+"""Patterns that break labellers: functions to (rows, columns) bool cells."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def spiral(rows: int, columns: int) -> np.ndarray:
-    """One arm, one cell wide, wound inward with a gap of one cell: merged only at its end."""
+    """One arm, wound inward with a gap of one cell, merged only at its end."""
     cells = np.zeros((rows, columns), bool)
     y, x, dy, dx = 0, 0, 0, 1
     cells[0, 0] = True
@@ -31,7 +31,7 @@ def _inside(cells: np.ndarray, place: tuple[int, int]) -> bool:
 
 
 def comb(rows: int, columns: int) -> np.ndarray:
-    """Teeth in every second column, joined by the last row: all merge at the end."""
+    """Teeth in every second column that merge in the last row."""
     cells = np.zeros((rows, columns), bool)
     cells[:, ::2] = True
     cells[-1] = True
@@ -39,13 +39,13 @@ def comb(rows: int, columns: int) -> np.ndarray:
 
 
 def checkerboard(rows: int, columns: int) -> np.ndarray:
-    """Every second cell: one zone with 8-connectivity, the most possible zones with 4."""
+    """Every second cell: one zone with 8-connectivity, the most zones with 4."""
     y, x = np.indices((rows, columns))
     return (y + x) % 2 == 0
 
 
 def nested_u(rows: int, columns: int) -> np.ndarray:
-    """Nested cups, open at the top: the most zones that wait at once, the inner ones closed first."""
+    """Nested cups, open at the top: the most waiting zones, the inner ones closed first."""
     y, x = np.indices((rows, columns))
     depth = np.minimum(np.minimum(x, columns - 1 - x), rows - 1 - y)
     return depth % 2 == 0
@@ -57,13 +57,13 @@ def nested_arch(rows: int, columns: int) -> np.ndarray:
 
 
 def ladder(rows: int, columns: int) -> np.ndarray:
-    """Rails in every second column with rungs shifted from gap to gap: holes, and merges in every row."""
+    """Rails in every second column with shifted rungs: holes, and merges in every row."""
     y, x = np.indices((rows, columns))
     return (x % 2 == 0) | ((y + x // 2) % 2 == 0)
 
 
 def tree(rows: int, columns: int) -> np.ndarray:
-    """Single cells that merge in pairs, the pairs in pairs, and so on downward."""
+    """Single cells that merge in pairs, the pairs in pairs, and so on."""
     cells = np.zeros((rows, columns), bool)
     stems = list(range(0, columns, 2))
     y = 0
@@ -86,14 +86,14 @@ def tree(rows: int, columns: int) -> np.ndarray:
 
 
 def rings(rows: int, columns: int) -> np.ndarray:
-    """Closed rings in one another, one cell apart."""
+    """Closed rings in one another."""
     y, x = np.indices((rows, columns))
     depth = np.minimum(np.minimum(x, columns - 1 - x), np.minimum(y, rows - 1 - y))
     return depth % 2 == 0
 
 
 def dots(rows: int, columns: int) -> np.ndarray:
-    """Single cells in every second row and column: the most possible zones with 8-connectivity."""
+    """Single cells in every second row and column: the most zones with 8-connectivity."""
     y, x = np.indices((rows, columns))
     return (y % 2 == 0) & (x % 2 == 0)
 
@@ -112,7 +112,7 @@ def diagonals(rows: int, columns: int) -> np.ndarray:
 
 
 def zigzag(rows: int, columns: int) -> np.ndarray:
-    """Lines that run down and up again: every upper turn is a new zone that merges later."""
+    """Lines that run down and up: every upper turn is a new zone that merges later."""
     y, x = np.indices((rows, columns))
     wave = np.abs(x % 6 - 3)
     return (y - wave) % 4 == 0
@@ -130,7 +130,7 @@ SHAPES: dict[str, Callable[[int, int], np.ndarray]] = {
         *(rings, dots, stripes, diagonals, zigzag, full),
     )
 }
-"""Every shape by its name."""
+"""Shapes by name."""
 
 
 def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:
@@ -148,8 +148,8 @@ def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def around(rows: int, columns: int) -> np.ndarray:
-    """(n, rows, columns) bool, for a closed sheet: all variants, shifted over the seam and sheared around the cylinder;
-    helices; spirals; hooks."""
+    """(n, rows, columns) bool, for a closed sheet: variants, shifted over the seam and sheared; helices; spirals;
+    hooks."""
     frames = []
     for _, cells in variants(rows, columns):
         for lean in (-3, -1, 0, 1, 2):
@@ -169,7 +169,7 @@ def around(rows: int, columns: int) -> np.ndarray:
 
 
 def _hook(rows: int, columns: int) -> np.ndarray:
-    """An arch over the seam, and inside it a zone that the last row joins with one leg, on another turn."""
+    """An arch over the seam, and inside it a zone that the last row joins on another turn."""
     cells = np.zeros((rows, columns), bool)
     cells[0, [0, 1, 2, -2, -1]] = cells[-1, :3] = True
     cells[:, [2, -2]] = True

@@ -1,12 +1,10 @@
 """Number, size and place of contacts, from their continuous shapes alone.
 
-Overlapping or touching parts are one contact. A row of constant y cuts each convex part in one interval; the exact
-union of intervals is integrated over y by Gauss-Legendre between all heights of beginnings, ends, corners and crossings
-of outlines. The error is at most 1e-7 of the area, unless two outlines cross twice between two of the :data:`SAMPLES`
-compared heights of a stretch; the sliver between them is then miscounted.
+Overlapping or touching parts are one contact. A row of constant y cuts each convex part in one interval; the union of
+intervals is integrated over y by Gauss-Legendre between all beginnings, ends, corners and crossings of outlines. The
+error is at most 1e-7 of the area, unless two outlines cross twice between adjacent :data:`SAMPLES`.
 
-A sheet whose ends meet, laid flat, repeats for any number of turns, as do its contacts, which press wherever they reach
-around the cylinder.
+A closed sheet, laid flat, repeats, as do its contacts.
 """
 
 from __future__ import annotations
@@ -23,10 +21,10 @@ import numpy as np
 from contactfpga.design.cover import Load, Part
 
 TOUCH_M = 1e-9
-"""Largest gap of parts that count as one contact, so that rounding does not separate touching ones."""
+"""Largest gap of parts that count as one contact, in spite of rounding."""
 
 SAMPLES = 65
-"""Compared heights per stretch for finding crossings of outlines."""
+"""Heights per stretch compared for crossings of outlines."""
 
 NODES = 24
 """Gauss-Legendre nodes per stretch without a crossing."""
@@ -37,14 +35,14 @@ class TrueContact(NamedTuple):
 
     area_mm2: float
     x_mm: float
-    """Barycenter along the columns; column 0 is at 0. NaN for a contact all around a closed sheet."""
+    """Barycenter along the columns; column 0 is at 0. NaN for a contact all around."""
     y_mm: float
     """Barycenter along the rows; row 0 is at 0."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """The contacts at one instant, in the order of :class:`contactfpga.Zones`: by y, x and area."""
+    """Contacts at one instant, ordered by y, x and area like :class:`contactfpga.Zones`."""
 
     contacts: tuple[TrueContact, ...]
 
@@ -69,13 +67,13 @@ class Box(NamedTuple):
 
 
 def truth_of(parts: Sequence[Part], box: Box = Box()) -> Truth:  # noqa: B008, a tuple that cannot change
-    """The contacts of these parts, within the box."""
+    """Contacts of these parts within the box."""
     groups = _groups([part for part in parts if lies_in(part, box)], box)
     return in_order(measured(group, box) for group in groups)
 
 
 def in_order(contacts: Iterable[tuple[float, float, float]]) -> Truth:
-    """The truth of contacts with these areas in m2 and barycenters in m."""
+    """Truth of contacts with these areas in m2 and barycenters in m."""
     found = [TrueContact(area * 1e6, x * 1e3, y * 1e3) for area, x, y in contacts if area > 0]
     return Truth(tuple(sorted(found, key=lambda one: (one.y_mm, one.x_mm, one.area_mm2))))
 
@@ -92,12 +90,11 @@ def widths(part: Part, box: Box) -> tuple[float, float]:
 
 
 def lies_in(part: Part, box: Box) -> bool:
-    """Whether any part of it is in the box."""
+    """Whether any of a part is in the box."""
     return distance_m([part], box) < 0
 
 
 def _groups(parts: Sequence[Part], box: Box) -> list[list[Part]]:
-    """Parts that are joined, directly or indirectly."""
     groups: list[list[Part]] = []
     for part in parts:
         joined = [group for group in groups if any(distance_m([part, other], box) <= TOUCH_M for other in group)]
@@ -107,10 +104,9 @@ def _groups(parts: Sequence[Part], box: Box) -> list[list[Part]]:
 
 
 def distance_m(parts: Sequence[Part], box: Box) -> float:
-    """Below 0 if all these parts share a point in the box; else a distance along x or y in m.
+    """Below 0 if all parts share a point in the box; else a distance along x or y in m.
 
-    A part's left end is convex over y and its right end concave, so the difference of the rightmost left end and the
-    leftmost right end is convex, and its minimum is found by bisection.
+    The distance is convex over y, so bisection finds its minimum.
     """
     low = max(_heights(part, box)[0] for part in parts)
     high = min(_heights(part, box)[1] for part in parts)
@@ -168,7 +164,7 @@ def _outlines(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
 
 
 def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> list[float]:
-    """Heights between which outlines keep their order; each part is cut from start to end, or nowhere."""
+    """Heights between which outlines keep their order; each part is cut from start to end or nowhere."""
     middle, half = (start + end) / 2, (end - start) / 2
     active = [part for part in parts if np.isfinite(part.span(np.array(middle))[0])]
     if not active:  # between two parts that hardly touch
@@ -201,7 +197,6 @@ def _nodes() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _stretch(parts: Sequence[Part], box: Box, low: float, high: float) -> np.ndarray:
-    """Area, and area times x and times y, between two heights."""
     nodes, weights = _nodes()
     y = (low + high) / 2 + (high - low) / 2 * nodes
     spans = [part.span(y) for part in parts]
@@ -219,8 +214,7 @@ def _stretch(parts: Sequence[Part], box: Box, low: float, high: float) -> np.nda
 
 
 def all_loads(loads: Sequence[Load], left_m: float, around_m: float) -> list[Load]:
-    """The loads on the sheet that begins at ``left_m``: each on all turns within a turn of it, as a cover spreads loads
-    beside a switch."""
+    """Loads on the sheet that begins at ``left_m``, on all turns within a turn of it."""
     box = Box(left_m - around_m, left_m + 2 * around_m)
     return [
         Load(tuple(_moved(part, turn * around_m) for part in load.parts), load.force_n)
@@ -230,9 +224,9 @@ def all_loads(loads: Sequence[Load], left_m: float, around_m: float) -> list[Loa
 
 
 def truth_around(parts: Sequence[Part], box: Box, around_m: float) -> Truth:
-    """The contacts of these parts on a sheet of this circumference, which fills the box.
+    """Contacts of these parts on a closed sheet that fills the box.
 
-    The x of a contact is from 0 to the circumference; one all the way round has none.
+    The x of a contact is from 0 to the circumference; NaN for a contact all around.
     """
     band = Box(top=box.top, bottom=box.bottom)
     return in_order(
@@ -252,13 +246,11 @@ def _unrolled(group: Sequence[Part], band: Box, around_m: float) -> tuple[float,
 
 
 def _around(group: Sequence[Part], box: Box, around_m: float) -> tuple[float, float, float]:
-    """Area and barycenter of one turn, counting overlaps of several turns once."""
     area, _, y = measured(on_all_turns(group, box, around_m), box)
     return area, math.nan, y
 
 
 def _groups_around(parts: Sequence[Part], band: Box, around_m: float) -> Iterator[tuple[list[Part], bool]]:
-    """Joined parts, each on its turn, and whether they close around."""
     turns: dict[int, int] = {}
     for seed in range(len(parts)):
         if seed in turns:
@@ -275,13 +267,11 @@ def _groups_around(parts: Sequence[Part], band: Box, around_m: float) -> Iterato
 
 
 def _meetings(one: Part, other: Part, band: Box, around_m: float) -> list[int]:
-    """Turns by which the other part must move to meet this one."""
     near = _turns(other, Box(*widths(one, band)), around_m)
     return [turn for turn in near if distance_m([one, _moved(other, turn * around_m)], band) <= TOUCH_M]
 
 
 def _turns(part: Part, box: Box, around_m: float) -> range:
-    """Turns by which it can move to be between the box's left and right, or touch them."""
     left, right = widths(part, Box())
     first, last = (box.left - right - TOUCH_M) / around_m, (box.right - left + TOUCH_M) / around_m
     return range(math.ceil(first), math.floor(last) + 1)

@@ -1,7 +1,4 @@
-"""Circuits of many kinds in the project's model and in ngspice, compared over each phase of the scan.
-
-ngspice, if installed, is an independent check of the circuit model.
-"""
+"""Circuits in the project's model and, for an independent check, in ngspice, in each phase of the scan."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ PHASES: dict[str, tuple[Callable[[Network, Levels], Phase], tuple[str, ...]]] = 
     "project columns": (phases.project_columns, ("one cell", "all but a column", "checker")),
 }
 ROUNDS = 7
-"""Rounds per phase; the first has the nominal circuit at 16x16."""
+"""Rounds per phase, the first with the nominal circuit at 16x16."""
 PATTERN_SEED = 13
 
 
@@ -49,7 +46,7 @@ class SpiceCase:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpiceComparison:
-    """Seconds by both models, and the lowest volts of a column that should stay high, for a phase."""
+    """Seconds by both models, and the lowest volts of a column that should stay high."""
 
     case: SpiceCase
     ours_s: float
@@ -59,7 +56,7 @@ class SpiceComparison:
 
     @property
     def error(self) -> float:
-        """Relative excess of our time."""
+        """Relative excess of the model's time over ngspice's."""
         return self.ours_s / self.spice_s - 1
 
 
@@ -79,7 +76,6 @@ def _case(
     rng: np.random.Generator,
     nominal: bool,
 ) -> SpiceCase:
-    """A case whose circuit reaches readable levels."""
     pressed = rng.random(size) < 0.3 if pattern == "random" else patterns.named(*size)[pattern]
     while True:
         circuit = Circuit() if nominal else _drawn(rng)
@@ -90,8 +86,6 @@ def _case(
 
 
 def _drawn(rng: np.random.Generator) -> Circuit:
-    """A circuit of values on a logarithmic scale, to two digits."""
-
     def between(low: float, high: float) -> float:
         return float(f"{low * (high / low) ** rng.random():.2g}")
 
@@ -110,7 +104,7 @@ def _drawn(rng: np.random.Generator) -> Circuit:
 
 
 def compared(case: SpiceCase) -> SpiceComparison:
-    """Run both models."""
+    """Run both models on a case."""
     phase = case.phase
     ours = phases.passed(phase)
     seconds, volts = run(phase, float(ours.trace.seconds[-1]))
@@ -136,7 +130,8 @@ def installed() -> bool:
 
 
 def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) seconds and (n, lines) volts under the phase's last drive; ``celsius``: of the diodes, 27 in our model."""
+    """(n,) seconds and (n, lines) volts under the phase's last drive; ``celsius``: of the diodes, 27 in the project's
+    model."""
     if not installed():
         raise MissingTool("the comparison", "ngspice", "apt install ngspice")
     with tempfile.TemporaryDirectory() as folder:
@@ -155,11 +150,11 @@ def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) 
 
 
 SCHOTTKY_GAP = "EG=0.69 XTI=2"
-"""SPICE's band gap for the temperature of a Schottky diode; no effect at 27 degrees Celsius."""
+"""Band gap and exponent of a Schottky diode's temperature in SPICE."""
 
 
 def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: float = 27.0) -> str:
-    """The deck: it settles under the first drive, and writes time and volts of all lines."""
+    """Deck that settles under the first drive, and writes time and volts of all lines."""
     lines = phase.network.rows + phase.network.columns
     end = sum(phase.seconds) + seconds
     names = " ".join(f"v({line})" for line in range(1, lines + 1))
@@ -210,7 +205,6 @@ def _parts(network: Network) -> Iterator[str]:
 
 
 def _pins(phase: Phase) -> Iterator[str]:
-    """For each line a source of the level, and a switch that is closed while the pin drives."""
     starts = [0.0, *np.cumsum([0.0, *phase.seconds]).tolist()]
     for line in range(phase.network.rows + phase.network.columns):
         levels = [float(drive.volts[line]) for drive in phase.drives]
@@ -225,7 +219,6 @@ def _pins(phase: Phase) -> Iterator[str]:
 
 
 def _steps(starts: list[float], values: list[float]) -> str:
-    """A source with each value from its start on."""
     points = [f"0 {values[0]:g}"]
     for start, before, after in zip(starts[1:], values, values[1:]):
         if before != after:

@@ -1,4 +1,4 @@
-"""A converter at the board's pins, edge by edge by its data sheet, with set inputs."""
+"""Converters at the board's pins, edge by edge by data sheet, with set inputs."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ PERIOD, AHEAD = 2048, 4
 """Clock periods per conversion, and periods before its end in which ready is high anyhow."""
 WORDS, BITS = 10, 24
 SETTLING = 2
-"""Results after power-up from the filter that settles within one period."""
+"""Results after power-up from a filter that settles within one period."""
 
 
 class Ads131m08:
-    """All channels at once. A result is of the middle of the filter's window: three periods, but one for the first two
-    results after power-up (SBAS950B 8.3.7.1). It keeps two unread results."""
+    """All channels at once. A result is of the middle of the filter's window: three periods, one for the first two
+    results (SBAS950B 8.3.7.1). Two unread results are kept."""
 
     reads: tuple[str, ...] = ("spi_clock", "spi_select_n", "spi_mosi", "spi_pace")
     gives: tuple[str, ...] = ("spi_miso", "spi_ready_n")
 
     def __init__(self, codes: Sequence[int]):
         self.codes = list(codes)
-        """Current reading of each input, from 0 on, with no voltage in the middle."""
+        """Current reading of each input, from 0 on; 0 V is in the middle."""
         self._middles: list[list[int]] = []
         self._results: list[list[int]] = []
         self._ready_n, self._pace, self._clock, self._select_n = 1, 0, 0, 1
@@ -104,8 +104,6 @@ class Ads131m08:
             self._ready_n = 0
 
     def _next_frame(self) -> int:
-        """The oldest result, else the last one again: its status, eight channels in two's complement, an unused
-        check."""
         if self._results:
             self._last = self._results[0]
         status, check = 0x050000 | 0xFF00 * bool(self._results), 0xA5A500
@@ -129,7 +127,7 @@ def converter_of(skin: Skin) -> Model | None:
 
 
 def check_simulated(skin: Skin) -> None:
-    """Raises SkinError for units on a converter without a simulation."""
+    """Raises SkinError for a converter without a simulation."""
     chosen = converters.find(skin.converter)
     if skin.units and chosen.name not in _MODELS:
         raise SkinError(f"converter is {chosen.name!r}, which is not simulated; give it a model (docs/extend.md)")

@@ -1,4 +1,4 @@
-"""Lines with settling times in the compiled board: the sheet's circuit, reduced per clock."""
+"""Settling lines in the compiled board: the sheet's circuit, reduced per clock."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from contactfpga.skin import Skin
 
 @dataclasses.dataclass(frozen=True)
 class ColumnLine:
-    """A column goes exponentially to the level that a pressed switch pulls it to, or back to the released one.
+    """A column settles exponentially to its pressed or its released level.
 
-    Levels are shares of the way from the supply to ground. Both exponentials cross the threshold when the circuit's
-    column reaches its surely read level.
+    Levels are shares of the way from supply to ground. Both exponentials cross the threshold when the circuit's column
+    reaches its surely read level.
     """
 
     press_s: tuple[float, ...]
-    """Time constants toward pressed, by the number of columns that the row pulls."""
+    """Time constants toward pressed, by number of columns that the row pulls."""
     pulled: tuple[float, ...]
-    """Final share of the way of a column, by the same number."""
+    """Final share of the way, by number of columns that the row pulls."""
     release_s: float
     """Time constant toward released."""
     threshold: float
@@ -35,7 +35,7 @@ class ColumnLine:
     def of(
         cls, circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", most: int | None = None
     ) -> ColumnLine:
-        """The slowest column of a sheet with equally pressed rows, at most ``most`` pressed switches a row."""
+        """The slowest column of a sheet with equally pressed rows, at most ``most`` switches each."""
         levels = Levels.of(circuit, diodes)
         threshold = 1 - levels.low / circuit.supply_v
         counts = [count for count in (1, 2, 4, 8, 16, 32) if count < (most or columns)] + [most or columns]
@@ -58,13 +58,13 @@ class ColumnLine:
 
 @dataclasses.dataclass(frozen=True)
 class RowLine:
-    """A released row while columns drive goes to the level to which pressed switches lift it, or back to the untouched
+    """A released row settles, while columns drive, to the level to which pressed switches lift it, or to the untouched
     one. Levels are shares of the way from the untouched level to the columns'."""
 
     rise_s: tuple[float, ...]
     """Time constants toward touched, by the number of pressed switches."""
     lifted: tuple[float, ...]
-    """Final share of the way, by the same number."""
+    """Final share of the way, by the number of pressed switches."""
     fall_s: float
     """Time constant toward untouched."""
     threshold: float
@@ -87,7 +87,7 @@ class RowLine:
 
 
 def lines_of(circuit: Circuit, skin: Skin, most: int | None = None) -> tuple[ColumnLine, RowLine | None]:
-    """Columns of a Skin's sheet, with at most ``most`` pressed switches a row, and rows if read."""
+    """Columns of a Skin's sheet, with at most ``most`` pressed switches per row, and rows if they are read."""
     if skin.guard:
         most = None  # the guard row presses all columns
     columns = ColumnLine.of(circuit, skin.row_lines, skin.column_lines, skin.diodes, most)
@@ -99,7 +99,7 @@ def _one_row(circuit: Circuit, columns: int, count: int) -> Network:
 
 
 def _lifted(circuit: Circuit, levels: Levels, columns: int, count: int) -> tuple[float, float]:
-    """Seconds until a row with ``count`` pressed switches reads touched, 0 if never, and its final share."""
+    """Seconds until a row reads touched, 0 if never, and its final share."""
     phase = phases.project_rows(_one_row(circuit, columns, count), levels, lifted=True)
     seconds = phases.passed(phase).seconds
     share = float(phases.rest_volts(phase)[columns]) / circuit.supply_v
@@ -107,7 +107,6 @@ def _lifted(circuit: Circuit, levels: Levels, columns: int, count: int) -> tuple
 
 
 def _alike(circuit: Circuit, rows: int, columns: int, count: int) -> Network:
-    """A network with this many adjacent pressed switches in each row."""
     return Network(circuit, np.tile(np.arange(columns) < count, (rows, 1)))
 
 

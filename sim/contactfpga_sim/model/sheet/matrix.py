@@ -1,5 +1,4 @@
-"""The sheet at the board's pins: switches with ideal diodes, guard lines, stuck, cut or joined lines, and bridged
-diodes."""
+"""The sheet at the board's pins: switches with ideal diodes, and faults."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Shorts:
-    """Joints without resistance, in the sheet's rows and columns, a guard line as the last."""
+    """Joints without resistance, in the sheet's rows and columns, guard lines last."""
 
     rows: tuple[tuple[int, int], ...] = ()
     """Pairs of joined rows."""
@@ -24,14 +23,14 @@ class Shorts:
     crossed: tuple[tuple[int, int], ...] = ()
     """Joined pairs of a row and a column."""
     bridged: tuple[tuple[int, int], ...] = ()
-    """Row and column of switches with bridged diodes; closed they conduct both ways."""
+    """(row, column) of switches with bridged diodes, which conduct both ways when closed."""
     supplied: tuple[int, ...] = ()
     """Rows joined with the supply of the released level."""
     pulled: tuple[int, ...] = ()
-    """Columns whose strong pull lifts them at once."""
+    """Columns with a strong pull, which lifts them at once."""
 
     def soldered(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Shorts:
-        """The joints in lines, given the line of each row and column."""
+        """Joints in lines, given the line of each row and column."""
         return Shorts(
             tuple((rows[one], rows[other]) for one, other in self.rows),
             tuple((columns[one], columns[other]) for one, other in self.columns),
@@ -93,7 +92,7 @@ def bits(lines: Iterable[int]) -> int:
 
 
 def words(cells: np.ndarray | None, rows: int) -> list[int]:
-    """The rows of (R, C) bool cells as ints, bit c is column c; None: nothing pressed."""
+    """Rows of (R, C) bool cells as ints, bit c is column c; None: nothing pressed."""
     if cells is None:
         return [0] * rows
     return [int("".join("1" if cell else "0" for cell in row[::-1]), 2) for row in np.asarray(cells, bool)]
@@ -106,12 +105,11 @@ class Contention(AssertionError):
 class Matrix:
     """Levels of columns and rows for pressed cells and the board's drives.
 
-    A pressed switch passes only its row's selecting level to its column, by a series diode. ``col2row``: a row selects
-    by low, and a pressed column is low, else pulled up; ``row2col``: both high, else pulled down. Masked cells may be
-    pressed too; the board must ignore them. Conversely, a driven column passes the released level to released rows,
-    which are otherwise pulled to the selecting level; so is an undriven column, by a pressed switch to such a row, as
-    its own pull is weaker. A stuck column cannot be driven. After a discharge of a self-test, released columns stay at
-    the selecting level for a slot, as their pulls are weak.
+    A pressed switch passes its row's selecting level to its column, by a series diode: low with ``col2row``, where
+    columns are otherwise pulled up; high with ``row2col``. A driven column passes the released level to released rows,
+    which are otherwise pulled to the selecting level, as are undriven columns on them. A stuck column cannot be driven.
+    After a self-test's discharge, released columns stay at the selecting level for a slot. The board must ignore masked
+    cells.
 
     Switches and faults are in the sheet's rows and columns, guard lines last; levels are those of the lines that these
     are soldered to.
@@ -130,13 +128,13 @@ class Matrix:
         self._pressed = [0] * skin.rows
         self._reaches = [self._all_columns] * skin.row_lines
         self.stuck = 0
-        """LineBits of the stuck columns."""
+        """Stuck columns."""
         self._shorts: Shorts | None = None
         self._released = LineBits(0, 0)  # let go, and lifted to the released level
         self._keeps = skin.derived.settle_clocks + 1 if skin.self_test else 0  # clocks
         self._kept, self._left = 0, 0  # columns, and clocks for which they are
         self.closed = [0] * skin.row_lines
-        """By a row's line, the column lines that it reaches through closed switches."""
+        """By row line the column lines reached through closed switches."""
         self._solder()
 
     def press(self, cells: np.ndarray | Sequence[int] | None, stuck: np.ndarray | None = None) -> None:
@@ -150,8 +148,7 @@ class Matrix:
         self._solder()
 
     def cut(self, rows: Mapping[int, int], columns: Mapping[int, int]) -> None:
-        """Cut lines, and mend all others: a row's switches from a column on, and a column's from a row on, no longer
-        reach the pin. ``rows`` gives that column by row, ``columns`` that row by column."""
+        """Set the cut lines, as in :class:`contactfpga_sim.model.golden.trace.Cuts`."""
         self._reaches = [(1 << rows.get(row, self.column_lines)) - 1 for row in range(self.row_lines)]
         for column, end in columns.items():
             for row in range(end, self.row_lines):
@@ -159,11 +156,10 @@ class Matrix:
         self._solder()
 
     def join(self, shorts: Shorts | None) -> None:
-        """Join lines and bridge diodes, and separate all others."""
+        """Set the joined lines and bridged diodes."""
         self._shorts = shorts and shorts.soldered(self._row_line, self._column_line)
 
     def _solder(self) -> None:
-        """Compute the closed, whole connections of lines."""
         for row, guard in enumerate(self._guards):
             pressed = self._pressed[row] if row < self._rows else 0
             self.closed[self._row_line[row]] = self._on_lines((pressed | guard) & self._reaches[row])
@@ -172,8 +168,8 @@ class Matrix:
         return sum(1 << line for column, line in enumerate(self._column_line) if columns >> column & 1)
 
     def feeding(self, driven: int, level: int | None) -> tuple[int, int]:
-        """Driven columns at the released level, and at the selecting one. ``level`` is that of all but a guard column,
-        which has the other; None if columns have one drive level."""
+        """Driven columns at the released level, and at the selecting one. ``level``: of all but a guard column, which
+        has the other; None if columns have one drive level."""
         if level is None:
             return driven, 0
         plain = self._all_columns >> self._guarded
@@ -208,7 +204,6 @@ class Matrix:
         return pulled
 
     def _drained(self, rows_driven: int, columns_driven: int) -> int:
-        """Undriven columns that a released row pulls and nothing lifts."""
         drained, lifted = 0, self._lifted(columns_driven)
         for row, word in enumerate(self.closed):
             if not (rows_driven | lifted.rows) >> row & 1:
@@ -216,14 +211,12 @@ class Matrix:
         return drained & ~(columns_driven | lifted.columns)
 
     def _lifted(self, columns_driven: int) -> LineBits:
-        """Lines that follow columns driven to the released level; with shorts, as of this clock."""
         if self._shorts is not None:
             return LineBits(self._released.rows, self._released.columns | bits(self._shorts.pulled))
         feeding = columns_driven & ~self.stuck
         return LineBits(sum(1 << row for row, word in enumerate(self.closed) if word & feeding), feeding)
 
     def _keep(self, held: int, lifted: int) -> int:
-        """Released columns still at the selecting level."""
         if held:
             self._kept, self._left = held, self._keeps
         elif self._left:
@@ -233,8 +226,8 @@ class Matrix:
         return 0
 
     def _follow(self, selecting: LineBits, releasing: LineBits) -> tuple[int, int]:
-        """With shorts: columns that follow a line at the selecting, and at the released level. Pins may oppose the
-        supply, not each other."""
+        """Columns that with shorts follow the selecting and the released level. Pins may oppose the supply, not each
+        other."""
         assert self._shorts is not None
         feeding = LineBits(releasing.rows, releasing.columns & ~self.stuck)
         low = followers(self._shorts, self.closed, selecting, selecting=True)

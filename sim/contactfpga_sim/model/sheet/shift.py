@@ -1,4 +1,4 @@
-"""The sheet with its connection to the board: direct, or chains of 74HC595 and 74HC165."""
+"""The sheet's connection to the board: direct, or chains of 74HC595 and 74HC165."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ COLUMN_DATA = {"direct": "columns", "74hc165": "column_data"}
 class RowRegisters:
     """Chains of 74HC595. Output i of a chain is its line i; power-up contents are random.
 
-    The data pin counts as before a rising edge of the shift clock, the shifted bits as before a rising edge of the
-    latch.
+    Data count as before a rising edge of the shift clock, shifted bits as before one of the latch.
     """
 
     def __init__(self, lines: int, chains: int, power_up: random.Random):
@@ -32,7 +31,7 @@ class RowRegisters:
         self._before: tuple[int, int, int] | None = None
 
     def step(self, data: int, clock: int, latch: int, enable_n: int) -> int | None:
-        """Levels of all outputs in this cycle, bit r is row r; None while disabled."""
+        """Levels of all outputs, bit r is row r; None while disabled."""
         data_before, clock_before, latch_before = self._before or (data, clock, latch)
         self._before = (data, clock, latch)
         if latch and not latch_before:
@@ -57,7 +56,7 @@ class ColumnRegisters:
         self._outputs = deque([0] * (delay + 1), delay + 1)
 
     def step(self, load_n: int, clock: int, columns: int) -> int:
-        """Levels of the serial outputs in this cycle, bit j is chain j, for these column levels."""
+        """Levels of the serial outputs, bit j is chain j, for these column levels."""
         rises = clock and self._clock == 0
         self._clock = clock
         if not load_n:
@@ -72,8 +71,8 @@ class ColumnRegisters:
 class SheetAtPins:
     """A :class:`Matrix` at the pins of the gateware's top, cycle by cycle.
 
-    ``reads`` names the top's outputs it needs, ``drives`` the inputs it sets. ``column_delay``: see
-    :class:`ColumnRegisters`; ``row_levels`` are those of the row wires.
+    ``reads``: the top's outputs to read; ``drives``: its inputs to set. ``column_delay``: as in
+    :class:`ColumnRegisters`; ``row_levels``: levels of the row wires.
     """
 
     def __init__(self, skin: Skin, power_up: int = 0, column_delay: int = 0):
@@ -98,7 +97,7 @@ class SheetAtPins:
             self.column_registers = ColumnRegisters(skin.column_lines, skin.column_chains, contents, column_delay)
 
     def step(self, pins: Mapping[str, int]) -> tuple[int, ...]:
-        """Levels of ``drives`` in this cycle, given those of ``reads``."""
+        """Levels of ``drives``, given those of ``reads``."""
         if self.row_registers is None:
             self.row_levels = pins["rows"]
         else:

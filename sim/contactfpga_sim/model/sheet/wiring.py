@@ -1,7 +1,6 @@
-"""Readings of a faulty sheet: lines joined by pressed switches, and faulty diodes, wires and switches.
+"""Readings of a faulty sheet: joined lines, and faulty diodes, wires and switches.
 
-In :class:`Wiring` only the pulls have a resistance; :func:`at_rest` uses :mod:`contactfpga.design.circuit` for settled
-levels and currents. Guard lines are one more row and column; their misses are cuts.
+In :class:`Wiring` only the pulls have a resistance; :func:`at_rest` uses :mod:`contactfpga.design.circuit`.
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ def _none() -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Wiring:
-    """Readings of a board that drives one row at a time. Arrays are bool, (rows, columns) or one value for all.
+    """A board that drives one row at a time. Arrays are bool, (rows, columns) or one value for all.
 
     A row selects its columns through pressed switches; a column selects other rows through pressed switches without a
-    diode. Unselected rows are held at the other level, as for a sheet with diodes, or float. A broken line is cut at
-    the board; its switches still join lines.
+    diode. Unselected rows are held at the other level, or float. A broken line is cut at the board; its switches still
+    join lines.
     """
 
     bare: np.ndarray = dataclasses.field(default_factory=_none)
-    """Switches that conduct both ways: their diode is missing, bridged or shorted."""
+    """Switches that conduct both ways: diode missing, bridged or shorted."""
     dead: np.ndarray = dataclasses.field(default_factory=_none)
     """Switches that never conduct."""
     closed: np.ndarray = dataclasses.field(default_factory=_none)
@@ -41,8 +40,8 @@ class Wiring:
     """Whether unselected rows float."""
 
     def read(self, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(rows, columns) bool for pressed switches: cells that read pressed, and cells with undefined levels, because
-        a selected row and a held one meet in their column or its joined lines."""
+        """(rows, columns) bool each: cells that read pressed, and cells with undefined levels, where a selected row and
+        a held one meet in their column or its joined lines."""
         conducts = (pressed | self.closed) & ~self.dead
         read, undefined = np.zeros_like(conducts), np.zeros_like(conducts)
         for row in range(len(conducts)):
@@ -56,7 +55,6 @@ class Wiring:
         return read, undefined
 
     def _joined(self, conducts: np.ndarray, row: int) -> tuple[list[int], np.ndarray]:
-        """The rows and the (columns,) bool that a selected row reaches, whatever else drives them."""
         back = conducts & self.bare
         reached = np.zeros(len(conducts), bool)
         reached[row] = True
@@ -69,8 +67,8 @@ class Wiring:
 
 
 def at_rest(circuit: Circuit, cells: np.ndarray, bare: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """For (rows, columns) bool pressed cells, scanned row by row: cells that read pressed, cells with undefined levels,
-    and the largest current in A through an unselected row's pin."""
+    """For (rows, columns) bool pressed cells: cells that read pressed, cells with undefined levels, and the largest
+    current in A through an unselected row's pin."""
     levels, network = Levels.of(circuit), Network(circuit, cells, bare)
     read, undefined, most = np.zeros_like(cells), np.zeros_like(cells), 0.0
     for row in range(len(cells)):
@@ -91,7 +89,7 @@ class LineCuts(NamedTuple):
 
 
 def extended(cells: np.ndarray, guard: bool = True) -> np.ndarray:
-    """(rows + 1, columns + 1) bool: the cells, and ``guard`` for the guard switches; the corner is open."""
+    """(rows + 1, columns + 1) bool: the cells, ``guard`` at the guard switches, and an open corner."""
     found = np.full((cells.shape[0] + 1, cells.shape[1] + 1), guard)
     found[:-1, :-1] = cells
     found[-1, -1] = False
@@ -99,7 +97,7 @@ def extended(cells: np.ndarray, guard: bool = True) -> np.ndarray:
 
 
 def missed(read: np.ndarray) -> LineCuts:
-    """Lines of an extended sheet's reading whose guard switch reads open, as cut right before it."""
+    """Lines of an extended sheet whose guard switch reads open, as cut right before that switch."""
     rows, columns = (number - 1 for number in read.shape)
     return LineCuts(
         dict.fromkeys(np.flatnonzero(~read[:rows, columns]).tolist(), columns),

@@ -1,4 +1,4 @@
-"""The gateware top in Amaranth's own simulator, recorded as a trace."""
+"""The gateware top in Amaranth's simulator."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0, vcd: str | None = None) -> Trace:
-    """Simulate ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` seconds of the processor.
+    """Trace of ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` processor seconds.
 
-    ``vcd`` is a file for every signal in every clock, in board time.
+    ``vcd``: file for every signal in every clock, in board time.
     """
     top = Top(skin, probes=True)
     simulator = Simulator(top)

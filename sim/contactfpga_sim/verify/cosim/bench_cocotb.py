@@ -1,4 +1,4 @@
-"""The gateware top as Verilog, through cocotb on Verilator or Icarus, recorded as a trace."""
+"""The gateware top as Verilog, through cocotb on Verilator or Icarus."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def available(simulator: str) -> bool:
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, simulator: str = "verilator", limit_s: float = 240.0) -> Trace:
-    """Simulate ``cycles`` clocks of the board.
+    """Trace of ``cycles`` clocks of the board.
 
-    Raises :class:`OutOfTime` if build and simulation need more than ``limit_s`` seconds, and :class:`SimulatorFailed`
-    if the simulator does not finish.
+    Raises :class:`OutOfTime` if build and simulation exceed ``limit_s`` seconds, and :class:`SimulatorFailed` if the
+    simulator does not finish.
     """
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as folder:
         job = Path(folder) / "job"
@@ -56,7 +56,6 @@ def run(skin: Skin, timeline: Timeline, cycles: int, simulator: str = "verilator
 
 
 def _supervise(job: Path, limit_s: float) -> None:
-    """Build and simulate in a process group of its own, to end all of it."""
     python = os.pathsep.join(path for path in sys.path if path)
     environment = os.environ | {"PATH": _search_path(), "PYTHONPATH": python, "CONTACTFPGA_JOB": str(job)}
     log = job.with_name("log")

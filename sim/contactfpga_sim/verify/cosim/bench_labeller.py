@@ -1,4 +1,4 @@
-"""The compiled labeller alone: millions of frames in, every record with its cycle out."""
+"""The compiled labeller alone: millions of frames in, records with cycles out."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ class LabellerRecords:
     cycle: np.ndarray
     """(n,) int64: cycle of each record."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each record; for a sheet whose ends meet (n, 4), with the cells past the
-    seam."""
+    """(n, 3) int64: area, sum x, sum y of each record; on closed sheets (n, 4), with the cells past the seam."""
     first_row: np.ndarray
     """(N,) int64: cycle of each frame's first row."""
     last_row: np.ndarray
@@ -35,7 +34,7 @@ class LabellerRecords:
     """(N,) int64: cycle of each frame's end mark."""
 
     def sorted_moments(self) -> np.ndarray:
-        """The moments, sorted by area, sum x, sum y within each frame."""
+        """Moments sorted by area, sum x, sum y within each frame."""
         area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
@@ -48,10 +47,7 @@ class LabellerRecords:
 
 
 class LabelBench:
-    """The Skin's labeller, compiled, for sheets of its size and connectivity.
-
-    The first build needs some seconds (:mod:`contactfpga_sim.model.board.native`).
-    """
+    """The Skin's labeller, compiled."""
 
     def __init__(self, skin: Skin):
         self.skin = skin

@@ -1,4 +1,4 @@
-"""Co-simulation through the compiled board: its events, as the golden model predicts them."""
+"""Co-simulation through the compiled board."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from contactfpga_sim.model.golden.trace import BOUNDARIES, Timeline, Trace
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, model: native.Model | None = None) -> Trace:
-    """Events of the compiled board in cycles 0 to ``cycles`` - 1; ``model`` as in :class:`CompiledBoard`."""
+    """Trace of the compiled board in cycles 0 to ``cycles`` - 1; ``model`` as in :class:`CompiledBoard`."""
     with CompiledBoard(skin, BOUNDARIES, model) as board:
         play(board, timeline, cycles)
         return trace({name: board.take(name) for name in BOUNDARIES}, cycles)
 
 
 def play(board: CompiledBoard, timeline: Timeline, until: int) -> None:
-    """Play the timeline to the board from its current cycle up to cycle ``until`` - 1."""
+    """Play the timeline to the board from its current cycle to cycle ``until`` - 1."""
     changes = {cycle: (cells, stuck) for cycle, cells, stuck in timeline.pieces}
     received, cuts, units = dict(timeline.received), dict(timeline.cuts), dict(timeline.units)
     for now in sorted(cycle for cycle in {*changes, *received, *cuts, *units} if board.cycle <= cycle < until):
@@ -39,7 +39,7 @@ def play(board: CompiledBoard, timeline: Timeline, until: int) -> None:
 
 
 def trace(events: Mapping[str, np.ndarray], cycles: int) -> Trace:
-    """The trace of a board that ran ``cycles``, from its events (dtype ``EVENT``) at each boundary."""
+    """Trace of a board that ran ``cycles``, from its events (dtype ``EVENT``) by boundary."""
     result = Trace(cycles)
     for name in BOUNDARIES:
         columns = [events[name]["cycle"].tolist(), events[name]["data"].tolist()]

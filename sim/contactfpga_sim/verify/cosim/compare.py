@@ -1,4 +1,4 @@
-"""Lockstep comparison: the first difference between gateware and golden model."""
+"""Lockstep comparison of gateware and golden model."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ Event = tuple[Any, ...]
 class Mismatch(AssertionError):
     """The first difference between two traces.
 
-    ``cycle`` is the first differing cycle, at ``boundary``; ``expected`` and ``got`` are the payloads there in that
-    cycle, None without one. If one side's next payload is later, the message tells when.
+    ``expected`` and ``got``: payloads at ``boundary`` in ``cycle``; None without one.
     """
 
     def __init__(self, boundary: str, expected: Event | None, got: Event | None):
@@ -37,10 +36,9 @@ class Mismatch(AssertionError):
 
 
 def compare(expected: Trace, got: Trace) -> int:
-    """Compare two traces over their common cycles; raises :class:`Mismatch` for the first difference.
+    """Number of agreeing events over the common cycles of two traces, which exposes an empty comparison.
 
-    If several boundaries differ in one cycle, the earliest in data order is named. Returns the number of agreeing
-    events, which exposes an empty comparison.
+    Raises :class:`Mismatch` for the first difference, at the earliest boundary in data order.
     """
     cycles = min(expected.cycles, got.cycles)
     expected, got = expected.until(cycles), got.until(cycles)
@@ -60,7 +58,7 @@ def _first(boundary: str, expected: list[Event], got: list[Event]) -> Mismatch |
 
 
 def describe(boundary: str, event: Event) -> str:
-    """The payload of an event in words."""
+    """Payload of an event in words."""
     match boundary:
         case "rows":
             return f"row {event[1]:#b}" + (" (last)" if event[2] else "")

@@ -1,4 +1,4 @@
-"""Skins and stimuli for co-simulation: a set of Skins that covers every pair of choices."""
+"""Skins that together have every pair of choices, and stimuli, for co-simulation."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
     "column_chains": (0,),
     "precharge_us": (0.0,),
 }
-"""Choices for the adaptive scan, which needs columns on pins of their own."""
+"""Choices for the adaptive scan, with columns on pins of their own."""
 
 REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
     "scan": ("reversal",),
@@ -60,11 +60,11 @@ REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
     "precharge_us": (0.1, 1.2),
     "project_us": (0.1, 1.0, 2.3),
 }
-"""Choices for line reversal, which needs rows and columns on pins of their own."""
+"""Choices for line reversal, with rows and columns on pins of their own."""
 
 
 def closed(choices: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
-    """Choices for sheets whose ends meet."""
+    """Choices for closed sheets."""
     return choices | {
         "surface": ("closed",),
         "sheet": ((4, 3), *(sheet for sheet in choices["sheet"] if sheet[1] >= MIN_AROUND)),
@@ -75,14 +75,13 @@ def closed(choices: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
-    """A short, reproducible list of assignments that has every pair of values of two choices."""
+    """A short, reproducible list of assignments with every pair of values of two choices."""
     rows = _pairwise(tuple(map(len, choices.values())), seed)
     return [{name: choices[name][value] for name, value in zip(choices, row, strict=True)} for row in rows]
 
 
 @cache
 def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
-    """:func:`pairwise` as indices, cached."""
     pick = random.Random(seed)
     open_pairs = _Open(counts)
     rows = []
@@ -94,9 +93,6 @@ def _pairwise(counts: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:
 
 
 class _Open:
-    """Pairs that are in no row yet, as bits for speed: each value of each choice has a number, and its open partners
-    are the bits of an integer."""
-
     def __init__(self, counts: Sequence[int]):
         self.counts = counts
         self._first = list(itertools.accumulate(counts, initial=0))
@@ -105,7 +101,7 @@ class _Open:
         self._partners = [every & ~own[place] for place, count in enumerate(counts) for _ in range(count)]
 
     def pairs(self) -> list[Pair]:
-        """All open pairs in order."""
+        """Open pairs in order."""
         return [
             (a, i, b, j)
             for a, count in enumerate(self.counts)
@@ -116,7 +112,7 @@ class _Open:
         ]
 
     def bits(self, row: Mapping[int, int]) -> int:
-        """The values (by place) of a row, or of part of one."""
+        """Values (by place) of a row, or of part of a row."""
         return sum(1 << (self._first[place] + value) for place, value in row.items())
 
     def closed_with(self, bits: int, place: int, value: int) -> int:
@@ -136,7 +132,6 @@ class _Open:
 
 
 def _candidate(open_pairs: _Open, first: Pair, pick: random.Random) -> dict[int, int]:
-    """The first open pair, then the values that close most others."""
     a, i, b, j = first
     row = {a: i, b: j}
     for place in pick.sample(range(len(open_pairs.counts)), len(open_pairs.counts)):
@@ -147,12 +142,12 @@ def _candidate(open_pairs: _Open, first: Pair, pick: random.Random) -> dict[int,
 
 
 def pairs_in(rows: list[list[int]]) -> set[Pair]:
-    """All pairs (choice, value, choice, value), as indices, in the rows of a covering set."""
+    """All pairs (choice, value, choice, value), as indices, in the rows."""
     return {(a, row[a], b, row[b]) for row in rows for a, b in itertools.combinations(range(len(row)), 2)}
 
 
 def skin_for(choice: dict[str, Any]) -> Skin:
-    """The Skin for an assignment of :data:`CHOICES`, :data:`ADAPTIVE`, :data:`REVERSAL` or :func:`closed` ones."""
+    """Skin for an assignment of :data:`CHOICES`, :data:`ADAPTIVE`, :data:`REVERSAL` or :func:`closed` ones."""
     rows, columns = choice["sheet"]
     megahertz, baud = choice["link"]
     values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "labeller", "report", "send")}
@@ -189,7 +184,6 @@ def skin_for(choice: dict[str, Any]) -> Skin:
 
 
 def _registers(choice: dict[str, Any]) -> dict[str, Any]:
-    """Lines on shift registers, in as many chains as they fill."""
     values: dict[str, Any] = {}
     kinds = (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165"))
     for (kind, wiring, registers), lines in zip(kinds, choice["sheet"], strict=True):
@@ -218,7 +212,7 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
 def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
     """Random cells that change at any cycle, stuck columns, requests and other bytes.
 
-    A scan that waits does not drive a stuck column, so only some of its columns are ever stuck.
+    A scan that waits does not drive stuck columns, so it gets few.
     """
     rng = np.random.default_rng([seed, 7])
     shape = (skin.rows, skin.columns)
@@ -240,8 +234,8 @@ def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
 def traffic(
     skin: Skin, gaps: Iterable[int], start: int, cycles: int, rng: np.random.Generator
 ) -> list[tuple[int, bytes]]:
-    """A host's bytes from ``start`` on, with these gaps between parts: requests, supported commands, and invalid
-    packets: damaged, cut off, of another kind, or random bytes."""
+    """A host's bytes from ``start`` on, with these gaps: requests, supported commands, and damaged, cut, unknown and
+    random packets."""
     byte = 10 * facts(skin).bit_clocks
     sent = []
     for gap in gaps:
@@ -273,7 +267,6 @@ def _packet(skin: Skin, rng: np.random.Generator) -> bytes:
 
 
 def _order(skin: Skin, rng: np.random.Generator) -> tuple[int, int]:
-    """Number and value of a command: mostly a supported one, with an effective value."""
     what = rng.choice(np.array([*facts(skin).commands, rng.integers(128)]))
     number = rng.choice(np.array([0, 1, rng.integers(1 << 12), rng.integers(1 << 18)]))
     clock, of_place = rng.integers(facts(skin).settle + 3), rng.integers(8) | number << 3

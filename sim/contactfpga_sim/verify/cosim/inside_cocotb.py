@@ -1,4 +1,4 @@
-"""The test that cocotb runs in the simulator: drive the pins, record the probes."""
+"""The test in cocotb's simulator: drive the pins, record the probes."""
 
 from __future__ import annotations
 

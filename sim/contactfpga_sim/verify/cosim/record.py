@@ -1,4 +1,4 @@
-"""Common parts of co-simulation benches: pin inputs by cycle, and the trace of the probes."""
+"""Common parts of co-simulation benches."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer", "alive")
-"""Ports of the top that are read in every cycle; a missing one is low."""
+"""Ports of the top that are read in every cycle; missing ones are low."""
 
 PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "item_end", "byte_data")
 """Ports of the top that are read at a transfer."""
 
 
 def ports(names: tuple[str, ...], skin: Skin) -> tuple[str, ...]:
-    """The names among these that the Skin's top has."""
+    """Those of the names that the Skin's top has."""
     has = {"item": skin.report == "barycenter", "alive": skin.alive}
     return tuple(name for name in names if has.get(name.split("_")[0], True))
 
@@ -34,9 +34,9 @@ class OutOfTime(RuntimeError):
 
 
 class InputDriver:
-    """Inputs of the board from sheet and line; request cycles in order.
+    """Inputs of the board from sheet and line.
 
-    ``reads`` names the top's outputs that it needs, ``drives`` the inputs it sets.
+    ``reads``: the top's outputs to read; ``drives``: its inputs to set.
     """
 
     def __init__(self, skin: Skin, timeline: Timeline):
@@ -79,14 +79,14 @@ class InputDriver:
 
 
 class TraceRecorder:
-    """Turns the top's probes, cycle by cycle, into a trace."""
+    """Turns the top's probes into a trace, cycle by cycle."""
 
     def __init__(self, cycles: int):
         self.trace = Trace(cycles)
         self._levels = _TX
 
     def note(self, cycle: int, levels: int, read: Callable[[str], int]) -> None:
-        """Record the values of :data:`LEVELS` in ``cycle``, the first lowest; ``read`` gives any other port's."""
+        """Record the :data:`LEVELS` in ``cycle``, the first lowest; ``read`` gives any other port's value."""
         if levels & _ROW:
             self.trace.rows.append((cycle, read("row_cells"), bool(read("row_last"))))
         if levels & _RECORD:

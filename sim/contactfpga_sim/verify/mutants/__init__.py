@@ -1,1 +1,1 @@
-"""Mutation testing of the gateware: does the comparison with the golden model notice netlist changes?"""
+"""Mutation testing: whether comparison with the golden model detects changes of the gateware's netlist."""

@@ -1,7 +1,6 @@
-"""Mutants of the gateware, the share that the comparison with the golden model detects, and the rest.
+"""Random mutants of the gateware, and which of them the comparison with the golden model detects.
 
-Mutants are drawn at random for each Skin. Survivors of short stimuli are tried for a proof of equivalence, then in long
-stimuli and longer proofs. The final survivors are listed.
+Survivors of short stimuli are tried for a proof of equivalence, then in longer stimuli and proofs.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 OBSERVED = (*golden.BOUNDARIES, "driven", "charged")
-"""Boundaries at which a mutant can differ from the gateware."""
+"""Boundaries at which a mutant can differ."""
 SHARED = ("line", "contact")
 """Boundaries at which a mutant of several sheets can differ."""
 
 _FIRST_LOOK = 512
-"""Cycles before the first comparison; each further one doubles the number."""
+"""Cycles before the first comparison; each further one doubles them."""
 
 Events = Mapping[str, np.ndarray]
 
@@ -41,7 +40,7 @@ Events = Mapping[str, np.ndarray]
 def survivors(
     design: Design, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus], until: float = math.inf
 ) -> list[int]:
-    """The mutants that no stimulus tells from the gateware as it should be, of those that begin before ``until``."""
+    """Mutants that no stimulus, begun before ``until``, tells from the gateware."""
     left = list(numbers)
     with _board(design, model) as board:
         for stimulus in stimuli:
@@ -53,10 +52,9 @@ def survivors(
 
 
 def expected(board: CompiledBoard | CompiledSheets, stimulus: Stimulus) -> Events:
-    """Events of the board without a mutant, after comparison with the golden model in every clock, unless lines are
-    joined.
+    """Events of the board without a mutant, compared with the golden model in every clock unless lines are joined.
 
-    Raises :class:`contactfpga_sim.verify.cosim.compare.Mismatch` if they differ.
+    Raises :class:`contactfpga_sim.verify.cosim.compare.Mismatch`.
     """
     board.restart()
     _play(board, stimulus, stimulus.cycles)
@@ -92,8 +90,8 @@ def _compare_shared(several: Several, stimulus: Stimulus, events: Events) -> Non
 
 
 def killed_at(board: CompiledBoard | CompiledSheets, number: int, stimulus: Stimulus, events: Events) -> str | None:
-    """The first boundary at which mutant ``number`` differs from ``events``, or "contention" if it drives lines against
-    each other; None if it never does."""
+    """The first boundary at which a mutant differs from ``events``, "contention" if it drives lines against each other,
+    or None."""
     board.restart(number)
     while (start := board.cycle) < stimulus.cycles:
         until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)
@@ -122,7 +120,6 @@ def _play(board: CompiledBoard | CompiledSheets, stimulus: Stimulus, until: int)
 
 
 def _play_sheets(board: CompiledSheets, timelines: Sequence[golden.Timeline], until: int) -> None:
-    """Play the cells of each sheet, and the received bytes of the first one's timeline."""
     received = dict(timelines[0].received)
     pressed: dict[int, list[tuple[int, np.ndarray]]] = {}
     for number, timeline in enumerate(timelines):
@@ -138,7 +135,7 @@ def _play_sheets(board: CompiledSheets, timelines: Sequence[golden.Timeline], un
 
 
 BATCH = 500
-"""Mutants per board; more slow it down."""
+"""Mutants per board, as more slow it down."""
 
 CHECKED = 2
 """Killed mutants of each Skin that the prover must not prove equivalent."""
@@ -146,7 +143,7 @@ CHECKED = 2
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """What became of a mutant: ``killed``, ``equivalent``, ``alive``, or ``open`` where time was up before."""
+    """Fate of a mutant: ``killed``, ``equivalent``, ``alive``, or ``open`` if time was up."""
 
     skin: str
     mutant: Mutant
@@ -154,7 +151,7 @@ class Result:
 
 
 def chosen(name: str) -> tuple[Design, tuple[str, ...]]:
-    """The Skin or sheets of this name, and the stages to mutate."""
+    """Skin or sheets of this name, and the stages to mutate."""
     if name in SKINS:
         return SKINS[name], tuple(STAGES)
     return SEVERAL[name] if name in SEVERAL else OPTIONS[name]
@@ -163,8 +160,8 @@ def chosen(name: str) -> tuple[Design, tuple[str, ...]]:
 def left_by(
     design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus], until: float = math.inf
 ) -> list[Mutant]:
-    """The mutants that behave as the golden model says under every stimulus, of those that begin before ``until``, a
-    time of :func:`time.monotonic`."""
+    """Mutants that agree with the golden model under every stimulus begun before ``until``, a
+    :func:`time.monotonic`."""
     given = list(itertools.takewhile(lambda _: time.monotonic() < until, stimuli))
     left: list[Mutant] = []
     for start in range(0, len(mutants), BATCH):
@@ -182,8 +179,8 @@ def examine(
     say: Callable[[str], None] = lambda _: None,
     budget_s: float = math.inf,
 ) -> list[Result]:
-    """The fates of ``count`` mutants of what is :func:`chosen`; ``long_s`` are the seconds of a longer proof. After
-    ``budget_s`` seconds no proof and no long stimulus begins.
+    """Fates of ``count`` mutants of what is :func:`chosen`; ``long_s``: seconds of a longer proof. No proof and no long
+    stimulus begins after ``budget_s`` seconds.
 
     Raises :class:`contactfpga_sim.verify.mutants.proof.Contradiction` if a killed mutant is proved equivalent.
     """

@@ -1,4 +1,4 @@
-"""Mutants: small changes of the gateware's netlist, all in one compiled board with a selecting input."""
+"""Mutants: small changes of the gateware's netlist, selected by an input of one compiled board."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STAGES = {
     "several": ("grants",),
     "top": (),
 }
-"""Stages, and the modules, as named in Top, with their registers."""
+"""Modules of Top, by stage."""
 
 # Longest first: a file before its room. What several stages use is of the stage whose module holds it.
 _FILES = {
@@ -72,7 +72,7 @@ _SELECT_BITS = 16
 
 @dataclasses.dataclass(frozen=True)
 class Mutant:
-    """One bit of a cell's port: inverted, held at a level, or inverted by another bit of the port."""
+    """One bit of a cell's port: inverted, held, or inverted by another bit."""
 
     stage: str
     place: str
@@ -101,7 +101,7 @@ def candidates(design: Design) -> list[Mutant]:
 
 
 def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
-    """``count`` of the mutants at random, or all; reproducible."""
+    """At most ``count`` random mutants; reproducible."""
     return random.Random(seed).sample(mutants, min(count, len(mutants)))
 
 
@@ -118,14 +118,14 @@ def model(design: Design, mutants: Sequence[Mutant]) -> native.Model:
 
 
 def switches(mutants: Sequence[Mutant]) -> list[str]:
-    """Yosys commands that insert the mutants into the prepared design, selected by its new input ``mutant``."""
+    """Yosys commands that insert the mutants, selected by the new input ``mutant``."""
     if len(mutants) >= 1 << _SELECT_BITS:
         raise ValueError(f"{len(mutants)} mutants in one board; at most {(1 << _SELECT_BITS) - 1}")
     return [f"mutate -ctrl mutant {_SELECT_BITS} {n} {mutant.change}" for n, mutant in enumerate(mutants, 1)]
 
 
 def parsed(line: str) -> Mutant | None:
-    """A line of Yosys' list; None for an excluded mutant."""
+    """Mutant of a line of Yosys' list; None if excluded."""
     options = re.findall(r"-(\w+) (\S+)", line)
     values = dict(options)
     if values["port"] in _LEFT_OUT:
@@ -141,7 +141,6 @@ def parsed(line: str) -> Mutant | None:
 
 
 def _stage(place: str, *names: str) -> str | None:
-    """The stage of a source place, else of the cell or wire of these names; None if unknown."""
     for file, stage in _FILES.items():
         if place.startswith(file):
             return stage
@@ -149,19 +148,17 @@ def _stage(place: str, *names: str) -> str | None:
 
 
 def module_of(name: str) -> str:
-    """The module of Top with this cell, wire or register of the flattened design, or of one of several sheets. A number
-    follows if a signal of Top has its name."""
+    """Module of Top with this cell, wire or register, and a number if a signal of Top has its name."""
     inside = in_sheet(name.removeprefix("$flatten").replace("\\", ""))
     return re.sub(r"\$\d+$", "", inside.partition(".")[0])
 
 
 def in_sheet(name: str) -> str:
-    """The name without that of its sheet among several."""
+    """A name without its sheet."""
     return re.sub(r"^sheet_\d+\.", "", name)
 
 
 def _with_places(rtlil: str) -> str:
-    """RTLIL whose switches have their process's source place."""
     lines, place, above = [], "", ""
     for line in rtlil.splitlines():
         word = line.split(maxsplit=1)[:1]

@@ -1,11 +1,11 @@
-"""Which mutants change nothing: proofs that hold in every clock from power-up.
+"""Proofs that mutants change nothing in any clock from power-up.
 
-The question is one of reachability. Gateware and mutant run side by side on the same inputs. Only registers that the
-mutant may affect are doubled; the question is whether an output or any other register can ever differ. If the answer is
-a path to such a clock, the registers that differ at its end are doubled too, and the question is repeated.
+Gateware and mutant run side by side on the same inputs. Only registers that the mutant may affect are doubled; the
+question is whether an output or any other register can ever differ. Registers that differ at the end of a
+counterexample are doubled too, and the question is repeated.
 
-To keep the problem small, some registers are cut: they may hold anything in any clock. That only adds behavior, so what
-stays unreachable is unreachable in the whole design.
+Some registers are cut to keep the problem small: they may hold anything. That only adds behavior, so unreachable states
+stay unreachable.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ _HANDED = {
 
 
 class Contradiction(ContactFPGAError):
-    """The proof itself is wrong; the message has details."""
+    """The proof is wrong; the message has details."""
 
 
 class Prover:
-    """Gateware and some mutants as one circuit, selected by its inputs ``mutant``."""
+    """Gateware and mutants as one circuit, selected by the input ``mutant``."""
 
     def __init__(self, design: Design, mutants: Sequence[Mutant]):
         self._mutants = list(mutants)
@@ -72,8 +72,8 @@ class Prover:
         self._folder.cleanup()
 
     def equivalent(self, mutant: Mutant, limit_s: int, until: float = math.inf) -> bool:
-        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds of one processor for each question, and
-        none is put after ``until``, a time of :func:`time.monotonic`."""
+        """Whether the mutant is proved equivalent, with at most ``limit_s`` processor seconds per question, and none
+        after ``until``, a :func:`time.monotonic`."""
         number = self._mutants.index(mutant) + 1
         return any(self._never_differs(number, cut, limit_s, until) for cut in self._cuts(mutant))
 
@@ -109,7 +109,6 @@ class Prover:
         return False
 
     def _placed(self, number: int, latches: Sequence[int]) -> tuple[Sequence[int], Sequence[int]]:
-        """Mutant ``number`` over these latches: their next states, and the outputs."""
         inputs = list(self._inputs)
         for index, name in enumerate(self._circuit.inputs):
             if found := re.fullmatch(r"mutant\[(\d+)\]", name):
@@ -118,12 +117,11 @@ class Prover:
         return placed.nexts, placed.driven
 
     def _differing(self, nexts: Sequence[int], twins: Collection[int]) -> dict[int, int]:
-        """For each single register whether the mutant's next state differs."""
         pairs = enumerate(zip(self._nexts, nexts))
         return {i: self._graph.differ(one, other) for i, (one, other) in pairs if one != other and i not in twins}
 
     def _seen(self, driven: Sequence[int]) -> Iterable[int]:
-        """Differences of outputs that are observed: payloads only during a transfer."""
+        """Differences of observed outputs: payloads only during a transfer."""
         names = self._circuit.outputs
         for name, one, other in zip(names, self._driven, driven):
             when = _HANDED.get(name.partition("[")[0])
@@ -131,7 +129,6 @@ class Prover:
             yield self._graph.both(self._graph.differ(one, other), looked_at)
 
     def _last(self, takes: dict[int, int], path: list[dict[int, int]], roots: list[int]) -> dict[int, int]:
-        """Values of the inputs of ``roots`` in the last clock of a path."""
         state: dict[int, int] = {}
         for inputs in path[:-1]:
             values = self._graph.values({**state, **inputs}, takes.values())
@@ -139,7 +136,6 @@ class Prover:
         return self._graph.values({**state, **path[-1]}, roots)
 
     def _inside(self, modules: Collection[str]) -> frozenset[int]:
-        """Registers of these modules, and those without a name."""
         names = enumerate(self._circuit.latches)
         return self._named("?") | {index for index, some in names if any(module_of(name) in modules for name in some)}
 
@@ -159,7 +155,7 @@ def equivalent(
     done: Callable[[], None] = lambda: None,
     until: float = math.inf,
 ) -> list[bool]:
-    """For each mutant whether it is proved equivalent; ``done()`` is called after each. Limits: see
+    """Whether each mutant is proved equivalent; ``done()`` is called after each. Limits are those of
     :meth:`Prover.equivalent`."""
     verdicts: list[bool] = []
     if not mutants or time.monotonic() >= until:

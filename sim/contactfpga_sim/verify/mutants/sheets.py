@@ -15,15 +15,14 @@ from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 def quick(several: Several) -> Iterator[Stimulus]:
     """Cells that change at any time; requests of each sheet, of an absent one and of none, damaged ones, and hellos in
-    a row. Then resting sheets, with so few hellos that they report more frames than a digit holds."""
+    a row. Then resting sheets with so few hellos that frames overflow a digit."""
     for seed in range(3):
         yield _random(several, seed, 40_000)
     yield _rare(several, 400_000)
 
 
 def thorough(several: Several) -> Iterator[Stimulus]:
-    """Longer stimuli of the kind of :func:`quick`: ten seconds, with unrequested hellos and counters that reach their
-    high digits."""
+    """Ten seconds of stimuli like :func:`quick`, with unrequested hellos, and counters that reach their high digits."""
     for seed in range(3, 7):
         yield _random(several, seed, 120_000)
     yield _rare(several, 10 * several.clock_hz)
@@ -43,7 +42,6 @@ def _rare(several: Several, cycles: int) -> Stimulus:
 def _stimulus(
     several: Several, name: str, cycles: int, most: int, gaps: Sequence[int], rng: np.random.Generator
 ) -> Stimulus:
-    """Cells of each sheet change within ``most`` cycles, requests have these gaps."""
     received = _asked(several, gaps, rng, cycles)
     timelines = []
     for skin in several.skins:
@@ -57,7 +55,6 @@ def _stimulus(
 
 
 def _asked(several: Several, gaps: Sequence[int], rng: np.random.Generator, cycles: int) -> list[tuple[int, bytes]]:
-    """Requests of any number at any time after the first hellos, some in bursts."""
     sheets, bit_clocks = len(several.skins), facts(several.skins[0]).bit_clocks
     sent: list[tuple[int, bytes]] = []
     start = 600

@@ -245,7 +245,7 @@ OPTIONS: dict[str, tuple[Skin, tuple[str, ...]]] = {
         ("closed", "label"),
     ),
 }
-"""Skins of options, and the mutated stages: those that the option changes."""
+"""Skins of options, and the stages that the option changes."""
 
 _CHAINED: dict[str, Any] = {"row_drive": "74hc595", "column_read": "74hc165", "settle_us": 30.0} | _TINY
 
@@ -270,4 +270,4 @@ SEVERAL: dict[str, tuple[Several, tuple[str, ...]]] = {
         ("several", "serial", "link"),
     ),
 }
-"""Sheets on one FPGA, and the mutated stages: the arbiter, the reader of addressed requests, and waiting links."""
+"""Sheets on one FPGA, and the mutated stages."""

@@ -1,5 +1,4 @@
-"""Stimuli for mutants: touches, noise and requests; for options of a Skin broken and joined lines, changing readings,
-commands."""
+"""Stimuli for mutants: touches, noise, requests, and inputs for options of a Skin."""
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ _AT_REST = 400_000
 _ALL_FRAMES = 16
 """Cells of a sheet whose every frame is tried."""
 _FEW_CELLS = 64
-"""Cells of a sheet of which many more frames are tried, as each has fewer meetings of zones."""
+"""Cells of a sheet of which more frames are tried, as each has fewer meetings of zones."""
 
 
 class Stimulus(NamedTuple):
@@ -37,19 +36,16 @@ class Stimulus(NamedTuple):
     timeline: Timeline
     cycles: int
     noise: Sequence[tuple[int, int]] = ()
-    """(cycle, length) of low levels at the receive pin: too short for a start bit, or without a stop bit, so that no
-    byte is received."""
+    """(cycle, length) of low levels at the receive pin that are no byte: too short, or without a stop bit."""
     shorts: Sequence[tuple[int, Shorts]] = ()
-    """(cycle, joined lines from then on). The golden model has no joints: a mutant is compared with the gateware, whose
-    findings ``tests/gateware/test_self_test.py`` checks against the faults."""
+    """(cycle, joined lines from then on). The golden model has no joints, so a mutant is compared with the gateware."""
     others: Sequence[Timeline] = ()
-    """Inputs of the sheets after the first. Received bytes are the first one's."""
+    """Inputs of the sheets after the first, whose received bytes are the first one's."""
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:
-    """Cells that change at any time, requests, stuck columns and noise; every adversarial shape for one scan, on a
-    closed sheet also shapes around it. With guard lines or a self-test also a resting sheet with broken and joined
-    lines."""
+    """Cells that change at any time, requests, stuck columns and noise; every adversarial shape for one scan. With
+    guard lines or a self-test also a resting sheet with broken and joined lines."""
     for seed in range(3):
         yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, least_cycles(skin)))
     yield from _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
@@ -60,8 +56,8 @@ def quick(skin: Skin) -> Iterator[Stimulus]:
 
 
 def thorough(skin: Skin) -> Iterator[Stimulus]:
-    """Stimuli for the survivors of :func:`quick`: longer ones, all frames of a small sheet, random ones of a larger
-    one, and more than half a second of board time, after which a hello is sent unrequested."""
+    """Stimuli for survivors of :func:`quick`: longer ones, all frames of a small sheet, random ones of a larger one,
+    and over half a second of board time, with an unrequested hello."""
     for seed in range(3, 9):
         yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks, 4 * least_cycles(skin)))
     if skin.units:
@@ -80,7 +76,6 @@ def until_time_wraps(skin: Skin) -> Stimulus:
 
 
 def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
-    """Random cells with requests in bursts and one by one."""
     rng = np.random.default_rng([seed, 11])
     known = facts(skin)
     scan = known.scan_clocks
@@ -105,8 +100,7 @@ def _optional(skin: Skin) -> Iterator[Stimulus]:
 
 
 def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
-    """Requests with invalid pulses between them: a low level of up to half a bit, or past the stop bit's middle, mostly
-    separated."""
+    """Requests with low levels between them, of up to half a bit or past the stop bit's middle."""
     if uart.pulsed(facts(skin).bit_clocks):
         return
     rng = np.random.default_rng(17)
@@ -128,7 +122,7 @@ def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
 
 
 def _crowded(skin: Skin, scans: int) -> Stimulus:
-    """Hellos in a row, so that more frames are overwritten than their counter can hold."""
+    """Hellos in a row, so that more frames are overwritten than their counter holds."""
     known = facts(skin)
     scan = known.scan_clocks
     asked = range(scan, (scans - 5) * scan, 130 * known.bit_clocks)
@@ -137,8 +131,8 @@ def _crowded(skin: Skin, scans: int) -> Stimulus:
 
 
 def _meeting(skin: Skin, chains: int) -> Stimulus:
-    """Chains of hellos, then a waiting frame. The chains end at all clocks of a hello's time around the next frame's
-    end mark."""
+    """Chains of hellos, then a waiting frame, ending at all clocks of a hello's time around the next frame's end
+    mark."""
     known = facts(skin)
     scan, byte = known.scan_clocks, 10 * known.bit_clocks
     hello_clocks = byte * (len(hello(known)) + 1)
@@ -172,7 +166,6 @@ def _frames(skin: Skin, name: str, frames: np.ndarray) -> Stimulus:
 
 
 def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
-    """New cells every 0.3 s, with occasional stuck columns."""
     rng = np.random.default_rng(13)
     clocks = skin.clock_hz // 1_000_000
     shape = (skin.rows, skin.columns)
@@ -185,7 +178,7 @@ def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
 
 
 def least_cycles(skin: Skin) -> int:
-    """Cycles by which each option has worked: unit sweeps, some self-tests."""
+    """Cycles by which each option has worked."""
     sweeps = 40 * skin.derived.units.sweep_clocks if skin.units else 0
     return max(sweeps, 5 * test_clocks(skin) if skin.self_test else 0)
 
@@ -205,7 +198,7 @@ def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
 
 
 def at_rest(skin: Skin, cycles: int) -> Timeline:
-    """Few touches; lines are cut long enough for renewed reports, and self-tests end."""
+    """Few touches; cuts long enough for renewed reports, and complete self-tests."""
     rng = np.random.default_rng(37)
     pieces: list[tuple[int, np.ndarray, None]] = []
     for start in range(100, cycles, 30_000):
@@ -216,7 +209,7 @@ def at_rest(skin: Skin, cycles: int) -> Timeline:
 
 
 def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
-    """One zero and threshold after the other, with readings around them and on either side of the zero; no touches."""
+    """Zeros and thresholds, with readings around them and on either side of the zero; no touches."""
     rng = np.random.default_rng(41)
     units, bits = skin.derived.units, facts(skin).bit_clocks
     most = 2**units.converter.bits - 1
@@ -257,7 +250,6 @@ def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int],
 
 
 def _number(reached: int, rng: np.random.Generator) -> int:
-    """A threshold that is reached, or missed by one step, or far above in one more bit."""
     number = reached + int(rng.integers(2))
     if rng.random() < 0.25:
         number |= 1 << int(rng.integers(min(reached.bit_length(), NUMBER_BITS - 1), NUMBER_BITS))
@@ -265,14 +257,13 @@ def _number(reached: int, rng: np.random.Generator) -> int:
 
 
 def _of_bits(most: int, rng: np.random.Generator) -> int:
-    """A number of up to ``most`` bits, uniform, or with uniform bit count."""
     return int(rng.integers(1 << (most if rng.random() < 0.5 else int(rng.integers(most + 1)))))
 
 
 def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
-    """Each pair of rows and of columns joined, each row joined with the supply and each column with a strong pull,
-    alone and with another one; each followed by a whole sheet, both with a self-test. Returns the timeline, joints by
-    starting cycle, and the number of cycles."""
+    """Each pair of rows and of columns joined, each row with the supply and each column with a strong pull, alone and
+    with another; each followed by a whole sheet, both with a self-test. Returns the timeline, joints by cycle, and
+    number of cycles."""
     shorts = [Shorts(rows=(pair,)) for pair in itertools.combinations(range(skin.rows), 2)]
     shorts += [Shorts(columns=(pair,)) for pair in itertools.combinations(range(skin.columns), 2)]
     shorts += [Shorts(supplied=(row,)) for row in range(skin.rows)]
@@ -287,8 +278,7 @@ def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
 
 
 def bridged(skin: Skin) -> Iterator[tuple[Timeline, list[tuple[int, Shorts]], int]]:
-    """Each diode bridged at power-up, its switch pressed for the self-test: a frame would drive the row against the
-    column. Returns as :func:`joined`."""
+    """Each diode bridged at power-up, its switch pressed for the self-test. Returns as :func:`joined`."""
     first = (1 + skin.rows + skin.columns) * (2 * facts(skin).project + facts(skin).settle + 8)
     for place in itertools.product(range(skin.rows), range(skin.columns)):
         cells = np.zeros((skin.rows, skin.columns), bool)
@@ -298,7 +288,7 @@ def bridged(skin: Skin) -> Iterator[tuple[Timeline, list[tuple[int, Shorts]], in
 
 
 def test_clocks(skin: Skin) -> int:
-    """An upper bound on the clocks of a self-test whose slots are sent."""
+    """Upper bound on the clocks of a self-test whose slots are sent."""
     slots = 1 + skin.rows + skin.columns
     packet = 10 * facts(skin).bit_clocks * (12 + (skin.rows + skin.columns) // 7)
     return slots * (3 * packet + facts(skin).scan_clocks)
@@ -323,7 +313,6 @@ def _with_guard(skin: Skin, stuck: np.ndarray | None, rng: np.random.Generator) 
 
 
 def _cuts(skin: Skin, rng: np.random.Generator) -> Cuts:
-    """None, some, or half of the lines cut, each at a random place."""
     share = rng.choice([0, 0, 0.2, 0.5])
     ends = (
         {line: int(rng.integers(across + 1)) for line in range(lines) if rng.random() < share}

@@ -1,7 +1,5 @@
-"""Verilog of ECP5 cells without a usable Yosys model, as far as the gateware needs them.
-
-Any other use names a missing module, so that reading the netlist fails.
-"""
+"""Verilog of ECP5 cells without a usable Yosys model, for the gateware's needs. Any other use names a missing
+module."""
 
 from __future__ import annotations
 
@@ -9,7 +7,7 @@ _RAM_BYTES, _WORDS_AN_INITVAL = 2048, 16
 
 
 def cells() -> str:
-    """The text of all of them."""
+    """Text of all cells."""
     return _block_ram() + _PIN + _GLOBAL_RESET + _pll()
 
 
@@ -35,8 +33,8 @@ _GLOBAL_RESET = "module SGSR(input CLK, GSR); endmodule\n"
 def _block_ram() -> str:
     """Two ports of 9 or 18 bits that read before write, without output registers.
 
-    9 bits are a byte with its parity bit; an 18-bit address counts them in pairs, its two lowest bits are their
-    enables.
+    9 bits are a byte with its parity bit; an 18-bit address counts these in pairs, with their enables in the two lowest
+    bits.
     """
     ports, parameters, bodies = [], [], []
     for side in "AB":
@@ -95,7 +93,7 @@ endgenerate
 
 
 def _pll() -> str:
-    """A stub: its output is its input, and it is locked."""
+    """A stub: always locked, with its input as output."""
     control = ("CLKFB", "RST", "STDBY", "PLLWAKESYNC", "ENCLKOP")
     phase = ("PHASESEL0", "PHASESEL1", "PHASEDIR", "PHASESTEP", "PHASELOADREG")
     parameters = ("CLKI_DIV", "CLKFB_DIV", "CLKOP_DIV", "CLKOP_CPHASE", "CLKOP_ENABLE", "FEEDBK_PATH")

@@ -1,6 +1,6 @@
-"""The netlist of a built board: extracted from an iCE40's bitstream, or as synthesized for an ECP5.
+"""The netlist of a built board: from an iCE40's bitstream, or as synthesized for an ECP5.
 
-A bidirectional pin becomes its input, its output, and its output enable.
+A bidirectional pin becomes an input, an output and an output enable.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from contactfpga_sim.verify.netlist import ecp5_cells
 
 
 class WrongPins(ContactFPGAError):
-    """The netlist does not have one buffer with an output enable for each line."""
+    """The netlist lacks one buffer with an output enable for each line."""
 
 
 def lines(skin: Skin) -> dict[str, int]:
-    """Number of lines by name of a Skin's bidirectional pins."""
+    """Number of lines of each bidirectional pin, by name."""
     sheet = row_pins(skin) | column_pins(skin)
     return {name: sheet[f"{name}_drive"].shape for name in ("rows", "columns") if f"{name}_drive" in sheet}
 
@@ -74,7 +74,6 @@ def _buffer(connections: str, name: str, line: int, width: int) -> str:
 
 
 def _driven(name: str, line: int, width: int, level: str, enable: str) -> str:
-    """Assignments to a line's two outputs."""
     return (
         f"assign {_bit(f'{name}_0__o', line, width)} = {level};\n"
         f"assign {_bit(f'{name}_0__oe', line, width)} = {enable};"
@@ -84,8 +83,8 @@ def _driven(name: str, line: int, width: int, level: str, enable: str) -> str:
 def wrapper(skin: Skin) -> tuple[dict[str, str], str]:
     """Connections of the chip's ports that this module adds, and the needed Verilog.
 
-    A column counts as driven only at its proper level: the released one, or with two drive levels the first column's,
-    and the other one for the guard column.
+    A column counts as driven only at its proper level: the released one, or of two the first column's; a guard column
+    at the other.
     """
     ports: dict[str, str] = {}
     text = ""
@@ -120,7 +119,6 @@ def _bit(name: str, line: int, width: int) -> str:
 
 
 def _once(text: str, pattern: str) -> re.Match[str]:
-    """The only match of a pattern."""
     hits = list(re.finditer(pattern, text, re.DOTALL))
     if len(hits) != 1:
         raise WrongPins(f"the netlist has {len(hits)} places like {pattern}; expected is one")
@@ -170,7 +168,7 @@ def _check(skin: Skin) -> None:
 
 
 def _without_pll(chip: str, board: BoardSpec, skin: Skin) -> str:
-    """The netlist with the PLL's output on the crystal's pin, always locked; its dividers are checked."""
+    """Netlist with the PLL's output on the crystal's pin, always locked; its dividers are checked."""
     cell = re.search(r"^SB_PLL40_\w+ #\((.*?)\) \S+ \((.*?)^\);", chip, re.MULTILINE | re.DOTALL)
     if cell is None:
         raise WrongBitstream(f"{board.title}: there is no PLL in the bitstream")
@@ -184,7 +182,7 @@ def _without_pll(chip: str, board: BoardSpec, skin: Skin) -> str:
 
 
 def synthesized(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
-    """Synthesize for an ECP5: the input of place and route."""
+    """The netlist synthesized for an ECP5, before place and route."""
     _check(skin)
     build.plan_for(board, skin).extract(str(folder))
     native.yosys(f"read_rtlil {NAME}.il; {synthesis.script(board.fpga, NAME)}; write_verilog -noattr chip.v", folder)
@@ -197,7 +195,6 @@ def synthesized(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
 
 
 def _pins(board: BoardSpec, skin: Skin) -> str:
-    """Verilog that maps the platform's pin names to the gateware's."""
     sheet = row_pins(skin) | column_pins(skin)
     wires = {_crystal(board): "clk", "uart_0__rx__io": "rx", "uart_0__tx__io": "tx"}
     wires |= {f"{name}_0__io": name for name in ("contact", *board.pins(skin))}

@@ -1,8 +1,8 @@
 """The program of ``make bitstream-replay``: frames through the netlist of a built board, compared with the golden
 model.
 
-The iCE40 boards' netlists are extracted from the bitstream; the ULX3S's is the synthesized one. Transmit and contact
-pin are compared in every clock after the power-up reset, hence every byte.
+The iCE40 boards' netlists are extracted from bitstreams; the ULX3S's is the synthesized one. The transmit and contact
+pins are compared in every clock after the power-up reset.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ RUNS: tuple[tuple[str, Skin], ...] = (
     ("icebreaker", _REVERSAL.replace(rows=8, columns=8, guard=True, clock_hz=24_000_000, baud=12_000_000)),
     ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, self_test=True, clock_hz=30_000_000, baud=3_000_000)),
 )
-"""Default boards and sheets. The first sends every frame, the others overwrite some; the second has rows on shift
-registers, the fourth its clock from the PLL, the last four bidirectional pins, the third of these guard lines, and the
-last a self-test."""
+"""Default boards and sheets. The first sends every frame, the others overwrite some. The second has rows on shift
+registers, the fourth its clock from the PLL, the last four bidirectional pins, the third of these guard lines, the last
+a self-test."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,12 +63,12 @@ class NetlistReplay:
     """A netlist that agrees with the golden model."""
 
     frames: int
-    """Frames held at the pins, each for one scan."""
+    """Frames, each held for one scan."""
     packets: int
     """Packets on the line, with hellos."""
     clocks: int
     changes: int
-    """Changes of the transmit and contact pin."""
+    """Changes of the transmit and contact pins."""
 
     def __add__(self, other: NetlistReplay) -> NetlistReplay:
         pairs = zip(dataclasses.astuple(self), dataclasses.astuple(other), strict=True)
@@ -98,7 +98,7 @@ def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> 
 
 
 def reset_clocks(skin: Skin, model: native.Model) -> int:
-    """Clocks from power-up to cycle 0 of docs/timing.md, by the start of the first hello."""
+    """Clocks from power-up to cycle 0 of docs/timing.md, by the first hello."""
     limit = RESET_US * skin.derived.clocks_per_us
     untouched = Timeline([])
     hello = predict(skin, untouched, limit).line[0][0]
@@ -131,7 +131,6 @@ def _random(skin: Skin, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def _windows(skin: Skin, frames: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Windows around a pressed cell of random nonempty frames; larger sheets are padded."""
     touched = np.flatnonzero(frames.any(axis=(1, 2)))
     while True:
         cells = frames[rng.choice(touched)]
@@ -146,7 +145,7 @@ def _windows(skin: Skin, frames: np.ndarray, rng: np.random.Generator) -> Iterat
 
 
 def main() -> int:
-    """Replay and print the result; 1 if a netlist differs from the golden model or its bitstream does not pack."""
+    """Replay and print the result; returns 1 if a netlist differs or a bitstream does not pack."""
     parser = argparse.ArgumentParser(prog="make bitstream-replay", description=__doc__)
     parser.add_argument("board", nargs="?", choices=list(BOARDS), help="default: 8x8 on one of each FPGA")
     parser.add_argument("--skin", type=Path, help="the board's sheet; default: the one it is built with")
@@ -181,7 +180,7 @@ def main() -> int:
 
 
 def recordings_in(path: Path | None) -> list[Path]:
-    """The file itself, or the files in a folder."""
+    """The file, or the files in a folder."""
     if path is None:
         return []
     return sorted(path.glob("*.npz")) if path.is_dir() else [path]

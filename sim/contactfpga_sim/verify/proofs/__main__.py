@@ -78,7 +78,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _report(case: ProofCase, number: str) -> bool:
-    """Print one line of the table, preceded by progress on a terminal."""
     _progress(f"{number}: {case.name}")
     verdict = case.run()
     found = 0

@@ -1,4 +1,4 @@
-"""The adaptive scan: its choice of rows, and that rows driven together never meet other driven ones."""
+"""The adaptive scan: its choice of rows, and no contention of rows driven together."""
 
 from functools import partial
 
@@ -17,10 +17,10 @@ ALL = (1 << ROWS) - 1
 
 
 def released_between(proof: Proof) -> None:
-    """Free: the columns in each clock, and when rows are taken.
+    """Free: the columns, and when rows are taken.
 
-    Claimed: all rows or one are driven, and change by way of none; none are driven for at least the release time,
-    others for the settle time.
+    Claimed: all rows or one are driven; between two choices none are, for at least the release time; others are driven
+    for the settle time.
     """
     dut = AdaptiveScanner(Skin(scan="adaptive", rows=ROWS, columns=1, settle_us=1, zone_capacity=1))
     inside = proof.put(dut)
@@ -65,7 +65,6 @@ def _seek_lemmas(proof: Proof, inside: Inside) -> None:
 
 
 def _slot_lemmas(proof: Proof, inside: Inside, settled: int, off, driven, since) -> None:
-    """Lemmas on when a slot chooses rows: after its strobe, or with hits of idle rows, from the release on."""
     clock, state = inside["clock"], inside["seek.choice_state"]
     pattern, idle, watches = inside["seek.pattern"], inside["seek.idle"], inside["watches"]
     todo, due = inside["seek.todo"], inside["row_due"]
@@ -106,12 +105,12 @@ WAIT, PICK, SEARCH, START = range(4)  # in the order in which the source names t
 
 
 def frames(proof: Proof, rows: int) -> None:
-    """Free: whether a slot hits, and whether its row is busy, each time; when a strobe comes once rows are chosen.
+    """Free: whether each slot hits, and whether its row is busy; when a strobe comes once rows are chosen.
 
     Assumed: a frame's rows are handed on before the next one's first strobe, by the Skin's limits.
 
-    Claimed: each slot drives rows not known yet, one if alone; these are in ascending order; after the last slot of a
-    frame every row is known; a frame has at most ``2 rows - 1`` slots, and ``rows + 2 ceil(log2 rows) + 2``.
+    Claimed: each slot drives unknown rows, one if alone, in ascending order; after a frame's last slot every row is
+    known; a frame has at most ``2 rows - 1`` slots, and ``rows + 2 ceil(log2 rows) + 2``.
     """
     m = proof.m
     dut = Seek(Skin(scan="adaptive", rows=rows, columns=1, settle_us=20))
@@ -199,7 +198,6 @@ def _in_state(inside: Inside, state: int):
 
 
 def _highest(rows):
-    """The highest of the rows, alone."""
     mirrored = rows[::-1]
     return (mirrored & -mirrored)[: len(rows)][::-1]
 

@@ -1,9 +1,4 @@
-"""Claims, bugs that a proof must find, and their verdicts: forever, by induction, or by search through all inputs for
-some clocks from power-up.
-
-Bugs are planted in the elaborated design, independent of the source: a bug names a class and a signal driven in it, and
-gives a wrong value.
-"""
+"""Claims, planted bugs, and verdicts: forever, by induction, or by search from power-up."""
 
 import dataclasses
 import json
@@ -26,20 +21,20 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 @dataclasses.dataclass(frozen=True)
 class Bug:
-    """A signal with a wrong value, in every component of a class."""
+    """A wrong value of a signal that a class drives, in the elaborated design."""
 
     name: str
     owner: type
     signal: str
-    """Name in the driving component; of a bundle with the field: ``join.place``."""
+    """Name in the driving component, with a bundle's field: ``join.place``."""
     wrong: Callable[[Value, Inside], object]
-    """The wrong value, from the right one and the component's signals; of a register, in the next clock."""
+    """Function from the right value and the component's signals to the wrong one; for a register, in the next clock."""
 
 
 def plant(bug: Bug, design: Fragment) -> None:
     """Plant the bug in the elaborated design.
 
-    Raises LookupError if the design has no component of the class, or the class drives no such signal.
+    Raises LookupError if the design lacks the class, or the class drives no such signal.
     """
     owners = [part for part in fragments(design) if isinstance((part.origins or (None,))[0], bug.owner)]
     if not owners:
@@ -49,7 +44,6 @@ def plant(bug: Bug, design: Fragment) -> None:
 
 
 def _change(bug: Bug, part: Fragment) -> None:
-    """Move the drivers of the old signal to a new one, and give the old one the wrong value."""
     inside = Inside(part)
     name, *fields = bug.signal.split(".")
     domain, signal = inside.driven(name)
@@ -69,8 +63,6 @@ def _change(bug: Bug, part: Fragment) -> None:
 
 
 class _Redirected(StatementTransformer):
-    """Statements that assign to other signals under the same conditions; their inputs stay."""
-
     def __init__(self, targets: dict[int, Signal]):
         self._target = _Target(targets)
 
@@ -111,7 +103,7 @@ class Verdict:
     outcome: str
     """``proved``, ``counterexample``, or ``open`` if depth or time was too short."""
     clocks: int
-    """Clocks of the induction or search, or of the counterexample."""
+    """Clocks of the induction, search or counterexample."""
     seconds: float
     said: str
     """Inputs and registers of a counterexample, or of the step that no induction excludes."""
@@ -123,8 +115,8 @@ def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> 
 
 
 def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600, bug: Bug | None = None) -> Verdict:
-    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up, with
-    ``bug`` in the gateware if given."""
+    """Whether the claims of ``build``, without lemmas, hold in the first ``clocks`` clocks, in gateware with ``bug`` if
+    given."""
     return _solve(build, Proof(claims_alone=True), clocks, limit_s, bug=bug)
 
 
@@ -160,10 +152,10 @@ class ProofCase:
     """Largest depth of the induction, or the clocks before one at rest; with ``bounded``, of the search."""
     bugs: tuple[Bug, ...] = ()
     bug_clocks: int = 12
-    """Clocks from power-up within which a planted bug must break a claim."""
+    """Clocks from power-up within which a bug must break a claim."""
     bounded: bool = False
     campaign: bool = False
-    """Whether it is too slow for ``make test``."""
+    """Whether the proof is too slow for ``make test``."""
 
     @property
     def name(self) -> str:
@@ -174,5 +166,5 @@ class ProofCase:
         return solve(self.build, self.clocks, limit_s)
 
     def run_with(self, bug: Bug, limit_s: float = 3600) -> Verdict:
-        """Search for a counterexample to the claims, without the lemmas, in the gateware with the bug."""
+        """Search for a counterexample to the claims in the gateware with the bug."""
         return search(self.build, self.bug_clocks, limit_s, bug)

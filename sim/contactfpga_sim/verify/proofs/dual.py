@@ -1,4 +1,4 @@
-"""Two differing copies are stopped before the byte is over."""
+"""Two differing copies are stopped within a byte."""
 
 from functools import partial
 
@@ -31,9 +31,9 @@ def differences_stop_the_line(proof: Proof, fail_safe: bool) -> None:
     """Free: outputs of both copies in each clock, and the level of ``rx``.
 
     Claimed: until the second's output differs from the first's a clock before, all outputs are the first's, ``contact``
-    with ``fail_safe`` a clock later. A difference makes ``tx`` low from the next clock on, for longer than a byte;
-    ``contact`` is high with ``fail_safe``, until a scan after the restart. Both are then reset until the line was high
-    as long, the second always a clock after the first, and receives ``rx`` a clock after the first.
+    with ``fail_safe`` a clock later. A difference makes ``tx`` low from the next clock on, for longer than a byte, and
+    ``contact`` with ``fail_safe`` high until a scan after the restart. Both are reset until the line was high as long.
+    The second's reset and ``rx`` are the first's a clock later.
     """
     m = proof.m
     skin = Skin(rows=1, columns=1, dual=True, fail_safe=fail_safe)

@@ -1,4 +1,4 @@
-"""Contents of an elaborated component: its parts, and the signals driven there."""
+"""Parts and driven signals of an elaborated component."""
 
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
@@ -12,17 +12,14 @@ _Found = TypeVar("_Found")
 
 
 class Inside:
-    """Signals and parts of an elaborated component by name.
-
-    All methods raise LookupError for an unknown name, or for two signals of a part.
-    """
+    """Signals and parts of an elaborated component by name. Unknown and ambiguous names raise LookupError."""
 
     def __init__(self, fragment: Fragment):
         self._fragment = fragment
 
     def __getitem__(self, path: str) -> Value:
-        """The signal driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else a signal
-        that is only read, which keeps its initial value."""
+        """The signal driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else a read
+        one, which keeps its initial value."""
         names = path.split(".")
         fragment = self._fragment
         while len(names) > 1 and (sub := _sub(fragment, names[0])) is not None:
@@ -35,7 +32,7 @@ class Inside:
 
     @property
     def component(self):
-        """The component itself, for its ports."""
+        """The component, for its ports."""
         return self._fragment.origins[0]
 
     def driven(self, name: str) -> tuple[str, Signal]:
@@ -43,11 +40,11 @@ class Inside:
         return self._only(self._all_driven(name), "drives", name)
 
     def part(self, path: str):
-        """The component of that path."""
+        """Component of that path."""
         return self._part(path).origins[0]
 
     def word(self, path: str, address) -> Signal:
-        """The memory's word at an address in this clock, through an added read port."""
+        """The memory's word at an address, through an added read port."""
         (memory,) = (part for part in fragments(self._part(path)) if isinstance(part, MemoryInstance))
         data = memory._data
         word = Signal(Shape.cast(data.shape).width, name=f"{path.replace('.', '_')}_word")
@@ -56,11 +53,11 @@ class Inside:
         return word
 
     def registers_here(self) -> list[Signal]:
-        """Registers of the component without those of its parts."""
+        """Registers of the component without its parts'."""
         return _driven(self._fragment, "sync")
 
     def registers(self) -> Iterator[Signal]:
-        """All registers of the component and its parts."""
+        """Registers of the component and its parts."""
         for fragment in fragments(self._fragment):
             yield from _driven(fragment, "sync")
 
@@ -102,7 +99,7 @@ def fragments(fragment: Fragment) -> Iterator[Fragment]:
 
 
 def fields_of(signal: Signal, names: Sequence[str]) -> tuple[int, int]:
-    """First bit of a bundle's field, and the one after its last; of the whole signal without names."""
+    """First bit of a bundle's field and the one after its last; without names those of the whole signal."""
     start, stop, described = 0, len(signal), signal._format
     for name in names:
         fields = described._fields if isinstance(described, Format.Struct) else {}

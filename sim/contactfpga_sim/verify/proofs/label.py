@@ -1,4 +1,4 @@
-"""The labeller: no overflow or underflow, nothing left over, and stalls change nothing."""
+"""The labeller: no overflow or underflow, nothing left over, and harmless stalls."""
 
 from functools import partial
 
@@ -20,7 +20,7 @@ def skin_of(rows: int, columns: int, connectivity: int, closed: bool = False) ->
 
 
 def rows_into(proof: Proof, dut: RunLabeller):
-    """Rows at any time; returns ``valid``, ``cells`` and ``last``."""
+    """Free rows at any time: ``valid``, ``cells`` and ``last``."""
     valid, last = proof.free(1, "valid"), proof.free(1, "last")
     cells = proof.free(dut.derived.skin.columns, "cells")
     proof.m.d.comb += [
@@ -32,12 +32,10 @@ def rows_into(proof: Proof, dut: RunLabeller):
 
 
 def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken at once; ``stalls_change_nothing`` shows that this is no
-    restriction.
+    """Free: any rows at any time. Assumed: records are taken at once, which ``stalls_change_nothing`` permits.
 
     Claimed: the stacks neither overflow nor underflow; no place of the table is written while it holds an open zone, or
-    read while it holds none or in the clock of its write; after a frame's last row no zone is open, in the table or on
-    a stack.
+    read while it holds none or in the clock of its write; after a frame's last row no zone is open.
     """
     m = proof.m
     dut = RunLabeller(skin_of(2, columns, connectivity, closed))
@@ -110,8 +108,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
 
 
 def walk_is_sound(labeller: Inside):
-    """Whether the walk's mask is a run of ones from column 0 on, followed by the other clusters' ends, and each
-    register without the lowest bits is its neighbor without them."""
+    """Whether the walk's mask is a run of ones from column 0 on, then the other clusters' ends, and each register
+    without the lowest bits is its neighbor without them."""
     inside, ends = labeller["walk.inside"], labeller["walk.ends"]
     work, found = labeller["walk.work"], labeller["walk.found"]
     before, before_later = labeller["walk.befores"], labeller["walk.befores_later"]
@@ -122,8 +120,8 @@ def walk_is_sound(labeller: Inside):
 
 
 def brackets_of(labeller: Inside):
-    """Which runs of the row before have an earlier and a later one, and what is known of the new row, once the marks
-    of the last step count."""
+    """Which runs of the row before have an earlier and a later one, and what is known of the new row, after the last
+    step."""
     done = labeller["join.brackets.late.row_done"]
     new = [labeller[f"join.brackets.new_{name}"] for name in ("earlier", "later")]
     old = [labeller[f"join.brackets.old_{name}"] for name in ("earlier", "later")]
@@ -132,7 +130,6 @@ def brackets_of(labeller: Inside):
 
 
 def _brackets(m, row, earlier, later):
-    """Whether a row's brackets nest, and for each column whether a zone's first run starts there."""
     starts = Signal(len(row))
     m.d.comb += starts.eq(row & ~(row << 1))
     runs = sum(starts[1:], starts[0])
@@ -148,10 +145,9 @@ def _brackets(m, row, earlier, later):
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
-    """Free: any rows at any time, and when records are taken.
+    """Free: rows at any time, and when records are taken.
 
-    Claimed: while a record waits it is unchanged, no row is taken and nothing changes inside. So the records are those
-    without the stall.
+    Claimed: while a record waits it is unchanged, no row is taken and nothing changes inside.
     """
     m = proof.m
     dut = RunLabeller(skin_of(4, columns, connectivity, closed))
@@ -168,9 +164,9 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed:
 
 
 def an_end_mark_a_frame(proof: Proof, columns: int, connectivity: int) -> None:
-    """Free: any rows at any time, and when records are taken.
+    """Free: rows at any time, and when records are taken.
 
-    Claimed: the end marks are the last rows taken, except those still inside, at most three.
+    Claimed: the end marks are the last rows taken, except at most three still inside.
     """
     m = proof.m
     dut = RunLabeller(skin_of(4, columns, connectivity))

@@ -1,4 +1,4 @@
-"""The labeller with one cell per clock: its records are the zones, its memories neither overflow nor collide."""
+"""The serial labeller: its records are the zones, its memories neither overflow nor collide."""
 
 from functools import partial
 
@@ -70,10 +70,10 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken at once.
+    """Free: rows at any time. Assumed: records are taken at once.
 
     Claimed: when a row can be taken, the zones that end with the previous row have left, each once, and after a last
-    row one end mark; that is so after at most C + e + 2 clocks, or two more for a sheet whose ends meet.
+    row one end mark; that is so after at most C + e + 2 clocks, on a closed sheet two more.
     """
     _labeller(proof, columns, connectivity, rows, closed, proof.claim)
 
@@ -81,7 +81,6 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
 def _labeller(
     proof: Proof, columns: int, connectivity: int, rows: int, closed: bool, claim
 ) -> tuple[SerialLabeller, Inside, OpenRow]:
-    """The labeller beside the specification, with claims on both."""
     m = proof.m
     dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
     inside = proof.put(dut)
@@ -120,7 +119,6 @@ def _labeller(
 
 
 def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRow) -> None:
-    """Lemmas between two rows: brackets and table agree with the specification's open row."""
     derived, columns = dut.derived, range(dut.derived.skin.columns)
     starts = Signal(len(columns), name="run_starts")
     proof.m.d.comb += starts.eq(open_row.cells & ~(open_row.cells << 1))
@@ -152,7 +150,7 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time, and when records are taken.
+    """Free: rows at any time, and when records are taken.
 
     Claimed: while a record waits no row is taken, no bracket is written, and no register changes.
     """
@@ -169,7 +167,6 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: i
 
 
 def _clusters_end_early(closes, inside: Inside):
-    """Whether clusters end early, at a column that is empty in the row before."""
     return (inside["cell_left"] | inside["before_left"]) & ~inside["before"][0]
 
 

@@ -1,5 +1,4 @@
-"""The link after the packer: which frame is sent, that its bytes are the packed ones, unrequested packets, and that the
-odometer's digits are the counts."""
+"""The link: which frames are sent, with which bytes, and the odometer's digits."""
 
 from functools import partial
 from typing import Any
@@ -29,11 +28,11 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
     place of a frame and of the hello. Assumed: a complete frame was written up to its end, as ``frames_are_packed``
     shows.
 
-    Claimed: a sent frame has at that place what the packer wrote there; a sent hello follows the protocol, except for
-    the digits of its state, of which each is a digit, and the first two are the frames sent. After a packet's bytes
-    come the check bytes and one delimiter, and only then the next packet. A byte stays until it is taken; the next is
-    offered two clocks later. Each complete frame is sent or counted as overwritten, and sequence numbers have no gap.
-    The packer gets these numbers from the clock after ``decide`` until ``commit``. The link never asks for a restart.
+    Claimed: a sent frame has at that place what the packer wrote there; a sent hello follows the protocol except for
+    the digits of its state, which are digits, the first two the frames sent. A packet's bytes are followed by check
+    bytes and one delimiter, then the next packet. A byte stays until it is taken; the next is offered two clocks later.
+    Each complete frame is sent or counted as overwritten, and sequence numbers have no gap. The packer gets these
+    numbers from the clock after ``decide`` until ``commit``. The link never asks for a restart.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
@@ -83,8 +82,6 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
 
 
 class _PackerAndLink(wiring.Component):
-    """Packer and link, joined as in the top."""
-
     def __init__(self) -> None:
         self.packer, self.link = Packer(_SKIN, offset_bits(_SKIN)), Link(_SKIN)
         packer, link = self.packer.signature.members, self.link.signature.members
@@ -104,8 +101,8 @@ class _PackerAndLink(wiring.Component):
 
 
 class _Frames:
-    """Frames in order: one being packed, one possibly waiting, one on the wire; numbers of sent and unsent ones; the
-    written byte of each at the followed place."""
+    """Frames being packed, waiting and on the wire; numbers of sent and unsent ones; their bytes at the followed
+    place."""
 
     def __init__(self, m: Module, packed, take_frame, place):
         write = packed.write
@@ -139,8 +136,6 @@ class _Frames:
 
 
 class _Wire:
-    """Number of bytes taken of the frame or hello on the wire."""
-
     def __init__(self, m: Module, dut: _PackerAndLink, inside: Inside, frames: _Frames, hello_length: int):
         self.busy, self.is_hello = Signal(name="busy"), Signal(name="is_hello")
         self.index = Signal(len(dut.packer.frames.end) + 1, name="index")
@@ -181,7 +176,6 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
 
 
 def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
-    """Lemmas: the odometer's digits are cleared and carried before the first fetch, and the offered digit is stable."""
     m, state, at = proof.m, inside["link.odometer.carry_state"], inside["link.odometer.at"]
     carries, clears = (state == 1) | (state == 2), state == 3
     proof.lemma(~carries | (at >= LIVE_DIGITS) & (at <= 10))
@@ -233,9 +227,8 @@ _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search
 def first_is_sent(proof: Proof, **changes: Any) -> None:
     """Free: decisions about frames, and frames' contents. Given: each frame needed a row time or more.
 
-    Claimed: no frame is dropped before one was sent. So after a restart, which begins with all link registers as at
-    power-up, a frame is packed before any is dropped: where ``contact`` waits for the first frame, it can wait for its
-    ``commit``.
+    Claimed: no frame is dropped before one was sent. So after a restart a frame is packed before any is dropped, and
+    ``contact`` can wait for its ``commit``.
     """
     dut = Link(Skin(rows=2, columns=2, send="on_change", **changes))
     inside = proof.put(dut)
@@ -266,8 +259,8 @@ def digits_are_the_counts(proof: Proof, counter: str) -> None:
     """Free: pulses of both counters at any time, hold, and the read place. Assumed: no pulse comes while one of its
     kind waits.
 
-    Claimed: once the digits were cleared, without a carry under way or waiting, the counter's digits are the number of
-    pulses, modulo their range; ``digit`` is that of the place a clock before; other places hold 0.
+    Claimed: once cleared, without a carry under way or waiting, the digits are the number of pulses, modulo their
+    range; ``digit`` is that of the place a clock before; other places hold 0.
     """
     m = proof.m
     dut = Odometer()

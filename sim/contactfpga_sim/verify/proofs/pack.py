@@ -1,4 +1,4 @@
-"""The packer: from items to the stuffed bytes of a frame."""
+"""The packer: from items to a frame's stuffed bytes."""
 
 from functools import partial
 
@@ -17,12 +17,12 @@ _STATES = ("ITEMS", "TRAILER", "CLOSE")
 
 def frames_are_packed(proof: Proof, skin: Skin) -> None:
     """Free: items at any time, tag, summary and verdict, and one followed place of the frame. Assumed: no more items
-    per frame than it can carry, by the audit; the tag is stable from ``decide`` to ``commit``, the summary and the
-    verdict's numbers from the clock after ``decide`` on.
+    per frame than fit, by the audit; the tag is stable from ``decide`` to ``commit``, the summary and the verdict's
+    numbers from the clock after ``decide`` on.
 
-    Claimed: when a frame closes, that place was written and holds the COBS byte for the bytes of all items, lowest
-    first, and of the trailer; the frame ends after its last byte; nothing is written outside of it. An item is taken
-    with its last byte. The frame closes once its bytes are written, and an unsent one leaves nothing.
+    Claimed: when a frame closes, that place holds the COBS byte for the bytes of all items, lowest first, and of the
+    trailer; the frame ends after its last byte; nothing is written outside. An item is taken with its last byte. The
+    frame closes once its bytes are written, and an unsent one leaves nothing.
     """
     m = proof.m
     derived = skin.derived
@@ -59,8 +59,6 @@ def _described_until_commit(proof: Proof, dut: Packer, plain: "_PlainBytes") -> 
 
 
 class _PlainBytes:
-    """The bytes of items and trailer in order, one per clock, from the clock after their arrival."""
-
     def __init__(self, m: Module, dut: Packer):
         derived, items, send = dut.derived, dut.items, dut.frames.verdict.send
         queue = Signal(8 * max(derived.item_bytes, derived.trailer_bytes), name="queue")
@@ -110,8 +108,8 @@ def _trailer(derived: Derived, dut: Packer):
 class _Followed:
     """One place of a stuffed frame: the ``expected`` byte, and the last written one, ``found``.
 
-    Every zero byte, and an imagined one before the frame, is the place of the distance to the next or to the end; all
-    other bytes keep their place.
+    Every zero byte, and an imagined one before the frame, is the place of the distance to the next; others keep their
+    place.
     """
 
     def __init__(self, m: Module, dut: Packer, plain: _PlainBytes, place):
@@ -161,7 +159,6 @@ def _lemmas(proof: Proof, dut: Packer, inside: Inside, plain: _PlainBytes, frame
 
 
 def _lemmas_on_reading(proof: Proof, dut: Packer, index, plain: _PlainBytes) -> None:
-    """Lemmas: unread data are at the ports."""
     m, left, payload = proof.m, plain.left, dut.items.payload
     item_bytes, trailer_bytes = dut.derived.item_bytes, dut.derived.trailer_bytes
     proof.lemma(~plain.decided | plain.closing & (left == trailer_bytes))

@@ -1,4 +1,4 @@
-"""Driven columns: never while a row is selected, and none held by something else."""
+"""Driven columns: never while a row is selected, and none held from elsewhere."""
 
 from functools import partial
 from typing import Literal
@@ -83,8 +83,8 @@ def let_go(proof: Proof) -> None:
 
     Claimed: columns are driven a clock after the request, except those masked in every row, and stuck ones, which read
     pressed in each sample of a window, of four that are two clocks apart and all between them. A stuck column is driven
-    throughout the first window that begins after a toggle, and stays stuck if it read pressed throughout that, too. A
-    guard column that reads pressed in a check is not driven until a toggle.
+    throughout the first window after a toggle, and stays stuck if it read pressed throughout. A guard column that reads
+    pressed in a check is not driven until a toggle.
     """
     m = proof.m
     skin = reversal_of("col2row").replace(columns=3, guard=True)
@@ -132,7 +132,7 @@ def kept(proof: Proof) -> None:
     """Free: as in :func:`let_go`. Assumed: column 0 reads pressed for at most 8 clocks on end, and not again in a
     window.
 
-    Claimed: it is driven whenever the others are.
+    Claimed: column 0 is driven whenever the others are.
     """
     m = proof.m
     dut = Precharge(Skin(rows=2, columns=3, precharge_us=1, settle_us=20))
@@ -153,9 +153,9 @@ def kept(proof: Proof) -> None:
 def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
-    Claimed: the driven columns follow :func:`let_go`; a sample is their reading two clocks before, in the last clock of
-    a release, as a frame begins, or while the sheet rests; and the clock's bit 16 toggles at least every 2^16 us.
-    Column 1 is never driven.
+    Claimed: driven columns follow :func:`let_go`; a sample is their reading two clocks before, in the last clock of a
+    release, as a frame begins, or while the sheet rests; the clock's bit 16 toggles at least every 2^16 us. Column 1 is
+    never driven.
     """
     m, skin = proof.m, dut.skin
     inside = proof.put(dut)
@@ -193,14 +193,12 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
 
 
 def level_lemmas(proof: Proof, inside: Inside, columns, released: int) -> None:
-    """Lemmas on the columns' synchronizer."""
     first = proof.before(columns, init=released)
     proof.lemma(inside["reader.sync.stage0"] == first)
     proof.lemma(inside["reader.sync.stage1"] == proof.before(first, init=released))
 
 
 def _raster_lemmas(proof: Proof, inside: Inside, dut: Scanner, late) -> None:
-    """Lemmas on when a sample is on its way, and of what."""
     clock, settled, slot = inside["clock"], dut.derived.settle_clocks, dut.derived.row_clocks
     ended = proof.before((clock == slot - 1) & inside["scans"])
     proof.lemma((clock < slot) & inside["scans"])

@@ -1,4 +1,4 @@
-"""A component with the solver's choices around it: free values, assumptions, claims."""
+"""A component with the solver's free values, assumptions and claims."""
 
 from amaranth.hdl import Assert, Assume, ClockDomain, Fragment, Module, Signal, Value
 
@@ -62,6 +62,6 @@ class Proof:
         self.m.d.comb += rest.eq(condition)
 
     def lemma(self, condition) -> None:
-        """Add a condition that is proved to support the induction of the claims."""
+        """Add a condition that is proved to support the claims' induction."""
         if not self._claims_alone:
             self.m.d.comb += Assert(condition)

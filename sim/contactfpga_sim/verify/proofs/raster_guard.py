@@ -1,4 +1,4 @@
-"""Guard lines in a raster scan: a line that does not answer is reported in that frame, one that does is not."""
+"""Guard lines in a raster scan: silent lines, and no others, are reported."""
 
 from functools import partial
 from typing import Literal
@@ -30,9 +30,9 @@ def lines_told(proof: Proof, diodes: Diodes) -> None:
     """Free: the columns, and when rows are taken.
 
     Claimed: a row that did not read the guard column in its slot is reported one clock after its strobe, likewise a
-    column that the guard row did not read, and the frame's tag has it two clocks after its last strobe. It stays
-    reported until it answers in a round that renews. A line that answered in all of its slots is never reported; nor is
-    a fully masked row.
+    column that the guard row did not read; the frame's tag has it two clocks after its last strobe. It stays reported
+    until it answers in a round that renews. A line that answered in all of its slots is never reported, nor is a fully
+    masked row.
     """
     m, skin = proof.m, skin_of(diodes)
     dut = Scanner(skin)
@@ -57,7 +57,6 @@ def lines_told(proof: Proof, diodes: Diodes) -> None:
 
 
 def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Value) -> None:
-    """Claims: a silent line is reported from the next clock until it answers in a renewing round; others are not."""
     ever = Signal(name="ever_silent")
     with proof.m.If(checked & silent):
         proof.m.d.sync += ever.eq(1)
@@ -67,7 +66,7 @@ def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Val
 
 
 def _slots(m, dut: Scanner) -> tuple[Signal, Signal]:
-    """The clock within its slot, and the slot's line, counted independently of the scanner."""
+    """Clock within its slot, and the slot's line, counted independently of the scanner."""
     slot = Signal(range(dut.derived.row_clocks))
     line = Signal(range(ROWS + 1), init=ROWS)
     ends = slot == dut.derived.row_clocks - 1

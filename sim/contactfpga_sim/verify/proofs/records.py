@@ -28,7 +28,7 @@ from contactfpga_sim.verify.proofs.zones import (
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: any rows at any time. Assumed: records are taken at once.
+    """Free: rows at any time. Assumed: records are taken at once.
 
     Claimed: from the second clock after a row to the second clock after the next one, exactly the zones that end with
     it leave, each once, and after a last row one end mark.
@@ -81,7 +81,6 @@ def _split(value):
 
 
 def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, rest, idle) -> None:
-    """Lemmas between two rows: brackets and table agree with the specification's open row."""
     m, columns = proof.m, range(dut.derived.skin.columns)
     join = inside.part("join")
     starts = Signal(len(columns))
@@ -122,7 +121,6 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
 
 
 def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:
-    """Lemmas in the clock after a row's handover, when the walk has all of it ahead."""
     walk = inside.part("walk")
     proof.lemma(inside["walk.befores_later"] == (before & ~(before << 1))[: len(before)])
     proof.lemma((inside["walk.last"] == last) & (inside["walk.y"] == y))
@@ -141,7 +139,7 @@ def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y
 
 
 def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int, closed: bool = False) -> None:
-    """The specification itself, without the labeller. Free: a frame and a zone's record.
+    """The specification itself. Free: a frame and a zone's record.
 
     Claimed: row by row as many zones with this record end as a flood fill of the frame finds.
     """

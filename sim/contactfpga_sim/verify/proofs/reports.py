@@ -1,4 +1,4 @@
-"""Fault reports: they equal the scan's knowledge, none is withheld, and each lets a waiting frame pass."""
+"""Fault reports: true to the scan, none withheld, and each lets a waiting frame pass."""
 
 from functools import partial
 from unittest import mock
@@ -22,10 +22,9 @@ def reports_are_true(proof: Proof, skin: Skin) -> None:
     """Free: the word in each clock, frames, wishes for a hello, when bytes are taken, one place of a report.
 
     Claimed: the byte at that place follows the word in the clock after the byte before was taken, and is stable. A
-    report has the right length. Without one on the wire, after the word was stable for as many clocks as places, and
-    two more, it is the last sent word, or a report is due; after a hello one is due as well, and stays due until it is
-    taken. Of two reports without a hello between them the second does not precede a frame that waited while the first
-    was taken.
+    report has the right length. Without one on the wire, after the word was stable for two clocks more than there are
+    places, it is the last sent word or a report is due; after a hello one is due, too, until it is taken. Of two
+    reports without a hello between them the second does not precede a frame that waited while the first was taken.
     """
     m = proof.m
     hello = protocol.encode_hello(skin)

@@ -1,4 +1,4 @@
-"""The frames of a line reversal: each touched row is selected and handed on once, in order."""
+"""Frames of a line reversal: each touched row is selected and handed on once, in order."""
 
 from collections.abc import Callable
 from functools import partial
@@ -47,7 +47,6 @@ class Frames:
         proof.given(~sheet.packed | self.packing)
 
     def _go_on(self, sheet: Sheet) -> None:
-        """Lemmas on the row after the one taken."""
         m, dut = sheet.proof.m, sheet.dut
         if not dut.derived.skips:
             with m.If(self.taken):
@@ -70,10 +69,9 @@ class Frames:
 def frames(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and when rows are taken. Assumed: no frame is packed before its last row is taken.
 
-    Claimed: a frame begins when the one before is packed, not earlier. Its rows are those that read touched then, or
-    are busy. They are selected in ascending order, none while a row is offered. Each is offered once, as its columns
-    were in the last clock of its selection, without masked ones; an offer stays until it is taken. Only the last row is
-    marked as such.
+    Claimed: a frame begins when the one before is packed. Its rows are those that read touched then, or are busy. They
+    are selected in ascending order, none while a row is offered. Each is offered once, as its columns were in the last
+    clock of its selection, without masked ones, until it is taken. Only the last row is marked as such.
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
@@ -118,8 +116,6 @@ def _say_of_frames(sheet: Sheet, spec: Frames, say: Say) -> None:
 
 
 def _say_of_driven_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
-    """Claim the selected rows, each followed by an empty one unless its neighbor was selected; an empty one for
-    none."""
     proof, row = sheet.proof, sheet.dut.rows.payload
     here = (Const(1, sheet.skin.rows + 1) << row.y)[: sheet.skin.rows + 1]
     with proof.m.If(sheet.dut.rows.valid & sheet.dut.alone):
@@ -130,7 +126,6 @@ def _say_of_driven_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
 
 
 def _say_of_all_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
-    """Claim every row of the sheet, unselected ones empty."""
     proof, row = sheet.proof, sheet.dut.rows.payload
     with proof.m.If(sheet.dut.rows.valid):
         say(row.last == (spec.place == sheet.skin.rows - 1))

@@ -17,12 +17,11 @@ LISTEN, ANSWER, GAP, CHARGE, SELECT = range(5)  # in the order in which the sour
 
 
 def _inverted(sheet: Sheet) -> Value:
-    """Whether the pins drive columns to the selecting level, and the guard column to the released one."""
     return sheet.dut.pins.columns_level != int(sheet.skin.selects_low)
 
 
 def pins(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, and the later stages in each clock.
+    """Free: the sheet and the later stages.
 
     Claimed: at most one row is selected, including the guard row, and none while rows are released; no column is driven
     then nor in the clock before or after; rows are released together, except the guard row, held at the released level.
@@ -45,7 +44,7 @@ def pins(proof: Proof, **changes: Any) -> None:
 
 
 def pin_lemmas(sheet: Sheet) -> None:
-    """Lemmas: a state's effect on the sheet is visible a clock later."""
+    """Lemmas: a state affects the sheet a clock later."""
     proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
     derived, rows = sheet.dut.derived, sheet.skin.rows
     before, started = proof.before(state, init=LISTEN), proof.before(1)
@@ -69,8 +68,8 @@ def pin_lemmas(sheet: Sheet) -> None:
 
 
 class Lines:
-    """A whole row and a whole column, chosen by the solver: within the settle time the row answers the guard column,
-    and the column the guard row. The guard column may be stuck, and then feeds no row."""
+    """A whole row and a whole column, chosen by the solver: within the settle time they answer the guard lines. The
+    guard column may be stuck, and then feeds no row."""
 
     def __init__(self, sheet: Sheet):
         proof, skin, settle = sheet.proof, sheet.skin, sheet.dut.derived.settle_clocks
@@ -88,10 +87,10 @@ class Lines:
 
 
 def whole(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, except one whole row and one whole column, see ``Lines``; and the later stages.
+    """Free: the later stages, and the sheet except one whole row and column, see ``Lines``.
 
-    Claimed: these two are never reported as open. After the last row of a frame there is a check before the next frame
-    begins, and checks of columns and rows alternate.
+    Claimed: these two are never reported as open. After a frame's last row there is a check before the next frame
+    begins; checks of columns and rows alternate.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     lines, inside, m = Lines(sheet), sheet.inside, proof.m
@@ -111,7 +110,6 @@ def whole(proof: Proof, **changes: Any) -> None:
 
 
 def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> None:
-    """Lemmas on a check's progress, and the pins' readings of the two lines."""
     proof, state, clock, inside, told = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.dut.faults
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)

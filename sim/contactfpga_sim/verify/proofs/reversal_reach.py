@@ -1,4 +1,4 @@
-"""Line reversal misses no switch that stays closed: it is in its frame, and the next frame is in time."""
+"""Line reversal misses no switch that stays closed."""
 
 from functools import partial
 from typing import Any
@@ -16,8 +16,8 @@ from contactfpga_sim.verify.proofs.reversal_frames import Frames, keep_frames, w
 class Switch:
     """One unmasked switch, chosen by the solver, which closes and opens freely.
 
-    While closed, a driven column is read by its row if rows are released, and a selected row by its column. A driven
-    column reads released.
+    While closed, a driven column, which reads released, is read by its row if rows are released; a selected row by its
+    column.
     """
 
     def __init__(self, sheet: Sheet):
@@ -80,7 +80,6 @@ def closed(proof: Proof, **changes: Any) -> None:
 
 
 def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) -> None:
-    """Lemmas on the pins' readings of the switch, and their fate."""
     proof, inside, state, due = sheet.proof, sheet.inside, sheet.state, sheet.inside["cycle.due"]
     before, row = proof.before(state, init=LISTEN), switch.row
     driven = switch.of_column(sheet.dut.pins.columns_drive)

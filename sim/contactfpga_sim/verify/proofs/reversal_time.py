@@ -1,4 +1,4 @@
-"""Longest times of line reversal: from frame to frame, and from a touch of an untouched sheet."""
+"""Longest times of line reversal: between frames, and from a touch."""
 
 from functools import partial
 from typing import Any
@@ -46,7 +46,6 @@ class Prompt:
 
 
 def _frame_time(sheet: Sheet, prompt: Prompt) -> tuple[Signal, Signal]:
-    """Clocks since the last frame began, and their bound; 0 without rows."""
     m, longest = sheet.proof.m, prompt.longest
     since, bound = Signal(range(longest + 2)), Signal(range(longest + 1))
     count = popcount(sheet.wanted)
@@ -62,8 +61,8 @@ def next_frame(proof: Proof, **changes: Any) -> None:
     """Free: the sheet. Assumed: rows are taken at once, and frames packed soon; see ``Prompt``.
 
     Claimed: the frame after one with n rows, n > 0, begins at most ``Prompt.frame(n)`` clocks after it. When nothing
-    was touched, and a row reads touched, a frame that includes the pins' readings then begins at most ``2 + project``
-    clocks later, or, if another was under way or began before, ``3 + PACKED``.
+    was touched and a row reads touched, a frame with the pins' readings begins at most ``2 + project`` clocks later,
+    or, if another was under way or began before, ``3 + PACKED``.
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
@@ -92,7 +91,6 @@ def next_frame(proof: Proof, **changes: Any) -> None:
 
 
 def _packing(sheet: Sheet, spec: Frames, prompt: Prompt) -> Value:
-    """Clocks of packing until a frame may begin, once the last row was sampled."""
     m, due = sheet.proof.m, sheet.inside["cycle.due"]
     packing = Signal(range(PACKED + 8))
     with m.If(due != 0):
@@ -107,7 +105,6 @@ def _packing(sheet: Sheet, spec: Frames, prompt: Prompt) -> Value:
 
 
 def _handing(sheet: Sheet) -> Value:
-    """Clocks until no row waits."""
     m, due = sheet.proof.m, sheet.inside["cycle.due"]
     handing = Signal(range(8))
     with m.If(due != 0):
@@ -118,7 +115,6 @@ def _handing(sheet: Sheet) -> Value:
 
 
 def _frame_time_lemmas(sheet: Sheet, prompt: Prompt, packing, since, bound) -> None:
-    """Lemmas on the remaining time of the frame, in each state."""
     m, proof, derived, inside = sheet.proof.m, sheet.proof, sheet.dut.derived, sheet.inside
     clock, handing = sheet.clock, _handing(sheet)
     after = popcount(inside["cycle.todo"]) * prompt.slot + prompt.end

@@ -77,7 +77,6 @@ def _slot_lemmas(proof: Proof, inside: Inside, dut: Scanner, slot, row) -> None:
 
 
 def _slots(proof: Proof, derived):
-    """The clock within its slot, and the slot's row, counted independently of the scanner."""
     slot = Signal(range(derived.row_clocks))
     row = Signal(range(derived.skin.rows))
     ends = slot == derived.row_clocks - 1

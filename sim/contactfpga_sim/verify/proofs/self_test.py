@@ -1,4 +1,4 @@
-"""The self-test of a scan by line reversal: one line is driven at a time, and its slots show the pins' levels."""
+"""The self-test of line reversal: one line is driven at a time, and slots show the pins' levels."""
 
 from functools import partial
 from typing import Any
@@ -49,12 +49,12 @@ class Tested:
 
 
 def one_line(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet, commands, and the later stages in each clock.
+    """Free: the sheet, commands, and the later stages.
 
     Claimed: columns at the released level and rows at the selecting one are driven in separate clocks. Two or more
-    lines are at the selecting level only while no line is at the other. In a slot of the self-test either all driven
-    lines are at the selecting level, for the projection time, or one line alone is driven to the released level, for
-    the settle time; a clock without a driven line is between.
+    lines are at the selecting level only while none is at the other. In a slot either all driven lines are at the
+    selecting level, for the projection time, or one line alone is driven to the released level, for the settle time; a
+    clock without a driven line is between.
     """
     tested = Tested(proof, **changes)
     m, sheet, skin = proof.m, tested.sheet, tested.sheet.skin
@@ -85,7 +85,7 @@ def one_line(proof: Proof, **changes: Any) -> None:
 
 
 def pin_lemmas(tested: Tested) -> None:
-    """Lemmas: a state's effect on the sheet is visible a clock later."""
+    """Lemmas: a state affects the sheet a clock later."""
     proof, sheet, inside = tested.proof, tested.sheet, tested.sheet.inside
     skin, derived, state, clock = sheet.skin, sheet.dut.derived, sheet.state, sheet.clock
     slot, slot_clock, before = inside["test.slot_state"], inside["test.clock"], proof.before(state, init=LISTEN)
@@ -120,7 +120,7 @@ def pin_lemmas(tested: Tested) -> None:
 
 def shown(proof: Proof, **changes: Any) -> None:
     """Free as in :func:`one_line`. Claimed: a sent slot has the pins' levels in the last clock in which its line was
-    driven; it stays until it is taken; and numbers are in order."""
+    driven, and stays until it is taken; numbers are in order."""
     tested = Tested(proof, **changes)
     m, sheet, skin = proof.m, tested.sheet, tested.sheet.skin
     slots, number = sheet.dut.slots, sheet.inside["test.number"]

@@ -1,4 +1,4 @@
-"""Several sheets share a line: packets are whole and in sequence, and only the sheet with the grant sends."""
+"""Several sheets on a line: packets are whole and in sequence, and only the sheet with the grant sends."""
 
 from functools import partial
 from unittest import mock
@@ -20,9 +20,8 @@ _PLACE = SheetPlace(1, 2)
 def grants_go_round(proof: Proof, sheets: int) -> None:
     """Free: which sheets hold the grant in each clock.
 
-    Claimed: in each clock one sheet has the grant, initially the first. It keeps the grant while it holds it; then the
-    next sheet has it, cyclically. So between two grants of a sheet each other sheet has one, and a sheet that does not
-    hold the grant delays no other.
+    Claimed: in each clock one sheet has the grant, initially the first, and keeps it while it holds it; then the next
+    sheet has it, cyclically. So a sheet that does not hold the grant delays no other.
     """
     m = proof.m
     dut = RoundRobin(sheets)
@@ -40,9 +39,8 @@ def packets_are_whole(proof: Proof, hello: bytes) -> None:
     """Free: all inputs of a sheet's link in each clock, and its waits for the grant. Assumed: the grant stays while it
     is held, as ``grants_go_round`` shows.
 
-    Claimed: it offers bytes only with the grant, and releases it only when the last byte sent, if any, was a delimiter.
-    Without the grant it takes nothing. When it releases the grant after a byte it has nothing in hand, so it sends one
-    packet per grant.
+    Claimed: the link offers bytes and takes anything only with the grant, and releases it only when the last byte sent,
+    if any, was a delimiter. After a byte it releases the grant with nothing in hand, so it sends one packet per grant.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):

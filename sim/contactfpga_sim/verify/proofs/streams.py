@@ -1,5 +1,4 @@
-"""Stages that pass on their inputs: an offer stays until it is taken, nothing is lost or repeated; and the divider,
-whose every barycenter is the nearest step to sum / area."""
+"""Stages that pass on their inputs, without loss or repetition; and the divider."""
 
 from functools import partial
 
@@ -19,7 +18,7 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def feed(proof: Proof, port, name: str):
-    """Free offers to a stream; assumed is that each stays unchanged until it is taken."""
+    """Free offers to a stream, each assumed unchanged until it is taken."""
     payload = Value.cast(port.payload)
     valid, value = proof.free(1, f"{name}_valid"), proof.free(len(payload), name)
     proof.m.d.comb += [port.valid.eq(valid), payload.eq(value)]
@@ -28,7 +27,7 @@ def feed(proof: Proof, port, name: str):
 
 
 def drain(proof: Proof, port, name: str):
-    """Free reads of a stream; claimed is that each offer stays unchanged until then."""
+    """Free reads of a stream, whose offers are claimed unchanged until then."""
     proof.m.d.comb += port.ready.eq(proof.free(1, f"{name}_ready"))
     offers_stay(proof, port)
 
@@ -108,7 +107,7 @@ def bitmap(proof: Proof) -> None:
     """Free: rows at any time, and when items are taken.
 
     Claimed: a row is taken in the clock in which it passes on, unchanged. Three clocks after a last one an end mark is
-    offered, once, and no row is taken before that is.
+    offered once, before any other row is taken.
     """
     m = proof.m
     dut = Bitmap(Skin(rows=3, columns=4, report="cells", settle_us=20))
@@ -134,10 +133,10 @@ def bitmap(proof: Proof) -> None:
 
 
 def backlog(proof: Proof, depth: int) -> None:
-    """The queue in front of the packer. Free: items at any time, when they are taken, and one followed item.
+    """The queue before the packer. Free: items at any time, when they are taken, and one followed item.
 
     Claimed: the item leaves unchanged, after exactly those in before it; an item inside for two clocks is offered;
-    there is room until all but one place are taken. So its fill level is always right.
+    there is room until all but one place are taken.
     """
     m = proof.m
     dut = Queue(width=4, depth=depth)
@@ -254,8 +253,6 @@ def _claim_nearest(proof: Proof, dut: Divider, kept, bits: int) -> None:
 
 
 def _divide_lemmas(proof: Proof, dut: Divider, inside: Inside, age, full, kept) -> None:
-    """Lemmas: after i steps quotient and remainder are those of the sum's first bits, the others are still to be
-    divided."""
     m = proof.m
     record, clocks = dut.records.payload, dut.derived.quotient_bits
     area = record.zone.area

@@ -15,8 +15,8 @@ def framing(proof: Proof, bit_clocks: int) -> None:
     """Free: bytes at any time.
 
     Claimed: after a byte is taken there is a start bit, its bits, lowest first, and a stop bit, ``bit_clocks`` each;
-    else the line is high. The next byte is taken in the last clock of the stop bit or whenever nothing is sent, and in
-    no other clock, so that no byte is lost or repeated.
+    else the line is high. The next byte is taken in the stop bit's last clock or whenever nothing is sent, and in no
+    other clock.
     """
     m = proof.m
     dut = Transmitter(bit_clocks)

@@ -1,4 +1,4 @@
-"""Pressure units: each converter is driven by its data sheet and read correctly, and thresholds are compared."""
+"""Pressure units: converters are driven by data sheet and read correctly, and thresholds are compared."""
 
 from functools import partial
 
@@ -19,10 +19,9 @@ def conversions(proof: Proof, skin: Skin) -> None:
     """Free: the converter's answers.
 
     Claimed: conversions follow one another, unit after unit, each with 19 clocks while the converter is selected and
-    none in the two levels while it is not. No level of the clock is too short, nor is the pause between selection and
-    clock. Start, single-ended and channel bits are set a level before each rising edge, and stable while the clock is
-    high. A reading is the pin's level in the clock before the last twelve rising edges, available three clocks after
-    the last one.
+    none in the two levels while it is not. No clock level is too short, nor the pause between selection and clock.
+    Start, single-ended and channel bits are set a level before each rising edge, and stable while the clock is high. A
+    reading is the pin's level in the clock before the last twelve rising edges, available three clocks after the last.
     """
     m = proof.m
     dut = Mcp3208(skin)
@@ -61,7 +60,6 @@ def conversions(proof: Proof, skin: Skin) -> None:
 
 
 def _readings(proof: Proof, dut: Mcp3208, rises: Value, edges: Value, miso: Value, unit: Value) -> None:
-    """The pin in the clock before each edge, shifted in."""
     taken = Signal(12, name="taken")
     with proof.m.If(rises):
         proof.m.d.sync += taken.eq(Cat(proof.before(miso), taken))
@@ -75,7 +73,6 @@ def _readings(proof: Proof, dut: Mcp3208, rises: Value, edges: Value, miso: Valu
 
 
 def _tie(proof: Proof, inside, least: int, edges: Value, unit: Value, begun: Value, since: dict[str, Signal]) -> None:
-    """Lemmas that tie the observer's counters to the inner ones, which precede the pins by a clock."""
     dut, level, clock, its_unit = inside.component, inside["level"], inside["clock"], inside["unit"]
     last_unit = dut.skin.units - 1
     late, phase = proof.before(level, init=38), proof.before(clock)
@@ -122,8 +119,8 @@ def thresholds(proof: Proof, skin: Skin) -> None:
     clocks apart.
 
     Claimed: two clocks after a reading of the unit its bit is whether a threshold is set and the reading at least that
-    far from the zero; it stays until the next reading. Before a threshold is set nothing is over or armed, and the
-    unit's makes it so.
+    far from the zero; it stays until the next reading. Before a threshold is set nothing is over or armed; the unit's
+    arms it.
     """
     m = proof.m
     dut = Watch(skin)
@@ -196,9 +193,9 @@ def frames(proof: Proof, skin: Skin) -> None:
     """Free: the converter's answers, and when a conversion is ready.
 
     Claimed: no level of the converter's own clock or of the SPI clock is too short, nor the pause between selection and
-    clock. The SPI clock runs while the converter is selected, and each selection has 240 clocks. A reading is the pin's
-    level in the clocks before the last 24 falling edges, with its highest bit inverted, available three clocks after
-    the last one.
+    clock. The SPI clock runs while the converter is selected; each selection has 240 clocks. A reading is the pin's
+    level in the clocks before the last 24 falling edges, its highest bit inverted, available three clocks after the
+    last.
     """
     m = proof.m
     dut = Ads131m08(skin)
@@ -245,7 +242,6 @@ def _paced_readings(proof: Proof, dut: Ads131m08, falls: Value, miso: Value) -> 
 
 
 def _tie_paced(proof: Proof, inside, dut: Ads131m08, edges: Value, since: dict[str, Signal]) -> None:
-    """Lemmas that tie the observer's counters to the inner ones, which precede the pins by a clock."""
     least, paces = dut.level_clocks, dut.pace_clocks
     level, clock, busy, count = inside["level"], inside["clock"], inside["busy"], inside["count"]
     late, phase, was_busy = proof.before(level), proof.before(clock), proof.before(busy)

@@ -1,4 +1,4 @@
-"""The check for spontaneously flipped registers finds none while none flips."""
+"""The check for flipped registers finds none while none flips."""
 
 from functools import partial
 

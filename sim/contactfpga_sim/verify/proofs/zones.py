@@ -1,9 +1,8 @@
-"""The reference for the labeller's records: the zones of a frame, found row by row with all their cells.
+"""The reference for the labeller's records: the zones of a frame, found row by row.
 
-There are no runs, clusters, brackets or places: the cells of two adjacent rows are the nodes of a graph, and zones are
-its closure. :func:`rows_find_the_zones` shows that these are the zones of a flood fill over the frame. For a sheet
-whose ends meet, offsets along the graph's paths give the turns of a zone's cells: a path over the seam adds or removes
-a turn, and two different paths between two cells make a ring.
+The cells of two adjacent rows are the nodes of a graph, and zones are its closure. :func:`rows_find_the_zones` shows
+that these are the zones of a flood fill. For closed sheets, offsets along paths give the turns of a zone's cells: a
+path over the seam adds or removes a turn, and two different paths between two cells make a ring.
 """
 
 import itertools
@@ -22,7 +21,7 @@ FIELDS = ("area", "sum_x", "sum_y")
 
 
 class OpenRow:
-    """A row and its zones: for each column the columns of the same zone, and that zone's moments."""
+    """A row and its zones: for each column the zone's columns and moments."""
 
     def __init__(self, derived: Derived, name: str):
         columns = range(derived.skin.columns)
@@ -32,7 +31,7 @@ class OpenRow:
         self.moments = [Signal(moments_layout(derived), name=f"{name}_moments_{x}") for x in columns]
 
     def another(self, name: str) -> "OpenRow":
-        """An empty row of its kind."""
+        """An empty row of this kind."""
         return type(self)(self.derived, name)
 
     def copy(self, other: "OpenRow", when=1) -> list:
@@ -40,7 +39,7 @@ class OpenRow:
         return [mine.eq(Mux(when, theirs, 0)) for mine, theirs in zip(self.state(), other.state(), strict=True)]
 
     def state(self) -> list:
-        """All its state."""
+        """All state."""
         return [self.cells, *self.reach, *(moments.as_value() for moments in self.moments)]
 
     def record(self, x: int) -> Value:
@@ -48,15 +47,15 @@ class OpenRow:
         return self.moments[x].as_value()
 
     def leaders(self) -> list:
-        """For each column whether it is the first of its zone."""
+        """Whether each column is the first of its zone."""
         return [cell & ~self.reach[x][:x].any() if x else cell for x, cell in enumerate(self.cells)]
 
 
 class RowStep(Elaboratable):
     """A step from a row to the next.
 
-    ``after`` is the open row after ``cells``, ``ended`` the number of zones with the record ``wanted`` that end there:
-    those without a cell in the new row, and in the last row all others, too.
+    ``after``: the open row after ``cells``; ``ended``: number of zones with the record ``wanted`` that end there,
+    without a cell in the new row; in the last row all.
     """
 
     def __init__(self, derived: Derived, before: OpenRow, cells, last, y, wanted):
@@ -88,7 +87,6 @@ class RowStep(Elaboratable):
 
 
 def _closure(m: Module, before: OpenRow, cells, skin: Skin) -> list:
-    """For each cell of two rows, first those of the row before, the cells of both rows in its zone."""
     count = len(cells)
     pressed = [*before.cells, *cells]
 
@@ -118,7 +116,7 @@ def columns_apart(x: int, other: int, skin: Skin) -> int:
 
 
 def flood_fill(m: Module, derived: Derived, frame, wanted):
-    """Number of zones of a frame with the moments ``wanted``: every pressed cell spreads over the frame."""
+    """Number of zones of a frame with the moments ``wanted``, by flood fill."""
     reach = spread(m, derived.skin, frame, turns=0)
     count = 0
     for i, zone in enumerate(reach):
@@ -129,8 +127,8 @@ def flood_fill(m: Module, derived: Derived, frame, wanted):
 
 
 def spread(m: Module, skin: Skin, frame, turns: int) -> list[Signal]:
-    """For each cell of a frame the cells of its zone, on this turn and on as many turns before and after it: the lowest
-    bits are of the first turn."""
+    """For each cell of a frame its zone's cells, on this turn and ``turns`` before and after; the first turn is
+    lowest."""
     cells = skin.rows * skin.columns
     laps, steps = 2 * turns + 1, [(-1, 0), (1, 0), (0, -1), (0, 1)]
     if skin.connectivity == 8:
@@ -178,17 +176,16 @@ def open_rows_agree(proof: Proof, open_row: OpenRow) -> None:
 
 
 Way = tuple[int, int, Value, Value | int]
-"""By pair of nodes, whether there is a path, and by how many turns the second is further on. The first nodes are the
-cells of the row before."""
+"""By pair of nodes, whether there is a path, and by how many turns the second is further on."""
 
 TURN = signed(4)
 """Largest distance in turns of two cells of two rows."""
 
 
 class TurnedRow(OpenRow):
-    """Also, for each column, whether it is a turn behind the first of its zone, and the turns of that zone's cells, as
-    in the gateware: ``turned`` on the upper one of ``two``, the lower of which is the first column's or, with ``back``,
-    the one before it."""
+    """Also, for each column, whether it is a turn back from the first of its zone, and the turns of that zone's cells,
+    as in the gateware: ``turned`` on the upper one of ``two``, of which the lower is the first column's or, with
+    ``back``, the one before."""
 
     def __init__(self, derived: Derived, name: str):
         super().__init__(derived, name)
@@ -228,7 +225,6 @@ class TurnedStep(RowStep):
         return m
 
     def _ways(self) -> list[Way]:
-        """Paths between neighbors, and between cells of the row before in one zone."""
         before, cells, skin = self.before, self.cells, self.derived.skin
         count = skin.columns
         over_the_seam = {(count - 1, 0): 1, (0, count - 1): -1}
@@ -245,7 +241,6 @@ class TurnedStep(RowStep):
         return found
 
     def _turns_from(self, m: Module, first: int, ways: list[Way], reach: list, offsets: list) -> data.View:
-        """Turns of the zone's cells, relative to a column of the new row."""
         before, columns = self.before, range(self.derived.skin.columns)
         zones = [leader & reach[j] for j, leader in enumerate(before.leaders())]
         low = [offsets[j] - before.turns[j].back for j in columns]
@@ -273,18 +268,17 @@ class TurnedStep(RowStep):
 
 
 def empty_row(derived: Derived) -> OpenRow:
-    """The specification's state before a frame: with turns only for a sheet whose ends meet."""
+    """The specification's state before a frame."""
     return (TurnedRow if derived.skin.closed else OpenRow)(derived, "open")
 
 
 def next_row(m: Module, derived: Derived, before: OpenRow, *given) -> tuple[OpenRow, Signal]:
-    """The result of a :class:`RowStep`, or of a :class:`TurnedStep` for a sheet whose ends meet."""
+    """Result of a :class:`RowStep`, for closed sheets of a :class:`TurnedStep`."""
     m.submodules += (step := (TurnedStep if derived.skin.closed else RowStep)(derived, before, *given))
     return step.after, step.ended
 
 
 def _followed(m: Module, ways: list[Way], nodes: int) -> tuple[list[list], list[list]]:
-    """For each pair of nodes whether there is a path, and over how many turns."""
     reach = [[_any(way for a, b, way, _ in ways if (a, b) == (i, j)) for j in range(nodes)] for i in range(nodes)]
     turns = {(a, b): turn for a, b, _, turn in ways}
     offsets = [[turns.get((i, j), 0) for j in range(nodes)] for i in range(nodes)]
@@ -353,7 +347,7 @@ def turned_rows_agree(proof: Proof, open_row: TurnedRow) -> None:
 def turns_are_known(proof: Proof, open_row: TurnedRow, x: int, word, linked) -> None:
     """Lemmas at a run that starts at column x: ``word`` in the table and ``linked`` agree with the specification.
 
-    Of a ring nothing else counts, and of a wound zone only the places of its runs.
+    Only the places of a wound zone's runs count, and nothing else of a ring.
     """
     turns, layout = open_row.turns[x], kept_layout(open_row.derived)
     kept = data.View(layout, word[: layout.size])

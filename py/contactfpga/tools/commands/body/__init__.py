@@ -1,4 +1,4 @@
-"""`contactfpga body`: many sheets on one robot; a file per topic."""
+"""`contactfpga body`: sheets on one robot; a file per topic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga body learn`: cells that the folding cover presses, over a joint's range."""
+"""`contactfpga body learn`: cells that a folding cover presses, by a joint's angle."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(body: Body, plan: Plan, joint: str) -> None:
-    """Check before anybody moves the robot. Raises ValueError."""
+    """Check the request before anybody moves the robot. Raises ValueError."""
     names = None if body.kinematics is None else body.kinematics.joint_names
     if names is not None and joint not in names:
         raise ValueError(f"joint {shown(joint)} is no joint of the URDF; it has {', '.join(names)}")
@@ -76,7 +76,7 @@ def _check(body: Body, plan: Plan, joint: str) -> None:
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
-    """Each angle with a later frame, until a link lacks data: unseen is not learned as free."""
+    """Each angle with a later frame, until a link lacks data, since unseen cells are not free."""
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue

@@ -44,7 +44,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def link(body: Body, name: str) -> Plan:
-    """The link of this name."""
     if name not in body.links:
         raise ValueError(f"link {shown(name)} is not known; there are {', '.join(body.links)}")
     return body.links[name]

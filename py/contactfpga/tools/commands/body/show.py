@@ -16,7 +16,7 @@ from contactfpga.tools.console import numbers
 EXTRA = None
 
 READINGS_S = 0.03
-"""Delay after a frame by which its readings of pressure units arrive."""
+"""Delay of a frame's pressure unit readings."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

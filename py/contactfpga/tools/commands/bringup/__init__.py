@@ -1,4 +1,4 @@
-"""`contactfpga bringup`: leads through the first power-up of a kit, and writes the findings into one file."""
+"""`contactfpga bringup`: leads through a kit's first power-up, and writes the findings into one file."""
 
 from __future__ import annotations
 
@@ -36,17 +36,15 @@ from contactfpga.tools.console import flags, interrupt, numbers, outputs
 EXTRA = None
 
 CLOSING = re.compile(r"closing_\w+_n")
-"""Names of predicted closing forces."""
 SECONDS = 300.0
-"""Default longest duration of each step that asks for a touch."""
+"""Default longest duration of each step with touches."""
 COUNTED_S = 2.0
 """Time for counting frames of an untouched sheet."""
 STUCK_S, REST_S = 10.0, 1.0
-"""Times of a :class:`Person`."""
 REHEARSAL = "sim://"
-"""Port name of a virtual board of the kit with a simulated hand."""
+"""Port of a virtual kit with a simulated hand."""
 REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
-"""Simulated times: longest constant action of the hand, and counting of frames."""
+"""Simulated times in s: longest constant action of the hand, and counting."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def bring_up_skin(kit: Kit) -> Skin:
-    """The kit's Skin with all cells in each frame, and no debounce."""
+    """The kit's Skin with all cells in each frame, and without debounce."""
     return kit.skin.replace(report="cells", debounce="none", send="always")
 
 
@@ -142,7 +140,7 @@ def _closing(measured: list[tuple[str, float]]) -> list[tuple[str, float]]:
 def _force(
     kit: Kit, predicted: dict[str, predictions.Prediction], measured: list[tuple[str, float]]
 ) -> FittedForce | None:
-    """The switches' force from measured closing forces; None without any, or without a cover."""
+    """The switches' force by measured closing forces; None without any, or without a cover."""
     cover, closing = load_cover(kit.skin_path), _closing(measured)
     if cover is None or not closing:
         return None
@@ -151,7 +149,6 @@ def _force(
 
 
 def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
-    """Lead through all possible steps."""
     try:
         board, person = _opened(args, kit, report.skin)
     except (ContactFPGAError, OSError) as error:
@@ -181,7 +178,6 @@ def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
 
 
 def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
-    """The steps up to a broken-off one."""
     try:
         yield from found
     except ContactFPGAError as error:
@@ -189,7 +185,7 @@ def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
 
 
 def _opened(args: argparse.Namespace, kit: Kit, skin: Skin) -> tuple[Board, Person]:
-    """The board, of the bring-up's Skin or else the kit's, and the person."""
+    """The board, built from the bring-up's or the kit's Skin, and the person."""
     person: Person = _Reader(args)
     port: str | SimulatedPort | None = args.port
     if port == REHEARSAL:
@@ -210,28 +206,22 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
 
 
 class _Hand:
-    """Does the steps' requests on a virtual board."""
-
     stuck_s, rest_s = 0.1, 0.02
 
     def __init__(self, hand: object):
         self._hand = hand
 
     def asked(self, does: str, words: str) -> float:
-        """See :class:`Person`."""
         return self._hand.does(does) or REHEARSED_S  # type: ignore[attr-defined]
 
 
 class _Reader:
-    """A person who reads the requests."""
-
     stuck_s, rest_s = STUCK_S, REST_S
 
     def __init__(self, args: argparse.Namespace):
         self._args = args
 
     def asked(self, does: str, words: str) -> float:
-        """See :class:`Person`."""
         waits = not self._args.yes and sys.stdin.isatty()
         enter = " Enter when you are ready;" if waits else ""
         terminal.say(f"      {words}{enter} Ctrl-C ends the step.", sys.stderr, hang=6)
@@ -241,7 +231,6 @@ class _Reader:
 
 
 def _add(args: argparse.Namespace, report: BringUpReport, step: Step, port: str) -> None:
-    """Record and show a step, without the port's name."""
     if not args.json:
         terminal.say(f"{len(report.steps) + 1}. {step.name}")
         for finding in step.findings:

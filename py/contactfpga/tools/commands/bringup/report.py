@@ -28,7 +28,7 @@ class Graded(NamedTuple):
     prediction: Prediction
     measured: float
     within: float
-    """Tolerance of the measured value either way, from rounding to clocks."""
+    """Tolerance of the measurement from rounding to clocks."""
 
     @property
     def holds(self) -> bool:
@@ -66,11 +66,9 @@ class BringUpReport:
 
     @property
     def faults(self) -> int:
-        """Number of faults found."""
         return sum(step.faults for step in self.steps)
 
     def to_dict(self) -> dict[str, Any]:
-        """The report for JSON."""
         return {
             "kit": self.kit.name,
             "fingerprint": self.skin.fingerprint.hex(),
@@ -107,7 +105,6 @@ class BringUpReport:
         return [one for one in self.fitted.values if one.told] if self.fitted is not None else []
 
     def to_markdown(self) -> str:
-        """The text of the file."""
         parts = [f"# Bring-up of the {self.kit.name} kit, {self.when.isoformat()}\n", *self._head()]
         for step in self.steps:
             parts.append(f"\n## {step.name[0].upper()}{step.name[1:]}\n")

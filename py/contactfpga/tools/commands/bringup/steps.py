@@ -1,4 +1,4 @@
-"""The steps of a first power-up in order, each a function of a board on the bench that measures and judges."""
+"""The steps of a first power-up, each a function of a board on the bench."""
 
 from __future__ import annotations
 
@@ -21,13 +21,11 @@ from contactfpga.tools.console import interrupt
 from contactfpga.zones.zone import Zones
 
 READS = 50
-"""Frames requested to measure the response time."""
+"""Requests for the response time."""
 MOST_LOST = 0.1
-"""Share of lost frames from which the link is too bad for other measurements."""
 RULER = "Press a ruler's edge along each column, one after the other, half a second each."
-"""Request to the person for diodes and bounce."""
 WATCHED_S = 0.1
-"""Least time for the untouched sheet."""
+"""Least time in s for the untouched sheet."""
 
 
 # ---- nothing touches
@@ -75,7 +73,7 @@ def _faults(board: Board) -> tuple[str, ...]:
 
 
 def lines(bench: Bench) -> Step:
-    """Lines of the untouched sheet: guard lines, self-test, and pressed readings."""
+    """Lines of the untouched sheet: guard lines, self-test, and pressed cells."""
     board, skin = bench.board, bench.skin
     pressed, zones = np.ones((skin.rows, skin.columns), bool), board.next(bench.timeout)
     first_us = zones.time_us
@@ -109,7 +107,7 @@ def lines(bench: Bench) -> Step:
 
 
 def switches(bench: Bench) -> Step:
-    """A finger over all switches: stuck, dead, loose ones, and lines that read alike."""
+    """A finger over all switches: stuck, dead and loose ones, and lines that read alike."""
     person, skin = bench.person, bench.skin
     seconds = person.asked("finger", "Press every switch with a fingertip, one row after the other.")
     watch, alike = Watch(skin, stuck_s=person.stuck_s), _Alike()
@@ -136,8 +134,9 @@ def switches(bench: Bench) -> Step:
 
 
 class _Alike:
-    """Lines that always read like another, in frames equal to the previous one, since a switch that moves between two
-    rows of a scan shows in one of them first."""
+    """Lines that always read like another, in frames equal to the one before: a switch that moves during a scan would
+    show in one line first.
+    """
 
     def __init__(self) -> None:
         self._last: np.ndarray | None = None
@@ -146,7 +145,6 @@ class _Alike:
         self._seen: list[np.ndarray] | None = None
 
     def take(self, zones: Zones) -> None:
-        """Add a frame."""
         assert zones.cells is not None
         before, rested = self._last, self._rests
         self._last = zones.cells
@@ -160,7 +158,6 @@ class _Alike:
         self._seen = [before | now for before, now in zip(self._seen or seen, seen, strict=True)]
 
     def sentences(self) -> Iterator[str]:
-        """Sentences on the equal lines."""
         for name, differ, seen in zip(("rows", "columns"), self._differ or (), self._seen or ()):
             same = np.triu(~differ & seen[:, None] & seen[None], 1)
             for one, other in np.argwhere(same).tolist():
@@ -220,7 +217,6 @@ def bounce(bench: Bench) -> Step:
 
 
 def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: Callable[[], bool]) -> None:
-    """Yield frames for these seconds of device time, until Ctrl-C, or until all was seen."""
     zones = bench.board.latest(bench.timeout)
     first_us = rest_us = zones.time_us
     with interrupt.usual_end():
@@ -237,14 +233,14 @@ def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: 
 
 
 def steps_for(skin: Skin) -> list[Callable[[Bench], Step]]:
-    """Steps possible with a board of this Skin."""
+    """Possible steps for this Skin."""
     if skin.report != "cells":
         return [link, lines]
     return [link, lines, switches, *[diodes] * skin.self_test, bounce, times.settling, times.circuit]
 
 
 def run(bench: Bench) -> Iterator[Step]:
-    """The steps up to the last, or to the first that makes later ones pointless."""
+    """The steps up to the last, or up to one that makes others pointless."""
     for step in steps_for(bench.skin):
         done = step(bench)
         yield done

@@ -1,4 +1,4 @@
-"""The steps of a bring-up that measure settle times, and the fitted circuit."""
+"""The bring-up's steps that measure settle times and fit the circuit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from contactfpga.tools.commands.wire import settle
 
 
 def settling(bench: Bench) -> Step:
-    """Times of cells to read pressed, with half of the columns and with all of them."""
+    """Times of cells to read pressed, with half of the columns and with all."""
     skin, per_us = bench.skin, bench.skin.derived.clocks_per_us
     found: list[Finding] = []
     measured: dict[str, float] = {}
@@ -49,7 +49,7 @@ def settling(bench: Bench) -> Step:
 
 
 class _Rested:
-    """Whether an image is complete, and has been for a person's rest time."""
+    """Whether an image is complete and unchanged for a person's rest time."""
 
     def __init__(self, bench: Bench, image: Settling):
         self._bench, self._image = bench, image
@@ -77,7 +77,7 @@ def _slow(image: Settling, per_us: int) -> Iterator[Finding]:
 
 
 def circuit(bench: Bench) -> Step:
-    """The values of [circuit] from the settle images."""
+    """The values of [circuit] by the settle images."""
     skin = bench.skin
     if bench.stated is None:
         return Step("circuit", (Finding("note", "the kit states no [circuit] to compare with"),))
@@ -119,8 +119,9 @@ def circuit(bench: Bench) -> Step:
 
 
 def _reading(image: Settling, broken: Sequence[int], guard: bool) -> SettleReading:
-    """Rows with the most common number of pressed switches, without slow or broken lines. ``guard``: each row pulls a
-    guard column too."""
+    """Rows with the most common number of pressed switches, without slow or broken lines. ``guard``: each row also
+    drives a guard column.
+    """
     counts = (image.clocks > 0).sum(axis=1)
     usual = int(np.bincount(counts[counts > 0]).argmax())
     clocks, slow = image.clocks.copy(), image.slow()

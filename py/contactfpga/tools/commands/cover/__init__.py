@@ -1,6 +1,6 @@
 """`contactfpga cover`: the soft cover's impact, sensitivity and design; a file per topic.
 
-Common code of the topics: numbers are read in SI units, tables are in mm and kPa, JSON is in SI units.
+Input and JSON are in SI units, tables in mm and kPa.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _plain(value: object) -> object:
 
 
 def unsolved(answer: NoSolution, as_json: bool) -> int:
-    """Print the reason for the missing answer."""
+    """Print the reason for a missing answer."""
     if as_json:
         say({"no_solution": answer.reason})
     else:
@@ -61,7 +61,6 @@ def unsolved(answer: NoSolution, as_json: bool) -> int:
 
 
 def table(*lines: tuple[str, str]) -> None:
-    """Print titles and values as two columns."""
     wide = max(len(title) for title, _ in lines)
     for title, value in lines:
         print(f"{title:{wide}}  {value}")
@@ -76,7 +75,6 @@ def notes(found: list[str]) -> int:
 
 LENGTH, LENGTH_FROM_0 = numbers.length(MAX_LENGTH_M), numbers.length(MAX_LENGTH_M, 0.0)
 ALONG = numbers.length(10.0)
-"""Places along an arm."""
 KG = numbers.number(1e-6, 1e6, "kg")
 SPEED = numbers.number(0, 1000, "m/s")
 TORQUE = numbers.number(-1e6, 1e6, "Nm")
@@ -90,5 +88,4 @@ NEWTON = numbers.number(1e-6, 1e6, "N")
 
 
 def json_flag(parser: argparse.ArgumentParser) -> None:
-    """Add the JSON flag of every topic."""
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")

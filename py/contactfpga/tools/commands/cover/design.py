@@ -97,7 +97,7 @@ def _row(one: FoamDesign) -> tuple[str, ...]:
 
 
 def region_row(one: RegionLimits) -> tuple[str, ...]:
-    """A body region's line."""
+    """Table row of a body region."""
     reaction = "any" if math.isinf(one.reaction_s) else f"{MM * one.reaction_s:.4g}" if one.reaction_s else "none"
     clamped = "none" if isinstance(one.clamped_m_s, NoSolution) else f"{one.clamped_m_s:.4g}"
     return (
@@ -142,7 +142,6 @@ def _thin_row(one: Thin) -> tuple[str, ...]:
 
 
 def columns(rows: list[tuple[str, ...]]) -> None:
-    """Print rows of text as columns, the first left-aligned."""
     wide = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     for row in rows:
         print("  ".join(f"{cell:<{w}}" if not i else f"{cell:>{w}}" for i, (cell, w) in enumerate(zip(row, wide))))

@@ -19,7 +19,6 @@ from contactfpga.tools.console import flags, numbers
 EXTRA = None
 
 M = 1e-3
-"""Meters in a mm."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

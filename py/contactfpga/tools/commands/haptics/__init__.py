@@ -9,7 +9,7 @@ from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.tools.console import interrupt
 
 BAD_INPUT = 2
-"""Exit status that distinguishes unusable files from failures."""
+"""Exit status for unusable files."""
 
 TOPICS = {
     "contacts": "Compute the force at each contact from a wrench.",

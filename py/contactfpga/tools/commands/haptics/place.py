@@ -16,7 +16,6 @@ from contactfpga.tools.console import numbers, outputs
 EXTRA = "haptics"
 
 SHOWN = 3
-"""Arrangements of each kind in the table."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

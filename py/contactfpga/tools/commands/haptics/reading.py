@@ -1,4 +1,4 @@
-"""JSON files of `contactfpga haptics`, and one-sentence refusals."""
+"""JSON files of `contactfpga haptics`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics zero`: read the unloaded units of a board, and send it these zeros."""
+"""`contactfpga haptics zero`: reads a board's unloaded units, and sets their zeros."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from contactfpga.tools.console.forces import cells_of
 EXTRA = "haptics"
 
 LEAST = 10
-"""Least number of readings for a zero."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _readings(board: Board, seconds: float) -> Floats:
-    """(m, n) readings of frames without a zone; raises :class:`HapticsError` if something touches."""
+    """(m, n) readings of frames without a zone; raises :class:`HapticsError` for a touch."""
     if board.hello.units is None:
         raise ContactFPGAError(f"{board.port}: this board has no pressure units; build its Skin with units")
     found: list[tuple[float, ...]] = []

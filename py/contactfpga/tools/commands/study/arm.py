@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 EXTRA = "sim"
 
 PLACES = 60
-"""Default number of touches anywhere."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -75,14 +75,12 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
 
 
 def _own(args: argparse.Namespace) -> dict[str, Method]:
-    """The methods of labellers that are not built in."""
     from contactfpga_sim.lab.chart.methods import by
 
     return {name: method for one in args.labeller or () for name, method in by(labellers.find(one)).items()}
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
-    """Save the finished points beside an earlier whole chart; returns the place."""
     from contactfpga_sim.lab.chart import numbers as table
 
     again = "run the same command again to go on from there"

@@ -48,7 +48,6 @@ def _write(sweeps: Mapping[str, Mapping[str, Sweep]], path: Path) -> Path:
 
 
 def _kept(sweeps: Mapping[str, Mapping[str, Sweep]], folder: Path) -> str:
-    """Save the finished sweeps beside an earlier whole table; returns the place."""
     done = sum(map(len, sweeps.values()))
     if not done:
         return "interrupted before the first knob was turned"

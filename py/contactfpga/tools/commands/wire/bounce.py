@@ -20,13 +20,12 @@ from contactfpga.tools.console import flags, live
 from contactfpga.zones.zone import Zones
 
 SHARES = (50, 90, 99, 100)
-"""Percentiles of the durations of presses, or releases."""
+"""Percentiles of press and release durations."""
 
 MANY = 0.05
 """Share of overwritten frames that is reported."""
 
 NAMED = 8
-"""Number of slow switches to name."""
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
@@ -52,7 +51,6 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def bare_skin(board: Board, hidden: str) -> Skin:
-    """The board's Skin without debounce."""
     skin = flags.known_skin(board)
     if skin is None:
         raise ContactFPGAError(
@@ -68,7 +66,6 @@ def bare_skin(board: Board, hidden: str) -> Skin:
 
 
 def _overwritten(board: Board) -> list[Finding]:
-    """Findings about gaps between frames, whose events are unknown."""
     stats = board.stats
     share = stats.overwritten / max(1, stats.overwritten + stats.frames)
     if share < MANY:

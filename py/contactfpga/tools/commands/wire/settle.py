@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 STEPS = 10
-"""Digits of the drawing."""
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
@@ -48,8 +47,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def settling(board: Board, skin: Skin) -> Settling:
-    """The receiver of this board's frames; raises :class:`ContactFPGAError` for a Skin that leaves nothing to
-    measure."""
+    """Receiver of this board's frames; raises :class:`ContactFPGAError` for a Skin that leaves nothing to measure."""
     derived = skin.derived
     first, settle = derived.first_sample_clocks, derived.settle_clocks
     if settle <= first:
@@ -68,8 +66,9 @@ def follow(
     render: live.Render | None = None,
     enough: Callable[[], bool] = lambda: False,
 ) -> tuple[float, list[Finding]]:
-    """Measure for these seconds of device time, until it is ``enough`` or until Ctrl-C, and restore the board; returns
-    the seconds taken and findings about the end. ``timeout`` in s, of each frame."""
+    """Measure for this device time, until it is ``enough`` or until Ctrl-C, and restore the board; returns the seconds
+    taken and findings about the end. ``timeout`` in s, of each frame.
+    """
     findings: list[Finding] = []
     zones, past_us = board.sample_at(0, timeout), 0
     found.start(_cells(zones))
@@ -100,7 +99,7 @@ def _cells(zones: Zones) -> np.ndarray:
 
 
 def _restored(board: Board, timeout: float) -> list[Finding]:
-    """Restore sampling at the end of the settle time; returns a finding on failure."""
+    """Restore sampling at the settle time; returns a finding on failure."""
     for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
         try:
             board.sample_at(0, timeout)
@@ -208,7 +207,6 @@ def _propose(found: Settling, skin: Skin) -> None:
 
 
 def _view(found: Settling, skin: Skin, room: live.Room) -> RenderableType:
-    """The results so far."""
     from rich.console import Group
     from rich.text import Text
 
@@ -224,10 +222,8 @@ def _view(found: Settling, skin: Skin, room: live.Room) -> RenderableType:
 def drawn(
     found: Settling, clocks_per_us: int, mask: Mask = (), wide: bool = True, unicode: bool = True
 ) -> SheetDrawing:
-    """The sheet, row 0 on top, with a digit for each cell.
-
-    Digit d: the cell reads pressed after d to d + 1 tenths of the settle time. Slow ones have the kind STUCK. ``wide``:
-    with a space between cells.
+    """The sheet, row 0 on top. Digit d: the cell reads pressed after d to d + 1 tenths of the settle time. Slow cells
+    have the kind STUCK. ``wide``: with spaces between cells.
     """
     clocks, free = found.clocks, "·" if unicode else "."
     digits = np.array([str(digit) for digit in range(STEPS)])
