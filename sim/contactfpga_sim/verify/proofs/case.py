@@ -87,8 +87,8 @@ class _Target(ValueTransformer):
 # One bad state per claim: a circuit of gates and latches that start at 0.
 _GATES = (
     "read_rtlil model.il; hierarchy -top top; proc; flatten; memory; async2sync; dffunmap; chformal -lower; opt_expr; "
-    "opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; aigmap; opt_merge; opt_clean; "
-    "write_aiger -B -zinit -map names.txt design.aig"
+    "opt_merge; opt_clean; setundef -anyseq; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; aigmap; "
+    "opt_merge; opt_clean; write_aiger -B -zinit -map names.txt design.aig"
 )
 
 

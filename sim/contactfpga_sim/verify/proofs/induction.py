@@ -46,8 +46,7 @@ class Clocks:
         for literal in placed.given:
             self.hold(literal)
         self._latches, self._bad = placed.nexts, self._graph.any(placed.bad)
-        if REST in self._circuit.outputs:
-            self.rest = placed.driven[self._circuit.outputs.index(REST)]
+        self.rest = next((at for name, at in zip(placed.outputs, placed.driven) if name == f"{REST}[0]"), 0)
 
     def hold(self, literal: int) -> None:
         """Assume that the literal holds."""
@@ -85,8 +84,9 @@ class Clocks:
             values: dict[str, int] = defaultdict(int)
             names = ((name,) for name in self._circuit.inputs)
             for called, literal in zip((*names, *self._circuit.latches), (*inputs, *latches), strict=True):
-                for word, bit in re.findall(r"^([^$?]+)\[(\d+)\]$", "\n".join(called), re.MULTILINE):
-                    values[word] |= holds(literal) << int(bit)
+                for name in called:
+                    if found := re.fullmatch(r"([^$?]+)\[(\d+)\]", name):
+                        values[found[1]] |= holds(literal) << int(found[2])
             words = (f"{name}={value:#x}" for name, value in values.items() if value)
             lines.append(" ".join((f"clock {number}:", *words)))
         return "\n".join(lines)
@@ -177,7 +177,7 @@ def main() -> int:
     circuit = aig.read(options.files / "design.aig", options.files / "names.txt")
     solve: Callable[[aig.Circuit, int], Found] = search
     if options.forever:
-        solve = prove_from_rest if REST in circuit.outputs else prove
+        solve = prove_from_rest if f"{REST}[0]" in circuit.outputs else prove
     json.dump(solve(circuit, options.clocks), sys.stdout)
     return 0
 

@@ -20,6 +20,7 @@ from contactfpga_sim.verify.proofs.zones import (
     open_rows_agree,
     turned_rows_agree,
     turns_are_known,
+    weights_of,
 )
 
 
@@ -91,7 +92,7 @@ def _labeller(
 
     y = Signal(range(rows))
     open_row = empty_row(dut.derived)
-    after, ended = next_row(m, dut.derived, open_row, cells, last, y, wanted)
+    after, ended = next_row(m, dut.derived, open_row, cells, last, wanted, weights_of(dut.derived, y))
     expected, expected_end = Signal(range(2 * columns + 1)), Signal()
     seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
     seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))

@@ -2,14 +2,17 @@
 
 from functools import partial
 
-from amaranth.hdl import Cat, Const, Mux, Signal
+from amaranth.hdl import Cat, Const, Fragment, Mux, Signal, Value
+from amaranth.lib import wiring
 
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.around import Unwrap
 from contactfpga_hdl.label.join import Brackets, Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import Walk, place_of
-from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.verify.proofs.case import Bug, ProofCase
+from contactfpga_hdl.payloads import labeller_ports, moments_layout, zone_layout
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase, plant
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of, walk_is_sound
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -24,37 +27,122 @@ from contactfpga_sim.verify.proofs.zones import (
     open_rows_agree,
     turned_rows_agree,
     turns_are_known,
+    weights_of,
 )
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
-    """Free: rows at any time. Assumed: records are taken at once.
+    """Free: any rows at any time. Assumed: records are taken at once.
 
     Claimed: from the second clock after a row to the second clock after the next one, exactly the zones that end with
     it leave, each once, and after a last row one end mark.
     """
-    m = proof.m
     dut = RunLabeller(skin_of(rows, columns, connectivity, closed))
     inside = proof.put(dut)
     valid, cells, last = rows_into(proof, dut)
-    m.d.comb += dut.records.ready.eq(1)
-    wanted = proof.chosen(zone_layout(dut.derived).size, "wanted")
-    handed = valid & dut.rows.ready
-    y_next = Signal(range(rows))
-    with m.If(handed):
-        m.d.sync += y_next.eq(Mux(last, 0, y_next + 1))
-    delayed = proof.before(Cat(handed, last, cells, y_next))
-    taken, taken_last, row_and_y = _split(proof.before(delayed))
-    row, y = row_and_y[:columns], row_and_y[columns:]
+    y = Signal(range(rows))
+    with proof.m.If(valid & dut.rows.ready):
+        proof.m.d.sync += y.eq(Mux(last, 0, y + 1))
+    proof.lemma(inside["walk.y_next"] == y)
+    _records(proof, dut, inside, Cat(valid & dut.rows.ready, last, cells, y), partial(weights_of, dut.derived))
 
-    open_row = empty_row(dut.derived)
-    after, ended_zones = next_row(m, dut.derived, open_row, row, taken_last, y, wanted)
+
+class MarkedLabeller(RunLabeller):
+    """A labeller that has, instead of moments, a bit for each of two marked cells, which a row's number names."""
+
+    def __init__(self, skin: Skin):
+        wiring.Component.__init__(self, labeller_ports(derived := _Marked(skin.derived)))
+        self.derived = derived
+
+
+class _Marked:
+    """Sizes of two marks in place of ``area`` and ``sum_x``."""
+
+    area_bits = sum_x_bits = 1
+    sum_y_bits = 0
+    skips = True  # rows come with their numbers
+
+    def __init__(self, derived: Derived):
+        self._derived = derived
+
+    def __getattr__(self, name: str):
+        return getattr(self._derived, name)
+
+
+def cells_leave_together(proof: Proof, columns: int, connectivity: int) -> None:
+    """The labeller with two marked cells of each frame in place of moments.
+
+    Moments are sums over cells: a step adds those of its run (:func:`a_run_has_its_cells`), and groups are added up.
+    So a zone's are right if each of its cells is added once, and no other.
+
+    Free: any rows at any time, and of each frame two cells in columns chosen once. Assumed: records are taken at once.
+
+    Claimed: as in :func:`records_are_the_zones`; a mark is never added to itself, and a run has a cell.
+    """
+    m = proof.m
+    dut = MarkedLabeller(skin_of(4, columns, connectivity))
+    marked = [proof.chosen(range(columns), name) for name in ("one", "other")]
+
+    def marks(_, inside: Inside):
+        step = inside.component.step
+        here = ((step.start <= x) & (x < step.past) & step.y[i] for i, x in enumerate(marked))
+        return Mux(step.has_run, Cat(*here), 0)
+
+    plant(Bug("marks, not moments", Join, "decided.run", marks), design := Fragment.get(dut, None))
+    inside = proof.put(design)
+    valid, cells, last = rows_into(proof, dut)
+    m.d.comb += dut.rows.payload.y.eq(y := proof.free(len(marked), "y"))
+    handed = valid & dut.rows.ready
+    passed = Signal(len(marked))  # marks that were handed over in this frame
+    proof.given(~handed | (y & passed == 0))
+    with m.If(handed):
+        m.d.sync += passed.eq(Mux(last, 0, passed | y))
+
+    def weights(y):
+        return {name: [y[i] & (marked[i] == x) for x in range(columns)] for i, name in enumerate(("area", "sum_x"))}
+
+    open_row, rows = _records(proof, dut, inside, Cat(handed, last, cells, y), weights)
+    walk, sums = inside.part("walk"), inside.part("sum")
+    with m.If(walk.step_valid & ~walk.step.end & walk.step.has_run):
+        proof.claim(walk.step.start < walk.step.past)
+    run, kept, found = (Value.cast(part) for part in (sums.join.run, inside["sum.kept"], inside["sum.found"]))
+    with m.If(sums.valid & ~sums.join.end):
+        proof.claim((run & kept | run & found | kept & found) == 0)
+    met: Value = Signal(len(marked))  # in the open row's frame
+    taken, taken_last, _, taken_y = rows[0]
+    with m.If(taken):
+        m.d.sync += met.eq(Mux(taken_last, 0, met | taken_y))
+    for i, name in enumerate(("area", "sum_x")):
+        zones = sum((leader & open_row.moments[x][name] for x, leader in enumerate(open_row.leaders())), Const(0))
+        proof.lemma(zones <= met[i])
+    for there, its_last, _, its_y in rows:
+        proof.lemma(~there | (its_y & met == 0))
+        met = Mux(there, Mux(its_last, 0, met | its_y), met)
+    proof.lemma(passed == met)
+
+
+def _records(proof: Proof, dut: RunLabeller, inside: Inside, offered, weights) -> tuple[OpenRow, list[tuple]]:
+    """Claims and lemmas of records; ``offered``: whether a row is handed over, and the row with its number.
+
+    Returns the specification's open row, and the rows handed over since, two clocks ago and one.
+    """
+    m, derived = proof.m, dut.derived
+    columns, closed = derived.skin.columns, derived.skin.closed
+    m.d.comb += dut.records.ready.eq(1)
+    wanted = proof.chosen(zone_layout(derived).size, "wanted")
+    handed, last, cells, _ = _split(offered, columns)
+    delayed = proof.before(offered)
+    newer = _split(delayed, columns)
+    taken, taken_last, row, y = older = _split(proof.before(delayed), columns)
+
+    open_row = empty_row(derived)
+    after, ended_zones = next_row(m, derived, open_row, row, taken_last, wanted, weights(y))
     expected, expected_end = Signal(range(2 * columns + 1)), Signal()
     seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
     record = dut.records.payload
     seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
     ends_now = seen_ends + (dut.records.valid & record.end)
-    steps = ((columns + 1) // 2 if connectivity == 8 else columns) + closed
+    steps = ((columns + 1) // 2 if derived.skin.connectivity == 8 else columns) + closed
     age = Signal(range(steps + 3), init=steps + 2)
     done = age == steps + 2
     with m.If(taken):
@@ -65,19 +153,22 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     newest = Signal(columns)  # the row last handed over, empty before a frame
     with m.If(handed):
         m.d.sync += newest.eq(Mux(last, 0, cells))
-    proof.lemma((inside["walk.before"] == newest) & (inside["walk.y_next"] == y_next) & (age <= steps + 2))
+    proof.lemma((inside["walk.before"] == newest) & (age <= steps + 2))
     with m.If(taken | done):
         proof.claim(seen_now == expected)
         proof.claim(ends_now == expected_end)
-    _lemmas(proof, dut, inside, open_row, taken | done, done & ~taken & ~delayed[0])
-    next_taken, next_last, next_and_y = _split(delayed)
+    proof.rests(taken | done & ~newer[0])
+    _lemmas(proof, dut, inside, open_row, taken | done, done & ~taken & ~newer[0])
+    next_taken, next_last, next_row_, next_y = newer
     with m.If(next_taken):
         row_before = Mux(taken, Mux(taken_last, 0, row), open_row.cells)
-        _loaded(proof, dut, inside, row_before, next_and_y[:columns], next_last, next_and_y[columns:])
+        _loaded(proof, dut, inside, row_before, next_row_, next_last, next_y)
+    return open_row, [older, newer]
 
 
-def _split(value):
-    return value[0], value[1], value[2:]
+def _split(value, columns: int) -> tuple:
+    """Whether there is a row, whether it is the last, its cells, and its number."""
+    return value[0], value[1], value[2 : 2 + columns], value[2 + columns :]
 
 
 def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, rest, idle) -> None:
@@ -138,6 +229,28 @@ def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y
         proof.lemma(inside["walk.seam"] == over)
 
 
+def a_run_has_its_cells(proof: Proof, columns: int, connectivity: int) -> None:
+    """Free: any rows at any time, and when records are taken.
+
+    Claimed: what a step adds are the moments of its run's cells. That a run has a cell is shown elsewhere.
+    """
+    dut = RunLabeller(skin_of(16, columns, connectivity))
+    inside = proof.put(dut)
+    rows_into(proof, dut)
+    proof.m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
+    step, run = inside.part("walk").step, inside["join.decided.run"]
+    proof.lemma(step.area == (step.past - step.start)[: len(step.area)])
+    proof.lemma(walk_is_sound(inside))
+    with proof.m.If(inside.part("walk").step_valid & ~step.end):
+        proof.lemma(step.past <= columns)
+    moments = Signal(moments_layout(dut.derived))
+    within = [step.has_run & (step.start <= x) & (x < step.past) for x in range(columns)]
+    for name, weights in weights_of(dut.derived, step.y).items():
+        proof.m.d.comb += moments[name].eq(sum(Mux(cell, weights[x], 0) for x, cell in enumerate(within)))
+    with proof.m.If(inside.part("walk").step_valid & ~step.end & (~step.has_run | (step.start < step.past))):
+        proof.claim(Value.cast(run) == moments.as_value())
+
+
 def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int, closed: bool = False) -> None:
     """The specification itself. Free: a frame and a zone's record.
 
@@ -149,7 +262,9 @@ def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int
     open_row, found = empty_row(derived), 0
     for y in range(rows):
         cells, last = frame.word_select(y, columns), Const(y == rows - 1)
-        open_row, ended = next_row(m, derived, open_row, cells, last, Const(y, range(rows)), wanted)
+        open_row, ended = next_row(
+            m, derived, open_row, cells, last, wanted, weights_of(derived, Const(y, range(rows)))
+        )
         found += ended
     proof.claim(found == (flood_around if closed else flood_fill)(m, derived, frame, wanted))
 

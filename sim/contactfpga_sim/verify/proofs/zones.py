@@ -6,7 +6,7 @@ path over the seam adds or removes a turn, and two different paths between two c
 """
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from amaranth.hdl import Cat, Const, Elaboratable, Module, Mux, Signal, Value, signed
 from amaranth.lib import data
@@ -58,8 +58,10 @@ class RowStep(Elaboratable):
     without a cell in the new row; in the last row all.
     """
 
-    def __init__(self, derived: Derived, before: OpenRow, cells, last, y, wanted):
-        self.derived, self.before, self.cells, self.last, self.y, self.wanted = derived, before, cells, last, y, wanted
+    def __init__(self, derived: Derived, before: OpenRow, cells, last, wanted, weights):
+        """``weights``: by field of a zone's moments, what the pressed cell of each column adds."""
+        self.derived, self.before, self.cells, self.last, self.wanted = derived, before, cells, last, wanted
+        self.weights = weights
         self.after = before.another("next")
         self.ended = Signal(range(2 * derived.skin.columns + 1))
 
@@ -73,7 +75,7 @@ class RowStep(Elaboratable):
             old, new = reach[len(columns) + x][: len(columns)], reach[len(columns) + x][len(columns) :]
             m.d.comb += after.reach[x].eq(new)
             merged = [leader & old[j] for j, leader in enumerate(before.leaders())]
-            for field, weights in zip(FIELDS, ([1] * len(columns), columns, [self.y] * len(columns))):
+            for field, weights in self.weights.items():
                 parts = [Mux(merged[j], before.moments[j][field], 0) for j in columns]
                 parts += [Mux(new[k], weights[k], 0) for k in columns]
                 m.d.comb += after.moments[x][field].eq(sum(parts))
@@ -173,6 +175,9 @@ def open_rows_agree(proof: Proof, open_row: OpenRow) -> None:
             proof.lemma((reach[j] == open_row.reach[j][x]) & (~reach[j] | same))
         if x or open_row.derived.skin.closed:
             proof.lemma(~(open_row.cells[x] & open_row.cells[x - 1]) | reach[x - 1])
+        for j in columns[x + 1 :]:  # zones do not cross
+            between = [reach[k] & open_row.reach[j][k + 1 :].any() for k in columns[j + 1 : -1]]
+            proof.lemma(~open_row.cells[j] | reach[j] | ~Cat(Const(0), *between).any())
 
 
 Way = tuple[int, int, Value, Value | int]
@@ -270,6 +275,12 @@ class TurnedStep(RowStep):
 def empty_row(derived: Derived) -> OpenRow:
     """The specification's state before a frame."""
     return (TurnedRow if derived.skin.closed else OpenRow)(derived, "open")
+
+
+def weights_of(derived: Derived, y) -> dict[str, Sequence]:
+    """What each column's pressed cell of row ``y`` adds to the moments of its zone."""
+    columns = range(derived.skin.columns)
+    return {"area": [1] * len(columns), "sum_x": columns, "sum_y": [y] * len(columns)}
 
 
 def next_row(m: Module, derived: Derived, before: OpenRow, *given) -> tuple[OpenRow, Signal]:
