@@ -105,6 +105,7 @@ def _labeller(
     with m.Else():
         m.d.sync += [seen.eq(seen_now), seen_ends.eq(ends_now), age.eq(Mux(dut.rows.ready, longest, age + 1))]
     claim((age < longest) | (age == longest) & dut.rows.ready)
+    proof.rests(dut.rows.ready)
     with m.If(dut.rows.ready):
         claim(seen_now == expected)
         claim(ends_now == expected_end)
