@@ -90,7 +90,7 @@ pages: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## make tables and pi
 ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 MB for each distribution, once)
 	$(PY) -m pytest -m campaign $(ARGS) tests/ros
 
-formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
+formal: $(VENV)/.stamp-test ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.verify.proofs $(ARGS)
 
 campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
