@@ -22,7 +22,6 @@ _DECODER_C = Path(__file__).parents[2] / "c" / "page.c"
 
 
 def skins() -> dict[str, Skin]:
-    """Skins of the packaged boards, by name."""
     kits = {file.parent.name: Skin.load(file) for file in sorted((examples() / "kits").glob("*/skin.toml"))}
     shown = {"reference": Skin(), "view": opening.own_skin(), "view-flat": opening.own_skin(flat=True)}
     return shown | {"force": demo.with_force(), "forearm": demo.forearm()} | kits
@@ -46,7 +45,6 @@ def check() -> None:
 
 
 def build(name: str) -> bytes:
-    """Content of a file."""
     with tempfile.TemporaryDirectory() as folder:
         if name == DECODER:
             return webassembly.build_c(_DECODER_C, Path(folder))
@@ -54,7 +52,6 @@ def build(name: str) -> bytes:
 
 
 def main() -> int:
-    """Build the files of changed designs and write the list."""
     files, late = dict(webassembly.listed()["files"]), stale()
     for name, key in keys().items():
         if name in late:

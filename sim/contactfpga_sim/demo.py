@@ -28,7 +28,6 @@ from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_nat
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 FORCED = "pushing"
-"""Scene with force, for pressure units."""
 
 LOOKS = 240
 """Clocks between two samples of the forces."""
@@ -53,14 +52,11 @@ RUNS = {
 
 @dataclasses.dataclass(frozen=True)
 class DemoResult:
-    """Result of one scene in one engine."""
-
     skin: Skin
     scene: str
     engine: str
     cells: np.ndarray
     frame: Frame | None
-    """First touched frame, as received."""
     last_record: int | None
     """Clocks from the frame's last row to its last record."""
     first_byte_us: float
@@ -110,19 +106,16 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
 
 
 def skin_of(name: str) -> Skin:
-    """Skin of a scene's board."""
     if name in scenes.AROUND:
         return forearm()
     return with_force() if name == FORCED else Skin()
 
 
 def with_force() -> Skin:
-    """Reference sheet with pressure units."""
     return Skin.load(examples() / "force.toml")
 
 
 def forearm() -> Skin:
-    """Closed sheet of the reference size."""
     return Skin.load(examples() / "forearm.toml")
 
 
@@ -145,7 +138,8 @@ def feel() -> str:
 
 
 def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
-    """Cycle of the frame's first start bit, cycle of its last byte's end, bytes on the wire, and the frame."""
+    """Returns the cycle of the frame's first start bit, that of its last byte's end, bytes on the wire, and the
+    frame."""
     for got in frames_in(skin, trace.bytes):
         if got.frame.cells:
             return got.first + 1, got.last + 1 + 10 * skin.derived.bit_clocks, got.size, got.frame
@@ -179,7 +173,6 @@ VERDICT = HEADS.index("verdict")
 
 
 def rows_of(outcomes: list[DemoResult]) -> list[list[str]]:
-    """Rows of the table: its head, then one per scene and engine."""
     rows = [list(HEADS)]
     for out in outcomes:
         zones = "-" if out.frame is None else str(out.frame.zones)

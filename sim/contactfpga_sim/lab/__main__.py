@@ -25,7 +25,6 @@ class StudyError(ContactFPGAError):
 
 
 def lacking(needs: Iterable[str]) -> list[str]:
-    """The absent needs: programs, and paths with a slash."""
     return [one for one in needs if not (Path(one).exists() if "/" in one else shutil.which(one))]
 
 
@@ -72,13 +71,11 @@ def stale(study: Study) -> Iterator[str]:
 
 
 def listed(study: Study) -> str:
-    """A study's line in the list."""
     needs = f"; needs {', '.join(study.needs)}" if study.needs else ""
     return f"{study.name:<12} {study.page:<16} {study.minutes:>4g} min  {study.title}{needs}"
 
 
 def main() -> int:
-    """Run the command; return its exit status."""
     args = _parser().parse_args()
     names = flags.known("study", args.name, list(studies.STUDIES))
     chosen = [studies.STUDIES[name] for name in names]
@@ -99,7 +96,6 @@ def main() -> int:
 
 
 def _make_all(chosen: Iterable[Study], strict: bool) -> int:
-    """Make each study; with ``strict`` one that cannot be made here is an error."""
     for study in chosen:
         try:
             make(study)

@@ -37,7 +37,6 @@ def part(text: str, kept: str, file: Path, heads: str = "") -> str:
 
 
 def whole(page: Path, name: str) -> str:
-    """A section of a page with all rows."""
     text = writer.sections(page.read_text(encoding="utf-8"))[name].text
     return _PARTED.sub(lambda found: _table((page.parent / found[1]).read_text(encoding="utf-8")), text)
 

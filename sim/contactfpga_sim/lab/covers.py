@@ -15,7 +15,7 @@ DOME = Switch(force_n=0.4, travel_m=0.2e-3, spread=0.1, hysteresis=0.2)
 
 
 def bare(pitch_mm: float) -> Cover | None:
-    """No cover, no force: a switch closes if its middle is under the contact."""
+    """No cover: a switch closes without force if its middle is under the contact."""
     return None
 
 

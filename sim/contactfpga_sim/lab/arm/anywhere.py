@@ -25,8 +25,6 @@ QUANTILE = 0.95
 
 
 class Geometry(NamedTuple):
-    """Parts of a sheet."""
-
     face: str
     """One of :data:`FACES`."""
     pitch_mm: float
@@ -84,7 +82,6 @@ _CHANGES = (
 
 
 def _around(base: Geometry) -> list[Geometry]:
-    """The geometry and its neighbors, each with one part changed."""
     return list(dict.fromkeys([base, *(base._replace(**change) for change in _CHANGES)]))
 
 
@@ -105,7 +102,6 @@ Found = list[Sequence[Peaks]]
 def touched(
     batches: Sequence[Batch], executor: Executor, step: Callable[[str, int], None] = lambda name, of: None
 ) -> Found:
-    """Peaks of the batches of one case."""
     return many({"": batches}, executor, step)[""]
 
 
@@ -114,7 +110,6 @@ def many(
     executor: Executor,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> dict[Any, Found]:
-    """Peaks of several cases, by their keys."""
     futures = {executor.submit(places.work, batch): batch for batches in tasks.values() for batch in batches}
     done = {}
     for future in as_completed(futures):
@@ -199,7 +194,6 @@ def _deep(thickness_m: float, halves: Sequence[Peaks]) -> str:
 
 
 def geometry_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
-    """Headings and a line per geometry."""
     head = ["face", "pitch, mm", "threshold, N", "foam, mm"]
     told = [[*head, *(f"{way}: mean / worst, N" for way in WAYS), "limit first, UART", "pressed in by UART, mm"]]
     for geometry, ways_found in found.items():
@@ -220,8 +214,6 @@ FACTORS = {"face": "face", "pitch_mm": "pitch, mm", "threshold_n": "threshold, N
 
 
 class Effect(NamedTuple):
-    """Effect of one change on the mean peak force."""
-
     factor: str
     before: str
     after: str
@@ -248,7 +240,6 @@ def _shown(value: str | float) -> str:
 
 
 def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
-    """Headings and a line per change to the paper's sheet and to the best."""
     told = [["from", "what changes", "in place of", "now", "mean peak force, N"]]
     for name, base in (("the paper's sheet", PAPER), ("tiles", BEST)):
         for one in sorted(effects(found, base), key=lambda effect: effect.newtons):
@@ -257,7 +248,6 @@ def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
 
 
 def matters(found: Mapping[Geometry, Found]) -> str:
-    """A sentence on the best change to the paper's sheet, and on the best sheet."""
     least: dict[str, Effect] = {}
     for one in effects(found, PAPER):
         if one.factor not in least or one.newtons < least[one.factor].newtons:

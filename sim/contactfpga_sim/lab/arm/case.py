@@ -112,7 +112,6 @@ _PARTS = {
 
 
 def names() -> list[str]:
-    """Names of the packaged cases."""
     return sorted(path.stem for path in _CASES.glob("*.toml"))
 
 

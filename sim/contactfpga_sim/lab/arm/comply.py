@@ -15,13 +15,10 @@ FASTEST_M_S = 5.0
 """Upper end of the search for the fastest push."""
 
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
-"""Pushes as shares of the fastest one that the arm yields to."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Push:
-    """Result of a push."""
-
     speed_m_s: float
     peak_torque_nm: float
     peak_force_n: float

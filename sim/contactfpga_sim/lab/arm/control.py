@@ -9,8 +9,6 @@ from contactfpga_sim.lab.arm.case import Case
 
 
 class SensorReadings(NamedTuple):
-    """The controller's inputs at a sample."""
-
     angle_rad: float
     speed_rad_s: float
     torque_nm: float

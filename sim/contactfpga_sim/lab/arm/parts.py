@@ -1,5 +1,3 @@
-"""Parts of a case of the arm."""
-
 from __future__ import annotations
 
 import dataclasses
@@ -56,7 +54,7 @@ class Motor(_Checked):
     supply_v: float
     current_a: float
     current_gain: float
-    """Gain of the current loop, in V/A."""
+    """Gain in V/A."""
 
     @property
     def torque_nm_a(self) -> float:
@@ -76,15 +74,13 @@ class Motor(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Control(_Checked):
-    """Speed controller, behavior, and trusted inputs."""
-
     period_s: float
     proportional: float
     """Current for an error of the joint's speed, in A s/rad."""
     integral: float
-    """Integral gain in A/rad, held while the current is at its limit."""
+    """Gain in A/rad; held while the current is at its limit."""
     reverse_m_s: float
-    """Speed of the retreat, at the lever."""
+    """Speed at the lever."""
     slowing_m_s2: float
     torque_limit_nm: float
     """Torque that causes a retreat whatever the sheet reports."""
@@ -101,11 +97,11 @@ class Control(_Checked):
     behavior: str = "reverse"
     """One of :data:`BEHAVIORS`."""
     virtual_kgm2: float = 0.02
-    """``comply``: inertia of the admittance."""
+    """Inertia of the admittance, for ``comply``."""
     virtual_damping: float = 0.5
-    """``comply``: damping in Nm s/rad."""
+    """Damping in Nm s/rad, for ``comply``."""
     virtual_stiffness: float = 4.0
-    """``comply``: return spring in Nm/rad."""
+    """Return spring in Nm/rad, for ``comply``."""
     _zero = ("delay_s", "clear_s", "virtual_stiffness")
 
 
@@ -140,7 +136,7 @@ class Foam(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Contacts(_Checked):
-    """Switches below the cover, by default :class:`contactfpga.design.cover.Switch`'s."""
+    """Switches below the cover."""
 
     force_n: float
     area_m2: float
@@ -208,8 +204,6 @@ class Usb(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Run(_Checked):
-    """Times of the simulation."""
-
     step_s: float = 10e-6
     """Step of integrator and gateware exchange."""
     lead_s: float = 20e-3

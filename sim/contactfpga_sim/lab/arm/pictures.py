@@ -26,7 +26,6 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.VERMILLION, "linestyle": style.DASHES[0], "linewidth": 1.8},
     {"color": style.BLUE, "linestyle": style.DASHES[1], "linewidth": 1.8},
 )
-"""Line styles of the runs."""
 
 DRAWN = {"speed": ("speed_rad_s", "angular speed, rad/s"), "torque": ("sensor_nm", "torque between motor and arm, Nm")}
 NAMES = {"speed": "arm-fig6-speed", "torque": "arm-fig7-torque"}
@@ -34,7 +33,6 @@ FROM_S, TO_S = -5e-3, 40e-3
 
 
 def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...] = ("png", "svg")) -> list[Path]:
-    """Both pictures in each format."""
     folder.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(style.SETTINGS):
         figures = {name: course(found, *DRAWN[name]) for name in DRAWN}
@@ -82,8 +80,6 @@ TICKS_MS = (0.01, 0.1, 1, 10)
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Tasks by picture."""
-
     force: tuple[SweepTask, ...]
     sheet: dict[str, tuple[SweepTask, ...]]
     speed: dict[str, tuple[SweepTask, ...]]
@@ -96,7 +92,6 @@ class Plan:
 
 
 def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[float] = SPEEDS_M_S) -> Plan:
-    """The charts' tasks."""
     alone, bounds = sweep.unlimited(case), sweep.bounds_s(case, Skin())
     by_speed = {"6 ms": PAPER_S, "UART": bounds["UART"], "pin": bounds["pin"]}
     leads = [case.run.lead_s + number * case.control.period_s for number in range(INSTANTS)]
@@ -130,7 +125,6 @@ def check(case: Case) -> None:
 def draw(
     case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path, suffixes: Sequence[str] = ("png", "svg")
 ) -> list[Path]:
-    """Both charts in each format."""
     with matplotlib.rc_context(style.SETTINGS):
         figures = {
             "arm-force": _force(case, tasks, found),

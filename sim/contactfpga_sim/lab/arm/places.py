@@ -90,7 +90,6 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
 
 
 def peaks(found: list[list[list[tuple[float, float, bool]]]], way: int) -> list[Peaks]:
-    """Peaks of one way."""
     arrays = [np.array(one[way], float) for one in found]
     return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0) for array in arrays]
 

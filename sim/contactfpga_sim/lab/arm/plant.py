@@ -24,20 +24,16 @@ State = tuple[float, ...]
 
 
 class Forces(NamedTuple):
-    """Forces in one state."""
-
     contact_n: tuple[float, ...]
     indentation_m: tuple[float, ...]
     """Foam indentation at each touch, negative while apart."""
     acceleration: float
     """Angular acceleration of the joint, in rad/s2."""
     sensor_nm: float
-    """True torque between motor and arm, even beyond the sensor's range."""
+    """True torque, even beyond the sensor's range."""
 
 
 class Plant:
-    """Equations of a case."""
-
     def __init__(self, case: Case):
         self._motor = case.motor
         self._foam = case.foam
@@ -54,7 +50,6 @@ class Plant:
         return (-speed_rad_s * lead_s, speed_rad_s, 0.0, *(0.0,) * (2 * yielding))
 
     def forces(self, seconds: float, state: State) -> Forces:
-        """Forces and torques in a state."""
         theta, omega, current = state[:3]
         forces, depths, torque = [], [], 0.0
         for touch, lever, place in self._touches:

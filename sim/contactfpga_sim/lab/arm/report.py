@@ -14,8 +14,6 @@ UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}
 
 
 class ReportLine(NamedTuple):
-    """A line of the table."""
-
     name: str
     field: str
     """Field of :class:`contactfpga_sim.lab.arm.run.ArmResponse`."""
@@ -49,7 +47,6 @@ NOTES = (
 
 
 def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -> dict[str, RunRecord]:
-    """Runs side by side, by heading."""
     late = f"{1e3 * latency_s:g} ms"
     found = {
         late: run(case, "latency", latency_s=latency_s, skin=skin),
@@ -65,7 +62,6 @@ def columns(case: Case, name: str, latency_s: float, skin: Skin | None = None) -
 
 
 def cell(row: ReportLine, outcome: ArmResponse) -> str:
-    """A value as a table cell."""
     value = getattr(outcome, row.field)
     return "-" if value is None else f"{row.scale * value:.{2 if row.scale * abs(value) < 100 else 1}f}"
 
@@ -120,7 +116,6 @@ PUSH_HEADINGS = ("push, m/s", "peak torque, Nm", "peak force, N", "indentation, 
 
 
 def push_lines(pushes: list[Push]) -> list[list[str]]:
-    """Headings and a line per push."""
     lines = [list(PUSH_HEADINGS)]
     for push in pushes:
         back = "-" if push.back_s is None else f"{1e3 * push.back_s:.0f}"

@@ -42,7 +42,6 @@ AFTER_S = 0.25e-3
 """Delay of the second torque reading after the reaction."""
 
 SLOW_M_S = 1e-3
-"""Speed of an arm at rest."""
 
 WITH_UNITS = Skin(units=3, unit_sums=((1, 1, 1),), baud=6_000_000)
 """The reference Skin on three pressure units."""
@@ -60,7 +59,7 @@ class ArmResponse:
     """Arrival of the contact at the controller's input."""
     reacts_s: float | None
     reason: str
-    """Reason of the reaction: ``contact``, ``torque``, ``silence``, or none."""
+    """Reason: ``contact``, ``torque``, ``silence``, or none."""
     positive_s: float | None
     """Time from the reaction until the arm goes back."""
     torque_before_nm: float | None
@@ -81,8 +80,6 @@ class ArmResponse:
 
 @dataclasses.dataclass(frozen=True)
 class RunRecord:
-    """Record of a run."""
-
     outcome: ArmResponse
     course: np.ndarray
     """Structured array of a :class:`contactfpga_sim.lab.arm.world.CourseStep` per step."""

@@ -113,7 +113,7 @@ def _thinnest(task: SweepTask) -> SweepPoint:
 
 
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
-    """Longest time in s from a switch to the controller's input, by way, for one zone."""
+    """Longest time in s from a switch to the controller's input by each way, for one zone."""
     usb = case.usb
     scan = skin.derived.max_frame_slots * skin.derived.row_clocks / skin.clock_hz
     wire = latency_s(skin)
@@ -126,7 +126,6 @@ def unlimited(case: Case) -> Case:
 
 
 def closing_n(case: Case) -> float:
-    """Force that closes a switch directly below it."""
     return float(force_n(case.switch.switch, 0.0, case.foam.thickness_m))  # type: ignore[arg-type]
 
 

@@ -24,8 +24,6 @@ LIMITS_N = (10.0, 15.0, 20.0, 30.0)
 
 
 class ArmRuns(NamedTuple):
-    """Runs shared by tables and pictures."""
-
     plan: pictures.Plan
     points: dict[SweepTask, SweepPoint]
     columns: dict[str, RunRecord]
@@ -33,7 +31,6 @@ class ArmRuns(NamedTuple):
 
 
 def compute() -> ArmRuns:
-    """Run the page's simulations."""
     case = Case.load("paper")
     plan = pictures.plan(case)
     with executor() as workers, progress() as step:
@@ -43,14 +40,11 @@ def compute() -> ArmRuns:
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
-    """The runs, and force, speed and thickness over latency."""
     charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
     return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
 
 
 class Failure(NamedTuple):
-    """A run with a fault."""
-
     name: str
     changes: dict[str, Any]
     way: str = "uart"
@@ -78,17 +72,14 @@ FAILURES = (
 
 
 def matters_text(found: ArmRuns) -> str:
-    """A sentence on the best change."""
     return anywhere.matters(found.anywhere)
 
 
 def places_table(found: ArmRuns) -> str:
-    """Peak forces by geometry."""
     return writer.table_of(anywhere.geometry_lines(found.anywhere))
 
 
 def effects_table(found: ArmRuns) -> str:
-    """Reduction of peak force by each part."""
     return writer.table_of(anywhere.effect_lines(found.anywhere))
 
 
@@ -98,7 +89,6 @@ def set_table(found: ArmRuns) -> str:
 
 
 def failure_table() -> str:
-    """Results of runs with faults."""
     lines = [["", "way", "reacts, ms", "because of", "peak force, N", "indentation, mm", "reversals", "at rest, ms"]]
     for failure in FAILURES:
         found = run(Case.load("paper").but(**failure.changes), failure.way, faults=failure.faults).outcome
@@ -116,7 +106,6 @@ def push_table() -> str:
 
 
 def defense_table() -> str:
-    """Peak force by line of defense."""
     return writer.table_of(report.defense_lines(Case.load("paper")))
 
 

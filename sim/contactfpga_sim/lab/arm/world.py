@@ -26,14 +26,12 @@ _MM = 1e-3
 _PATCH_M = 1e-3
 
 _FINE = 1.1
-"""Ratio of forces at which a wide patch is computed; in between, pressure per newton is linear."""
+"""Ratio of forces at which a wide patch is computed anew."""
 
 _LEAST_N = 0.01
 
 
 class Switches:
-    """The (rows, columns) switches under the cover."""
-
     def __init__(self, case: Case, skin: Skin):
         pitches = (skin.pitch_x_mm * _MM, skin.pitch_y_mm * _MM)
         self._cells = cells_of(case.cover, skin.rows, skin.columns, *pitches)
@@ -136,8 +134,8 @@ class UnitsUnderSheet:
 
 
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
-"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the ``contact`` pin;
-zones over UART and host; none but the torque limit; the pin with pressure units alone; the pin with both."""
+"""Ways from a contact to the controller: a fixed time after a switch closes (no gateware); the ``contact`` pin; zones
+over UART and host; none but the torque limit; the pin with units alone; the pin with both."""
 
 PINS = ("pin", "force", "both")
 UNITS = ("force", "both")
@@ -145,8 +143,6 @@ UNITS = ("force", "both")
 
 @dataclasses.dataclass(frozen=True)
 class Faults:
-    """Injected faults, in s from the touch; None: no fault."""
-
     board_dies_s: float | None = None
     """Time from which the board's pins freeze."""
     host_dies_s: float | None = None
@@ -155,8 +151,6 @@ class Faults:
 
 
 class CourseStep(NamedTuple):
-    """A sample of the course."""
-
     time_s: float
     angle_rad: float
     speed_rad_s: float
@@ -207,7 +201,6 @@ class World:
 
     @property
     def time_s(self) -> float:
-        """Seconds since the first touch."""
         return self.clock() - self.case.run.lead_s
 
     def delivered(self) -> bytes:
@@ -227,7 +220,6 @@ class World:
         self._changes.append((at, zones > 0))
 
     def step(self) -> None:
-        """Advance by one integrator step."""
         case, now = self.case, self.time_s
         forces = self._plant.forces(now, self._state)
         self._press(self._switches.at(now, forces.contact_n))

@@ -42,19 +42,16 @@ def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray
 
 
 def touch(x_mm: float, y_mm: float) -> np.ndarray:
-    """Cells under a finger."""
     disc = Contact(shape=contacts.disc(FINGER_MM), x_mm=x_mm, y_mm=y_mm, force_n=10.0)
     return np.asarray(Scene((disc,)).pressed(0.0, SKIN), bool)
 
 
 def frame_of(cells: np.ndarray, skin: Skin = SKIN) -> Zones:
-    """A frame of cells from a board with ``report = "cells"``."""
     frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells, None)
     return Zones(frame, skin.sheet, 0)
 
 
 def learned(sweeps: int, rng: np.random.Generator, frames: int = 400) -> Folds:
-    """Folds learned over ``sweeps`` of the joint, there and back."""
     angles = np.tile(np.linspace(0, RANGE_RAD, frames), sweeps)
     return learn("joint", ((angle, frame_of(fold(angle, rng))) for angle in angles.tolist()))
 
@@ -76,7 +73,6 @@ class Rates:
 
 
 def rates(sweeps: int, count: int = 400, seed: int = 1) -> Rates:
-    """Learn, then judge new folds and touches."""
     rng = np.random.default_rng(seed)
     known = learned(sweeps, rng)
     seen: dict[str, list[bool]] = {name: [] for name in ("folds", "apart", "joined", "within", "straight")}

@@ -37,7 +37,6 @@ class Socket:
         self.plugs += 1
 
     def flash(self, skin: Skin = SKIN) -> None:
-        """Load a bitstream; the port stays."""
         self.board = VirtualBoard(skin, "two_fingers")
         self._held.clear()
 
@@ -95,8 +94,6 @@ class HeldPort:
 
 @dataclasses.dataclass(frozen=True)
 class Outage:
-    """A fault, its end, and the expected status."""
-
     name: str
     begin: Callable[[Socket], object]
     end: Callable[[Socket], object]
@@ -123,8 +120,6 @@ OUTAGES = (
 
 @dataclasses.dataclass(frozen=True)
 class OutageTimes:
-    """Statuses and times reported by the body."""
-
     statuses: tuple[str, ...]
     noticed_s: float
     back_s: float
@@ -158,7 +153,7 @@ def play(outage: Outage, folder: Path) -> OutageTimes:
 def _until(
     reader: LinkReader, socket: Socket, status: str, seen: list[str], fresh_until_s: float = float("inf")
 ) -> int:
-    """Advance until this status; return how often the link was ok for too long."""
+    """Number of times the link was ok for too long before this status."""
     end_s, stale = socket.now + LONGEST_S, 0
     while (found := reader.state().status) != status:
         if not seen or seen[-1] != found:

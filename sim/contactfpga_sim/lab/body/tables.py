@@ -37,8 +37,6 @@ SKINS = {
 
 @dataclasses.dataclass(frozen=True)
 class RegistrationErrors:
-    """RMS errors over many registrations."""
-
     refused: float
     wrong: float
     """Share of accepted ones with the wrong mounting."""
@@ -50,7 +48,6 @@ class RegistrationErrors:
 def placement_errors(
     skin: Skin, points: int, folder: Path, *, normals: bool, count: int = 200, seed: int = 1
 ) -> RegistrationErrors:
-    """Errors over random poses, mountings and points."""
     (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
     rng = np.random.default_rng(seed)
@@ -101,7 +98,6 @@ SWEEPS = (1, 2, 5, 10)
 
 
 def outages_table() -> str:
-    """Table of link outages."""
     rows = [("fault", "states of the link", "reported after, s", "ok again after, s")]
     with tempfile.TemporaryDirectory() as folder:
         for outage in outages.OUTAGES:
@@ -116,7 +112,6 @@ def _seconds(value: float) -> str:
 
 
 def registration_table() -> str:
-    """Table of registration errors."""
     head = ("sheet", "points", "refused, %", "wrongly mirrored, %", "middle off by, mm", "turned by, degrees")
     rows: list[tuple[str, ...]] = [(*head, "residual, mm")]
     with tempfile.TemporaryDirectory() as folder:
@@ -134,14 +129,12 @@ def registration_table() -> str:
 
 
 def folds_table() -> str:
-    """Table of marked zones."""
     head = ("times over the range", "folds, %", "touches apart from the fold, %", "touches joined with it, %")
     rows: list[tuple[str, ...]] = [(*head, "touches within it, %", "touches, joint straight, %")]
     return writer.table_of([*rows, *map(_folds, SWEEPS)])
 
 
 def folds_sample() -> str:
-    """First row of :func:`folds_table`."""
     return writer.line(_folds(SWEEPS[0]))
 
 

@@ -43,7 +43,6 @@ size_t tell(uint32_t number, uint8_t what, uint8_t unit, uint32_t steps, uint8_t
 
 
 def sizes_table() -> str:
-    """Bytes of code by core, of memory by sheet."""
     uses = ["".join(list(USES.values())[: count + 1]) for count in range(len(USES))]
     rows = [["bytes of code (`-Os`)", *CORES]]
     for name, code in zip(USES, uses, strict=True):
@@ -56,7 +55,6 @@ def sizes_table() -> str:
 
 
 def size(code: str, flags: list[str], packet: int) -> tuple[int, int]:
-    """Bytes of code and constants, and of memory."""
     if not shutil.which(COMPILER):
         raise MissingTool("measuring code for microcontrollers", COMPILER, "apt install gcc-arm-none-eabi")
     with tempfile.TemporaryDirectory() as folder:

@@ -53,7 +53,6 @@ def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
 
 
 def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
-    """Each rival on each family, under tiles of :data:`PITCH_MM`."""
     lines, cover = round(EXTENT_MM / PITCH_MM), COVERS["tiles"](PITCH_MM)
     skin = Skin(rows=lines, columns=lines, pitch_x_mm=PITCH_MM, pitch_y_mm=PITCH_MM, connectivity=4)
     found = []

@@ -34,8 +34,6 @@ DEVICE = sizes.UP5K
 
 @dataclasses.dataclass(frozen=True)
 class Task:
-    """A method on a family of scenes."""
-
     method: str
     skin: Skin
     cover: Cover | None
@@ -58,15 +56,12 @@ Look = tuple[np.ndarray, list[errors.Blob]]
 
 @dataclasses.dataclass(frozen=True)
 class Point:
-    """Results of a task."""
-
     task: Task
     errors: dict[str, dict[str, Interval]]
     times: Times
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
-    """Labelling time on this host, if it labels."""
     least_mm: Interval | None = None
     """Lower bound of any method's mean barycenter error here."""
 
@@ -119,7 +114,6 @@ def _sized(point: Point, size: sizes.Size) -> Point:
 
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
-    """Intervals by kind and metric, over all pieces."""
     return {
         kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
@@ -137,8 +131,6 @@ def accuracy(task: Task, first: int) -> Found:
 
 
 def timing(task: Task, first: int) -> Raw:
-    """Times of one piece of a task's touches."""
-
     def new() -> Raw:
         return times.measured(_touches(task, first), task.skin, task.cover, first, task.checked)
 
@@ -150,12 +142,10 @@ def _touches(task: Task, first: int) -> list[Scene]:
 
 
 def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    """Pressed cells and contacts of a scene at an instant."""
     return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
 
 
 def compared(looks: Iterable[Look], skin: Skin) -> Found:
-    """Errors of a Skin's zones on looks."""
     found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
     for cells, there in looks:
         for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):

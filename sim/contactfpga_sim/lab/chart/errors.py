@@ -20,8 +20,6 @@ Z95 = 1.959963984540054
 
 @dataclasses.dataclass(frozen=True)
 class Blob:
-    """A contact or a zone."""
-
     area_mm2: float
     x_mm: float
     y_mm: float
@@ -64,7 +62,6 @@ def _pairs(found: Sequence[Blob], there: Sequence[Blob]) -> list[tuple[Blob, Blo
 
 
 def contacts(truth: Truth) -> list[Blob]:
-    """The contacts as blobs."""
     return [Blob(one.area_mm2, one.x_mm, one.y_mm) for one in truth.contacts]
 
 
@@ -89,7 +86,6 @@ def _blob(moments: tuple[int, int, int], skin: Skin) -> Blob:
 
 
 def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
-    """A zone rounded as a board with ``report = "barycenter"`` sends it."""
     area, *sums = moments
     x, y = (barycenter(total, area, skin.barycenter_bits) / 2**skin.barycenter_bits for total in sums)
     return Blob(area * skin.pitch_x_mm * skin.pitch_y_mm, x * skin.pitch_x_mm, y * skin.pitch_y_mm)
@@ -122,8 +118,6 @@ def interval(values: Sequence[float]) -> Interval:
 
 @dataclasses.dataclass(frozen=True)
 class Quantile:
-    """A quantile with its 95 % interval."""
-
     value: float
     low: float
     high: float

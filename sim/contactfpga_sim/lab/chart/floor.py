@@ -35,7 +35,6 @@ DOUBT = 4.0
 """Weight, in scenes, of the barycenter in a median for other scenes."""
 
 ROUNDS = 40
-"""Rounds of Weiszfeld's iteration."""
 
 LEAST = 1e-6
 """Distance in pitches below which a median's pull stops growing."""
@@ -49,7 +48,6 @@ class Floor:
     """Limits on a family of scenes, in mm, over scenes with a closed switch."""
 
     felt: Interval
-    """Share of scenes with a closed switch."""
     barycenter_mm: Interval
     lower_mm: Interval
     upper_mm: Interval
@@ -107,7 +105,6 @@ def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: 
 
 
 def inner(family: str, skin: Skin, count: int, seed: int, **options: Any) -> tuple[Skin, list[Scene]]:
-    """Scenes of one contact away from the edge, and a sheet for them."""
     if family not in ONE:
         raise ValueError(f"family {family!r} has no floor here; take one of {', '.join(ONE)}")
     contacts = [scene.contacts[0] for scene in placements(family, count, seed, skin, **options)]
@@ -159,7 +156,6 @@ def numbered(values: np.ndarray) -> np.ndarray:
 
 
 def _distances(offsets: np.ndarray, numbers: np.ndarray, pitch_mm: np.ndarray, folds: int) -> Interval:
-    """Distances from a number's median, with several folds from other folds'."""
     places, found = offsets * pitch_mm, np.zeros(len(offsets))
     count = int(numbers.max()) + 1
     if folds == 1:

@@ -82,15 +82,12 @@ ROWS = {
         style.GRAY, "v", {f"{pitch} mm": f"run, {pitch} mm, bare" for pitch in ("10", "6.4")}
     ),
 }
-"""Rows by name in the legend."""
 
 TICKS_US = {100: "0.1", 1000: "1", 10_000: "10", 100_000: "100"}
 ENDS_US = (80.0, 130_000.0)
 
 
 class Panel(NamedTuple):
-    """An error and its axis."""
-
     name: str
     label: str
     factor: float
@@ -127,7 +124,6 @@ def picture(points: Sequence[Point]) -> Figure:
 
 
 def title(best: Point) -> str:
-    """The recommended method, and how well it counts."""
     found = best.errors["total"]["miscounted"]
     share = f"{100 * found.mean:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f})"
     return f"the ringed method, {best.task.method}, miscounts {share}"

@@ -36,7 +36,6 @@ def _once(cells: np.ndarray, connectivity: int) -> float:
 
 
 def timed(point: Point) -> Point:
-    """The point with the host's labelling time, if any."""
     task = point.task
     if task.skin.report != "cells":
         return point

@@ -61,7 +61,6 @@ def floor_table() -> str:
 
 
 def measured(name: str, cover: str, pitch_mm: float, count: int = SCENES) -> Floor:
-    """One floor of the table."""
     family, options, _ = CONTACTS[name]
     skin = Skin(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     return floor(family, skin, COVERS[cover](pitch_mm), count, 0, **options)
@@ -80,7 +79,6 @@ def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
 
 
 def rivals_table() -> str:
-    """Rivals at two pitches of tiles, for several fingers."""
     head = (
         "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
         "assumes",
@@ -91,7 +89,6 @@ def rivals_table() -> str:
 
 
 def rival_line(name: str, pitch_mm: float, count: int = TOUCHES) -> str:
-    """One line of :func:`rivals_table`."""
     rival, cover = RIVALS[name], COVERS["tiles"](pitch_mm)
     lines = round(EXTENT_MM / pitch_mm)
     # On tiles of their own, cells that share a corner only are not joined.

@@ -11,7 +11,6 @@ from contactfpga.skin import Skin
 from contactfpga_sim.lab.covers import COVERS, DOME, tiled
 
 EXTENT_MM = 160.0
-"""Width and height of every sheet."""
 
 PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
 """Pitches; the first compares methods."""
@@ -26,8 +25,6 @@ MOST_ZONES = 32
 
 
 class Method(NamedTuple):
-    """A Skin and its cover."""
-
     skin: Skin
     cover: Cover | None
     """Cover; None is a bare sheet, whose switches close at any force if their middles are under a contact."""
@@ -41,13 +38,11 @@ def sheet(pitch_mm: float, **settings: Any) -> Skin:
 
 
 def under(cover: str, name: str, pitch_mm: float, more: str = "", **settings: Any) -> dict[str, Method]:
-    """One method: ``name`` at a pitch under one of :data:`contactfpga_sim.lab.covers.COVERS`."""
     whole = f"{name}, {pitch_mm:g} mm, {cover}" + (f", {more}" if more else "")
     return {whole: Method(sheet(pitch_mm, **settings), COVERS[cover](pitch_mm))}
 
 
 def by(labeller: Labeller) -> dict[str, Method]:
-    """A labeller under tiles at every pitch."""
     found: dict[str, Method] = {}
     for pitch in PITCHES_MM:
         found |= under("tiles", labeller.title, pitch, labeller=labeller)
@@ -95,4 +90,3 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
-"""Methods by name, the plainest first."""

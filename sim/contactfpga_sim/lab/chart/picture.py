@@ -41,8 +41,6 @@ SMALL: dict[str, Any] = {"fontsize": style.SMALL}
 
 
 class Metric(NamedTuple):
-    """An error and its axis."""
-
     name: str
     label: str
     scale: dict[str, Any]
@@ -89,7 +87,6 @@ def save(points: Sequence[Point], folder: Path, rivals: Sequence[RivalMethod] = 
 
 
 def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figure:
-    """All points, a row per family."""
     families = list(dict.fromkeys(point.task.family for point in points))
     figure = style.new(2.2 * len(families) + 1.3)
     panels = figure.subplots(len(families), len(METRICS), sharex=True, sharey="col", squeeze=False)
@@ -102,7 +99,6 @@ def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figu
 
 
 def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[RivalMethod]) -> None:
-    """One error of one family."""
     _axes(panel, points, metric)
     panel.set_xlabel(ALONG)
     some = [point for point in points if point.task.family == family]
@@ -126,24 +122,20 @@ def error(point: Point, name: str) -> float:
 
 
 def cover_of(method: str) -> str:
-    """Key of :data:`COLORS` for a method's name."""
     return next((name for name in COVERS if name in method.split(", ")), "other covers")
 
 
 def hollow(point: Point) -> bool:
-    """Whether many contacts are missed."""
     return error(point, "missed") > MISSED
 
 
 def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
-    """Axis ends, extended to all values."""
     finite = [value for value in values if math.isfinite(value)]
     least, most = min(finite, default=usual[0]), max(finite, default=usual[1])
     return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)
 
 
 def markers(points: Sequence[Point]) -> dict[float, str]:
-    """Markers by pitch in mm."""
     pitches = {skin.pitch_x_mm for skin, _ in METHODS.values()} | {point.task.skin.pitch_x_mm for point in points}
     return {pitch: MARKERS[index % len(MARKERS)] for index, pitch in enumerate(sorted(pitches))}
 
@@ -198,7 +190,6 @@ def _mark(panel: Any, point: Point, place: tuple[float, float], shapes: dict[flo
 
 
 def legend(points: Sequence[Point], rivals: Sequence[RivalMethod]) -> tuple[list[Line2D], list[str]]:
-    """Lines and words of the legend."""
     mark: dict[str, Any] = {"linestyle": "", "markersize": 6}
     used = {cover_of(point.task.method) for point in points} | ({"model"} if rivals else set())
     pitches = {point.task.skin.pitch_x_mm for point in points}

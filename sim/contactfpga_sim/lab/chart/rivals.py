@@ -33,7 +33,7 @@ HALVINGS = 14
 BITS = 8
 FULL_N = 10.0
 NOISE_COUNTS = 1.0
-"""Standard deviation in converter steps."""
+"""Noise in converter steps."""
 CROSSTALK = 0.01
 """Share of a force read by each of four neighbors."""
 GAIN_SPREAD = 0.05
@@ -51,7 +51,7 @@ ROW_CYCLES = 60
 CELL_CYCLES = 15
 """Cycles to store and label a cell in software."""
 SEND_CYCLES = 500
-"""Cycles to make a frame for UART or USB, which send during the next scan."""
+"""Cycles to make a frame for UART or USB; sending it overlaps the next scan."""
 USB_SLOT_US, USB_BIT_US = 1000.0, 1 / 12
 
 # ---- rough prices of parts in USD, boards and the elements themselves not counted: assumed, no offers
@@ -76,15 +76,12 @@ class Pace:
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """A model of another kind of sensor."""
-
     note: str
     readings: Readings
     pace: Callable[[Skin], Pace]
     cost_usd: Callable[[Skin], float]
 
     def wires(self, skin: Skin) -> int:
-        """Lines of the sheet."""
         return skin.rows + skin.columns
 
     def zones(self, scene: Scene, skin: Skin, cover: Cover | None) -> list[Blob]:
@@ -119,7 +116,7 @@ class Rival:
         return math.inf
 
     def _first_s(self, scene: Scene, skin: Skin, cover: Cover | None, rng: Random) -> float:
-        """When the first element is touched, within noise; infinite if never."""
+        """Time in s at which the first element is touched; infinite if never."""
 
         def touched(seconds: float) -> bool:
             return bool(self.readings(scene, seconds, skin, cover, rng).any())

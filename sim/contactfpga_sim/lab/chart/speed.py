@@ -41,7 +41,6 @@ def frame_clocks(skin: Skin, cells: np.ndarray, size: int) -> int:
 
 
 def _asked_clocks(skin: Skin, cells: np.ndarray) -> int:
-    """:func:`frame_clocks` of a requested frame of a waiting scan."""
     quiet = skin.replace(send="on_change")
     asked = round(WARM_US * skin.clock_hz / 1e6)
     received = requests([asked], skin.derived.bit_clocks)

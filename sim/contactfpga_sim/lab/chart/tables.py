@@ -23,7 +23,6 @@ SHEETS = (16, 32, 64)
 
 
 def compute() -> list[Point]:
-    """The chart's points, by way of its CSV file."""
     tasks = [
         Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
     ]
@@ -34,7 +33,6 @@ def compute() -> list[Point]:
 
 
 def draw(folder: Path, points: list[Point]) -> list[Path]:
-    """The README's picture, and the times of all methods."""
     times = times_picture.save(points, folder.parent / "chart" / "times.svg")
     return [times, front_picture.save(points, folder / "front.svg")]
 
@@ -64,7 +62,6 @@ def front_table(points: list[Point]) -> str:
 
 
 def methods_table(points: list[Point]) -> str:
-    """Every method of one family."""
     method = to_build(points)
     some = [point for point in points if point.task.family == front_picture.FAMILY]
     lines = [
@@ -117,7 +114,6 @@ def _percent(share: Interval) -> str:
 
 
 def host_table() -> str:
-    """Board zones against host-labelled cells, by sheet and touches."""
     head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
     lines = []
     for size in SHEETS:

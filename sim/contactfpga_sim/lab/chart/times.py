@@ -87,7 +87,6 @@ def measured(scenes: Sequence[Scene], skin: Skin, cover: Cover | None, first: in
 
 
 def summed(pieces: Sequence[Raw], skin: Skin) -> Times:
-    """Times over all touches of a method."""
     touch, electric, sizes = ([value for piece in pieces for value in piece[name]] for name in pieces[0])
     closed = [value for value in electric if not math.isnan(value)]
     usual = errors.quantile([size for size in sizes if not math.isnan(size)], 0.5).value

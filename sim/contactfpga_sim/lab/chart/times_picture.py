@@ -35,7 +35,6 @@ def save(points: Sequence[Point], path: Path) -> Path:
 
 
 def picture(points: Sequence[Point]) -> Figure:
-    """Methods downward, time along."""
     figure = style.new(0.2 * len(points) + 1.3)
     panel = figure.subplots()
     bits, electric, touch = PARTS.values()

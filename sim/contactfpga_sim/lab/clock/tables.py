@@ -51,8 +51,6 @@ PATHS = {
 
 
 class Moment(NamedTuple):
-    """One frame on its way."""
-
     time_us: int
     arrived_s: float
     sampled_s: float
@@ -62,8 +60,6 @@ class Moment(NamedTuple):
 
 
 class FrameTimes(NamedTuple):
-    """Fitted and true times of frames."""
-
     found_s: np.ndarray
     sigma_s: np.ndarray
     arrived_s: np.ndarray
@@ -93,7 +89,6 @@ def moments(path: Path, ppm: float, seed: int, seconds: float = SECONDS) -> Iter
 
 
 def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTimes:
-    """Feed frames to a fit."""
     fit = fit or ClockFit()
     rows = []
     for moment in frames:
@@ -107,7 +102,7 @@ def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> FrameTime
 
 
 class Accuracy(NamedTuple):
-    """Errors over all runs of a path, without each first second."""
+    """Errors over all runs of a path without the first second of each."""
 
     late_s: float
     error_s: float
@@ -144,7 +139,6 @@ HEAD = (
 
 
 def accuracy_table(names: Iterable[str] = PATHS) -> str:
-    """Accuracy over simulated transports."""
     rows: list[tuple[str, ...]] = [HEAD]
     for path in (PATHS[name] for name in names):
         found = accuracy(path)
@@ -154,5 +148,4 @@ def accuracy_table(names: Iterable[str] = PATHS) -> str:
 
 
 def slow_sample() -> str:
-    """A row of :func:`accuracy_table`."""
     return accuracy_table(("slow",)).splitlines()[-1]

@@ -20,7 +20,6 @@ AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": Tr
 
 
 def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> Skin:
-    """A sheet with as many rows as columns."""
     around = AROUND if closed else {}
     return Skin(rows=lines, columns=lines, connectivity=connectivity, labeller=labeller, settle_us=30.0, **around)
 
@@ -35,7 +34,6 @@ def clocks_table() -> str:
 
 
 def size_table() -> str:
-    """LUT4 of the labeller alone."""
     head = ["labeller", "connectivity", "16x16: open", "closed", "32x32: open", "closed"]
     rows = [[*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
             for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
@@ -43,7 +41,6 @@ def size_table() -> str:
 
 
 def names(labeller: Labeller, connectivity: int) -> tuple[str, str]:
-    """First cells of a line."""
     return f"`{labeller.title}`", str(connectivity)
 
 
@@ -63,12 +60,10 @@ def most(labeller: Labeller, connectivity: int) -> list[str]:
 
 
 def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:
-    """LUT4 on an iCE40UP5K, open and closed."""
     skins = (skin_of(lines, connectivity, labeller, closed) for closed in (False, True))
     return [f"{size.luts(functools.partial(labeller.load_gateware(), skin), sizes.UP5K):,}" for skin in skins]
 
 
 def clocks_sample() -> str:
-    """First row of :func:`clocks_table`."""
     labeller = LABELLERS["run"]
     return writer.line((*names(labeller, 8), *worst(labeller, 8), *most(labeller, 8)))

@@ -26,7 +26,6 @@ LINES = 16
 PLACES = 1000
 
 PROUD_MM = 0.5
-"""Height of proud caps, into which foam may sag."""
 
 FLUSH = 0.8
 
@@ -65,14 +64,12 @@ KINDS = {
 
 
 def felt_table() -> str:
-    """Smallest felt forces, by pitch, cover and switch."""
     head = ["pitch", "what the foam presses", "one switch takes, least"]
     head += [f"{force:g} N switch: {what}" for force in FORCES_N for what in ("50 %", "99 %", "worst")]
     return writer.table_of([head, *(_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS))])
 
 
 def felt_sample() -> str:
-    """Fastest line of :func:`felt_table`."""
     return writer.line(_row(PITCHES_MM[-1], list(KINDS)[-1]))
 
 
@@ -139,7 +136,6 @@ def sagging_n(cover: Cover, pitch_m: float, proud_m: float = PROUD_MM * 1e-3) ->
 
 
 def sagging_table() -> str:
-    """Sagging forces for proud caps under whole foam."""
     rows = [["pitch", "caps", "foam", f"sags by {PROUD_MM:g} mm from"]]
     for pitch, kind in itertools.product(PITCHES_MM, (_button, _caps)):
         cover = kind(pitch, 1.0)
@@ -158,7 +154,6 @@ _SHORT = ("flush face", "flush cap", "proud button", "proud caps, whole foam", "
 
 
 def draw(path: Path) -> Path:
-    """Cross sections of covers, and felt force along the diagonal."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(4.4)
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))

@@ -62,7 +62,6 @@ class FoamOnCaps:
         return np.asarray(total, float).reshape(self.count, self.count)
 
     def _solved(self, pressure: Floats) -> Floats:
-        """The pressure below, by conjugate gradients."""
         below = np.where(self.held, pressure.sum() / self.held.sum(), 0.0)
         rest = self._free(self._moves(pressure, below) - self._given(below))
         step, size = rest.copy(), (rest**2).sum()
@@ -78,7 +77,6 @@ class FoamOnCaps:
         raise AssertionError("the conjugate gradients did not converge")
 
     def _free(self, moved: Floats) -> Floats:
-        """Remove the mean, the depth of the layer as a whole."""
         return np.where(self.held, moved - moved[self.held].mean(), 0.0)
 
     def _moves(self, above: Floats, below: Floats) -> Floats:

@@ -25,8 +25,6 @@ STALLED = 200_000
 
 
 class Blow(NamedTuple):
-    """An impact whose duration is computed."""
-
     name: str
     arm: Arm
     speed_m_s: float
@@ -105,7 +103,7 @@ def _off_factored(share: float) -> Rule:
 
 
 def _euler(step_share: float) -> Rule:
-    """Explicit steps on v = sqrt(v^2(delta)), which never start from rest."""
+    """Starts slightly after rest: v = sqrt(v^2(delta)) never starts from rest."""
 
     def rule(blow: Blow) -> float:
         depth, step, count, end = 0.0, step_share * blow.depth_m / max(blow.speed_m_s, 0.1), 0, blow.depth_m
@@ -175,7 +173,6 @@ def relative_errors(rule: Rule) -> list[float]:
 
 
 def seconds(call: Callable[[], object], repeats: int = 5) -> float:
-    """Shortest of several runs."""
     call()
     count, took = 1, 0.0
     while took < 2e-3:

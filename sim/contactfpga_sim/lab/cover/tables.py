@@ -26,15 +26,12 @@ RESILIENCE = 4791.0
 
 
 class PaperClaim(NamedTuple):
-    """A claim of the paper, our result, and the verdict."""
-
     printed: str
     ours: str
     verdict: str
 
 
 def rows() -> list[PaperClaim]:
-    """All claims, in the paper's order."""
     return [*_equations(), *_first_design(), *_thickness(), *_sensitivity(), *_experiment()]
 
 
@@ -188,7 +185,7 @@ def _experiment() -> list[PaperClaim]:
 
 
 def _as_printed(radius_m: float) -> float:
-    """(8) in mm with t0 = 8 ms on the second design."""
+    """Equation (8), in mm, with t0 = 8 ms on the second design."""
     ball = Ball(radius_m, elastic.effective_modulus_pa(FOAM_PA, 0.5))
     hit = _solved(impact.strike(HEAVY, 1.5, elastic.stiffness(ball)))
     return 1e3 * elastic.thickness_m(ball, 2.0, 1.5, RESILIENCE, 0.008 / hit.time_s)
@@ -232,7 +229,6 @@ def _rule_table(rules: dict[str, formulas.Rule]) -> str:
 
 
 def sense_table() -> str:
-    """Sensitivity models: error and time."""
     study = formulas
     rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES), "time"]]
     for model in study.LADDER:
@@ -245,13 +241,11 @@ def sense_table() -> str:
 
 
 def paper_table() -> str:
-    """Printed value, our value, verdict."""
     lines = [(row.printed, row.ours, row.verdict) for row in rows()]
     return writer.table_of([("paper says", "we get", "verdict"), *lines])
 
 
 def thinning_table() -> str:
-    """The first design with ever faster reactions."""
     head = (
         "reaction time",
         "modulus for a compression of 4/3 of this time",
@@ -273,7 +267,6 @@ def thinning_table() -> str:
 
 
 def foam_table() -> str:
-    """Every foam with its source."""
     rows = [["foam", "E", "density", "Y", "pressed up to", "source"]]
     for one in FOAMS:
         density = "" if one.density_kg_m3 is None else f"{one.density_kg_m3:g} kg/m³"
@@ -284,15 +277,12 @@ def foam_table() -> str:
 
 
 def rules_table() -> str:
-    """Peak-force rules: error and time."""
     return _rule_table(formulas.RULES)
 
 
 def failing_table() -> str:
-    """Failing rules: error and time."""
     return _rule_table(formulas.FAILING)
 
 
 def draw(folder: Path) -> list[Path]:
-    """Pictures of the answer and the caps."""
     return [caps.draw(folder / "cover-caps.svg"), *drawing.draw(folder, "svg")]

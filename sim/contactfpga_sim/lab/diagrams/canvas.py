@@ -30,14 +30,12 @@ class Canvas:
         self.axes.axis("off")
 
     def text(self, x: float, y: float, words: str, **how: Any) -> None:
-        """Draw words from x, vertically centered at y."""
         self.axes.text(x, y, words, **{"va": "center", "fontsize": style.NORMAL, "color": style.INK} | how)
 
     def small(self, x: float, y: float, words: str, **how: Any) -> None:
         self.text(x, y, words, **{"fontsize": style.SMALL, "color": style.SOFT} | how)
 
     def box(self, x: float, y: float, w: float, h: float, color: str, **how: Any) -> None:
-        """Draw a rectangle from (x, y) down, in a tint."""
         from matplotlib.patches import Rectangle
 
         look: dict[str, Any] = {"fc": TINTS.get(color, color), "ec": color, "lw": 1} | how
@@ -50,7 +48,6 @@ class Canvas:
         self.axes.plot(*zip(*points, strict=True), **{"color": color, "lw": 1, "solid_capstyle": "round"} | how)
 
     def arrow(self, *points: tuple[float, float], color: str = style.SOFT, both: bool = False) -> None:
-        """Draw a line with an arrowhead at its end, or at both."""
         self.line(*points, color=color, lw=1.6, solid_capstyle="butt")
         ends = [(points[-2], points[-1])] + ([(points[1], points[0])] if both else [])
         for start, end in ends:

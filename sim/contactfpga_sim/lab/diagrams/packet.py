@@ -20,8 +20,6 @@ BITS = 32
 
 
 class Field(NamedTuple):
-    """A field, ``size`` bits or bytes wide."""
-
     name: str
     size: int
     color: str
@@ -114,7 +112,6 @@ def _hello(skin: Skin) -> Iterator[Field]:
 
 
 def _line(canvas: Canvas, y: float, fields: Sequence[Field], unit: str, even: bool = False) -> None:
-    """Draw boxes side by side, with ``even`` equally wide."""
     total = len(fields) if even else max(sum(one.size for one in fields), BITS if unit == "bit" else 0)
     step = (RIGHT - LEFT) / total
     sizes = [1 if even else one.size for one in fields]

@@ -12,7 +12,6 @@ from contactfpga_sim.lab.diagrams import cutaway, packet, together, touch, wires
 
 
 def draw(folder: Path) -> list[Path]:
-    """Draw all diagrams into the pictures' folder."""
     kit = kits.kit("starter")
     with matplotlib.rc_context(style.SETTINGS):
         return [

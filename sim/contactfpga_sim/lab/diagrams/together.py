@@ -16,7 +16,6 @@ CELLS = 9
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Draw the kit's skin, board and host."""
     canvas = Canvas(346)
     _skin(canvas, kit)
     _boxes(canvas, kit)

@@ -58,7 +58,6 @@ def _touch(axes: Any, skin: Skin, title: str) -> None:
 
 
 def _bars(skin: Skin, touch: wave.SimulatedTouch) -> Iterator[tuple[int, float, float, str]]:
-    """Lane, first clock, clocks and color of bars."""
     trace, times = touch.trace, skin.derived
     for cycle, cells, _ in trace.rows:
         first = cycle - BEFORE_OFFER - times.settle_clocks

@@ -25,14 +25,11 @@ COLORS = style.BLUE, style.PURPLE, style.BROWN
 
 
 class Pin(NamedTuple):
-    """A pin of a connector and its wire."""
-
     number: str
     wire: str
 
 
 def draw(kit: Kit, path: Path) -> Path:
-    """Draw the table of ``contactfpga build --wiring``."""
     circuit = load_circuit(kit.skin_path)
     assert circuit is not None
     board = _board(kit)

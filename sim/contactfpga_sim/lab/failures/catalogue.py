@@ -32,4 +32,3 @@ KNOBS = {
         line.CLOCK,
     )
 }
-"""Knobs by name."""

@@ -41,7 +41,6 @@ def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:
 
 
 def judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: str = "contact") -> Outcome:
-    """A frame judged against the contacts, to the cell."""
     right = reported(zones) == sorted(map(moments, contacts))
     what = f"{plural(len(zones), 'zone')} of {plural(len(contacts), unit)}"
     if not right and len(zones) == len(contacts):
@@ -126,7 +125,6 @@ def _rectangle(rng: np.random.Generator, skin: Skin) -> list[tuple[int, int]]:
 
 
 def _bare(skin: Skin, count: int, spots: list[tuple[int, int]], rng: np.random.Generator) -> Outcome:
-    """The worse outcome of both values of undefined levels."""
     cells = finger(skin, *spots)
     bare = np.zeros_like(cells)
     bare.flat[rng.permutation(np.flatnonzero(finger(skin, spots[0])))[:count]] = True
@@ -172,7 +170,6 @@ BARE_CELLS = BARE.replace(report="cells")
 
 
 def bare_read(pressed: np.ndarray) -> np.ndarray:
-    """What a sheet without diodes reads."""
     return Wiring(bare=np.ones((1, 1), bool), floating=True).read(pressed)[0]
 
 
@@ -184,7 +181,7 @@ def _corners(count: float, rng: np.random.Generator, draws: int) -> list[Outcome
 
 
 def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
-    """The second frame of each; the first depends on earlier ones."""
+    """The first frame depends on earlier ones, so the second counts."""
     found = []
     with Rig(skin) as rig:
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), hello_clocks(skin))
@@ -203,7 +200,7 @@ def _scattered(count: float, rng: np.random.Generator, draws: int) -> list[Outco
 
 
 def _scattered_cells(count: float, rng: np.random.Generator, draws: int) -> list[Outcome]:
-    """Outcomes of misread cells; a fault is reported if each is marked."""
+    """A fault counts as reported if every misread cell is marked."""
     cells = [finger(BARE, *_apart(rng, BARE, int(count))) for _ in range(draws)]
     return [_marked(zones, each) for zones, each in zip(_frames(BARE_CELLS, cells), cells)]
 

@@ -13,8 +13,6 @@ Place = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result at one value of a knob."""
-
     right: bool
     told: tuple[str, ...] = ()
     """Flags, counters and errors."""
@@ -35,8 +33,6 @@ class Outcome:
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """A quantity that is moved until something breaks."""
-
     name: str
     title: str
     axis: str
@@ -68,8 +64,6 @@ class Knob:
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """Outcomes of one method at all values of a knob."""
-
     values: tuple[float, ...]
     outcomes: tuple[Outcome, ...]
 

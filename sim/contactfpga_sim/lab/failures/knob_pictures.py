@@ -118,13 +118,11 @@ SOFT = f'fill="{style.SOFT}"'
 
 
 def _level(knob: Knob) -> float | None:
-    """Share from which a value holds, if one does for all methods."""
     levels = {run.level for run in knob.runs.values() if isinstance(run, Rated)}
     return levels.pop() if len(levels) == 1 else None
 
 
 def _alike(methods: Mapping[str, Sweep]) -> list[tuple[list[str], tuple[Outcome, ...]]]:
-    """Methods with equal shares and reports, together."""
     found: dict[Any, tuple[list[str], tuple[Outcome, ...]]] = {}
     for name, sweep in methods.items():
         key = tuple((outcome.amount, _kind(outcome)) for outcome in sweep.outcomes)
@@ -162,7 +160,6 @@ def _chart(
 
 
 def _kept_together(words: str) -> str:
-    """Words with each number and its unit on one line."""
     return re.sub(r"(?<=\d) (?=\S)", "\N{NO-BREAK SPACE}", words)
 
 
@@ -196,7 +193,6 @@ def _kind(outcome: Outcome) -> str:
 
 
 def _sheets(knob: Knob, methods: Mapping[str, Sweep]) -> tuple[str, list[tuple[str, Outcome]]]:
-    """The first method that fails, and its outcomes around the break."""
     for method, sweep in methods.items():
         if sweep.broken is None or not sweep.broken or sweep.outcomes[sweep.broken].cells is None:
             continue

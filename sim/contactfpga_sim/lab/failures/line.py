@@ -28,8 +28,6 @@ OVERSAMPLING = 16
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Line:
-    """The signal that a board put on its line."""
-
     skin: Skin
     edges: np.ndarray
     """(n,) float: clocks of level changes; the level begins high."""
@@ -97,11 +95,8 @@ class Line:
 
 @dataclasses.dataclass(frozen=True)
 class HostDecoding:
-    """The host's reading of a line."""
-
     sent: int
     arrived: int
-    """Frames that arrived unchanged."""
     wrong: int
     """Arrived frames that were never sent."""
     told: tuple[str, ...]
@@ -128,7 +123,6 @@ def _decoded(data: bytes) -> tuple[list[str], Conversation]:
 
 
 def _sent(zones: Zones) -> dict[str, object]:
-    """A frame without what the host adds from earlier frames."""
     own = {name: value for name, value in zones.to_dict().items() if not name.startswith("host_")}
     return own | {"flags": sorted(zones.frame.flags)}
 
@@ -144,12 +138,11 @@ RECORDED = 200
 
 @functools.cache
 def recorded(scans: int, seed: int) -> Line:
-    """A cached recorded line."""
     return Line.record(SKIN, scans, seed)
 
 
 def _of_line(found: HostDecoding) -> Outcome:
-    """Right if every frame arrives; an unsent one is worse than a lost one, and silent."""
+    """Right if every frame arrives. A frame that was never sent is worse than a lost one, and silent."""
     missing = found.sent - found.arrived
     what = f"{missing} of {found.sent} frames do not arrive"
     if found.wrong:
@@ -183,7 +176,6 @@ def _number(rng: np.random.Generator) -> int:
 
 
 def _asked(sign: int, per_cent: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of requests at any time: does a frame answer?"""
     bit = SKIN.derived.bit_clocks / (1 + sign * per_cent / 100)
     found = []
     with Rig(SKIN) as rig:
@@ -218,7 +210,7 @@ BAUD = Knob(
 
 
 def _noise(rate_hz: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """One outcome per frame; the port was opened before the noise."""
+    """The port was opened before the noise."""
     line = recorded(count + 10, int(rng.integers(RECORDED)))
     data = line.noisy(rate_hz, int(rng.integers(1 << 32))).read(SKIN.derived.bit_clocks)
     found = heard(line, data, greeted=protocol.encode_hello(SKIN))
@@ -332,8 +324,6 @@ def _slow_host(milliseconds: float, rng: np.random.Generator, count: int) -> lis
 
 
 class DyingBoard(SlowHost):
-    """A board that stops."""
-
     name = "the board that stops"
     runs = True
 

@@ -38,7 +38,6 @@ class Rig:
         self.scan = skin.derived.frame_clocks
 
     def frames(self) -> list[Zones]:
-        """All frames since the last call."""
         events = self.conversation.receive(self.board.receive(), self.board.cycle / self.skin.clock_hz)
         return [event.zones for event in events if isinstance(event, Arrival)]
 
@@ -90,12 +89,10 @@ def moments(cells: np.ndarray) -> tuple[int, int, int]:
 
 
 def reported(zones: Zones) -> list[tuple[int, int, int]]:
-    """Moments of a frame's zones, in order."""
     return sorted((area, x, y) for area, x, y in zones.frame.moments.tolist())
 
 
 def places(zones: Zones) -> tuple[Place, ...]:
-    """Barycenters of a frame's zones, in cells."""
     return tuple((x / area, y / area) for area, x, y in sorted(zones.frame.moments.tolist(), key=_place))
 
 
@@ -105,10 +102,8 @@ def _place(sums: list[int]) -> tuple[float, float, int]:
 
 
 def faults(zones: Zones) -> tuple[str, ...]:
-    """Faults that a frame reports."""
     return (*sorted(zones.flags - {"fault"}), *sorted(zones.faults))
 
 
 def plural(count: int, noun: str) -> str:
-    """A count with its noun."""
     return f"{count} {noun}" + ("" if count == 1 else "s")

@@ -73,7 +73,6 @@ CLOSED = ("knob", "closed form", "value")
 
 
 def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row per knob with a closed form: words and values."""
     lines = []
     for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
         values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
@@ -107,7 +106,6 @@ SAID = {
 
 
 def pictures() -> str:
-    """A heading per knob, and its picture or a sentence."""
     return headed(KNOBS, "failures", SAID)
 
 
@@ -118,7 +116,6 @@ def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> s
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
-    """Move every knob until something breaks."""
     sweeps: dict[str, dict[str, Sweep]] = {}
     sweep_all(list(KNOBS), sweeps)
     return sweeps
@@ -133,7 +130,6 @@ def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None
 
 
 def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """A picture per knob."""
     drawn = []
     for name, methods in sweeps.items():
         drawn.append(folder / f"{name}.svg")

@@ -52,7 +52,7 @@ def _pair(
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    """Outcomes of two fingers; the gateware does not depend on the pitch."""
+    """The gateware does not depend on the pitch."""
     sheet = skin.replace(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
     cells = np.array([_pair(gap_mm, 8.0, pitch_mm, rng).pressed(0.0, sheet) for _ in range(count)])
     return [_counted(zones, each, 2) for zones, each in zip(seen(skin, cells), cells)]
@@ -124,7 +124,7 @@ FIRST, LAST = 2.0, 13.0
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """The frame with the largest error, for a finger of 10 N from any phase; infinite without exactly one zone."""
+    """Largest error for a finger of 10 N from any phase; infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz
@@ -179,7 +179,6 @@ BOUNCING = Skin(rows=4, columns=4, baud=6_000_000)
 
 
 def debounced(method: str) -> Skin:
-    """A sheet with debounce times of :data:`DEBOUNCE_SCANS` scans."""
     scan_us = BOUNCING.derived.frame_clocks / BOUNCING.derived.clocks_per_us
     times = {"debounce_press_us": DEBOUNCE_SCANS * scan_us, "debounce_release_us": DEBOUNCE_SCANS * scan_us}
     return BOUNCING.replace(debounce=method, **times)

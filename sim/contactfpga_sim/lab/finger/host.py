@@ -104,7 +104,6 @@ def _taken(board: contactfpga.Board, player: _Player, number: int) -> float:
 
 
 def machine() -> str:
-    """This machine and its Python."""
     processor = platform.processor() or platform.machine()
     if (about := Path("/proc/cpuinfo")).exists():
         names = [line.partition(":")[2].strip() for line in about.read_text().splitlines() if "model name" in line]

@@ -43,7 +43,7 @@ class Finger:
 
     @property
     def decision_us(self) -> Spread:
-        """Time from the touch to the decision, with :data:`ASSUMED_HOST_US` for the host."""
+        """Time from the touch to the decision, with :data:`ASSUMED_HOST_US`."""
         return Spread(*(us + ASSUMED_HOST_US for us in dataclasses.astuple(self.usb_us)))
 
     def as_json(self) -> dict[str, Any]:

@@ -142,7 +142,6 @@ def _sheet(one: Candidate) -> Settings:
 
 
 def _sees(one: Candidate) -> Settings:
-    """Settings that decide which zones a candidate finds."""
     assert one.skin is not None
     if exact(one.skin):
         return (("connectivity", one.skin.connectivity),)

@@ -26,7 +26,6 @@ METRIC_HEADS = ("scenes miscounted", "contacts missed", "barycenter", "area")
 
 
 def printed(found: Fit) -> None:
-    """Print tables and notes."""
     _print(rows(found), bold="the answer")
     _print(reported(found), keys=1)
     for line in notes(found):
@@ -34,7 +33,6 @@ def printed(found: Fit) -> None:
 
 
 def printed_so_far(trials: Iterable[Trial]) -> None:
-    """Print an interrupted search."""
     _print(rows_so_far(trials))
 
 
@@ -58,8 +56,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """Refused trials to show, each with the number it represents: one per other cover on the answer's sheet and per
-    sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
+    """Returns each refused trial to show with the number it represents: one per other cover on the answer's sheet and
+    per sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer
@@ -89,13 +87,11 @@ def _without_same(table: list[list[str]]) -> list[list[str]]:
 
 
 def rows_so_far(trials: Iterable[Trial]) -> list[list[str]]:
-    """The head, and a line per Skin of an interrupted search, the nearest first."""
     nearest = sorted(trials, key=lambda one: (one.excess, one.cost))
     return _without_same([list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)])
 
 
 def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
-    """An interrupted search for JSON."""
     return {"interrupted": True, "measured": [_trial(one) for one in sorted(trials, key=lambda one: one.excess)]}
 
 
@@ -143,7 +139,6 @@ def _method(settings: dict[str, Any]) -> str:
 
 
 def name(trial: Trial) -> str:
-    """A Skin in a few words."""
     settings = dict(trial.candidate.settings)
     pitches = dict.fromkeys((settings["pitch_x_mm"], settings["pitch_y_mm"]))
     pitch = " x ".join(f"{one:.4g}" for one in pitches)
@@ -176,7 +171,6 @@ def _error(metric: str, error: Interval) -> str:
 
 
 def notes(fit: Fit) -> list[str]:
-    """Remarks on the answer or its absence."""
     lines = []
     if fit.answer is None:
         lines.append("No Skin that was tried meets the limits.")
@@ -202,7 +196,6 @@ def notes(fit: Fit) -> list[str]:
 
 
 def toml(fit: Fit, command: str) -> str:
-    """The answer's file, with its measurements on top."""
     assert fit.answer is not None
     lines = [command, f"{fit.answer.luts} LUT4 on {DEVICE.fpga}, {fit.answer.wires} wires"]
     for source, one in zip(fit.task.names, fit.reported[0], strict=True):

@@ -34,7 +34,6 @@ SECONDS = 1.0
 COUNT = 500
 
 Size = tuple[float, float]
-"""Width and height of a sheet in mm."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,8 +62,6 @@ class Source(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class Placed(Source):
-    """Contacts at random places."""
-
     @abc.abstractmethod
     def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
         """A scene, and its sampling instant in s."""
@@ -111,8 +108,6 @@ class BuiltIn(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class Shifted:
-    """A time-dependent value, moved."""
-
     value: Value
     by: float
 
@@ -126,8 +121,6 @@ def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
 
 @dataclasses.dataclass(frozen=True)
 class File(Placed):
-    """Contacts of a scene file."""
-
     says: SceneFile
 
     def size_mm(self) -> Size | None:

@@ -13,7 +13,7 @@ from contactfpga_sim.lab.fit.search import fit
 
 
 def section(arguments: str) -> str:
-    """A command and its output, without settings that Skin refuses."""
+    """Settings that Skin refuses are left out."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()

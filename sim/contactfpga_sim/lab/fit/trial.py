@@ -18,8 +18,6 @@ from contactfpga_sim.lab.fit.sources import Source
 
 @dataclasses.dataclass(frozen=True)
 class Measurement:
-    """A Skin on the scenes of one source."""
-
     errors: dict[str, Interval]
     speed: Speed | None = None
     """Speed; None if errors are too large."""
@@ -102,7 +100,6 @@ class Goals:
         return max(ends, default=0.0)
 
     def excess(self, found: Measurement) -> float:
-        """Largest factor of excess; 1 if all are met."""
         return max((over for over, _ in self.misses(found)), default=1.0)
 
 
@@ -133,8 +130,6 @@ TIMED = 48
 
 @dataclasses.dataclass(frozen=True)
 class FitTask:
-    """Inputs of a fit."""
-
     sources: tuple[Source, ...]
     names: tuple[str, ...]
     base: Skin
@@ -150,8 +145,6 @@ class FitTask:
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A candidate with its results."""
-
     candidate: Candidate
     measured: tuple[Measurement, ...] = ()
     refusals: tuple[str, ...] = ()
@@ -167,7 +160,6 @@ class Trial:
 
     @property
     def wires(self) -> int:
-        """Lines of the sheet."""
         return self.skin.rows + self.skin.columns
 
     @property
@@ -183,8 +175,6 @@ class Trial:
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """Result of a fit."""
-
     task: FitTask
     answer: Trial | None
     runner_up: Trial | None
