@@ -138,8 +138,7 @@ def feel() -> str:
 
 
 def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
-    """Returns the cycle of the frame's first start bit, that of its last byte's end, bytes on the wire, and the
-    frame."""
+    """Cycle of the frame's first start bit, cycle of its last byte's end, bytes on the wire, and the frame."""
     for got in frames_in(skin, trace.bytes):
         if got.frame.cells:
             return got.first + 1, got.last + 1 + 10 * skin.derived.bit_clocks, got.size, got.frame

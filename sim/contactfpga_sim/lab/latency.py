@@ -216,7 +216,6 @@ class Bench:
             self._wait(0)
 
     def _wait(self, cells: int) -> tuple[ReceivedFrame, bool]:
-        """The first frame with this many cells, and whether a keep-alive preceded it."""
         until = self._board.cycle + self._patience
         kept_alive = False
         while self._board.cycle < until:

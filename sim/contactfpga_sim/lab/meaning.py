@@ -19,7 +19,6 @@ LENGTH = 8
 
 
 def fingerprint(study: Study, section: str) -> str:
-    """Fingerprint of a section's code."""
     declared = study.sections[section]
     if declared.of_netlists:
         return _hashed("\n".join((*_netlists(study, section), *_marks(_file(study.module(declared.makes))))))
@@ -52,7 +51,6 @@ def _hashed(text: str) -> str:
 
 @functools.cache
 def _marks(file: Path) -> tuple[str, ...]:
-    """A hash per statement of a module, or of a whole other file."""
     data = file.read_bytes()
     if file.suffix != ".py":
         return (hashlib.sha256(data).hexdigest(),)

@@ -171,7 +171,6 @@ def _triggered(module: str) -> str:
 
 
 def _head(skin: Skin) -> str:
-    """Header that names the sources."""
     return (
         f"// contactfpga {__version__}: {skin.rows}x{skin.columns} switches, Skin {skin.fingerprint.hex()}. Made by "
         "`contactfpga ip`.\n/* verilator lint_off WIDTHEXPAND */\n/* verilator lint_off WIDTHTRUNC */\n"

@@ -30,7 +30,7 @@ class Forces(NamedTuple):
     acceleration: float
     """Angular acceleration of the joint, in rad/s2."""
     sensor_nm: float
-    """True torque, even beyond the sensor's range."""
+    """True torque between motor and arm, even beyond the sensor's range."""
 
 
 class Plant:

@@ -26,7 +26,7 @@ _MM = 1e-3
 _PATCH_M = 1e-3
 
 _FINE = 1.1
-"""Ratio of forces at which a wide patch is computed anew."""
+"""Ratio of forces at which a wide patch is computed; in between, pressure per newton is linear."""
 
 _LEAST_N = 0.01
 

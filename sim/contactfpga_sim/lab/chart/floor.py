@@ -48,6 +48,7 @@ class Floor:
     """Limits on a family of scenes, in mm, over scenes with a closed switch."""
 
     felt: Interval
+    """Share of scenes with a closed switch."""
     barycenter_mm: Interval
     lower_mm: Interval
     upper_mm: Interval

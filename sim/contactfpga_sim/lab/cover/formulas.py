@@ -103,7 +103,7 @@ def _off_factored(share: float) -> Rule:
 
 
 def _euler(step_share: float) -> Rule:
-    """Starts slightly after rest: v = sqrt(v^2(delta)) never starts from rest."""
+    """Explicit steps on v = sqrt(v^2(delta)), which never start from rest."""
 
     def rule(blow: Blow) -> float:
         depth, step, count, end = 0.0, step_share * blow.depth_m / max(blow.speed_m_s, 0.1), 0, blow.depth_m

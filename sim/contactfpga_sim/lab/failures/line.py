@@ -97,6 +97,7 @@ class Line:
 class HostDecoding:
     sent: int
     arrived: int
+    """Frames that arrived unchanged."""
     wrong: int
     """Arrived frames that were never sent."""
     told: tuple[str, ...]

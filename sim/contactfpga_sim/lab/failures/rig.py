@@ -93,6 +93,7 @@ def reported(zones: Zones) -> list[tuple[int, int, int]]:
 
 
 def places(zones: Zones) -> tuple[Place, ...]:
+    """Barycenters of a frame's zones, in cells."""
     return tuple((x / area, y / area) for area, x, y in sorted(zones.frame.moments.tolist(), key=_place))
 
 

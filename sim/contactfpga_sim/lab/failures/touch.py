@@ -124,7 +124,7 @@ FIRST, LAST = 2.0, 13.0
 
 
 def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generator) -> Outcome:
-    """Largest error for a finger of 10 N from any phase; infinite without exactly one zone."""
+    """The frame with the largest error, for a finger of 10 N from any phase; infinite without exactly one zone."""
     derived, pitch = skin.derived, skin.pitch_x_mm
     way = WAYS[rng.integers(len(WAYS))]
     start = (hello_clocks(skin) + rng.uniform(0, derived.frame_clocks)) / skin.clock_hz

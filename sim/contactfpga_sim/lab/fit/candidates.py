@@ -17,6 +17,7 @@ from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:
+    """Methods of a labeller; connectivity matters to exact ones."""
     settings = {"labeller": labeller.name, "report": "moments"}
     return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
 

@@ -56,8 +56,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """Returns each refused trial to show with the number it represents: one per other cover on the answer's sheet and
-    per sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
+    """Refused trials to show, each with the number it represents: one per other cover on the answer's sheet and per
+    sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer

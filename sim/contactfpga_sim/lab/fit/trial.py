@@ -160,6 +160,7 @@ class Trial:
 
     @property
     def wires(self) -> int:
+        """Lines of the sheet."""
         return self.skin.rows + self.skin.columns
 
     @property

@@ -34,12 +34,10 @@ DESIGNS: dict[str, dict[str, Any]] = {
 
 
 def skin(design: str) -> Skin:
-    """The design with the study's clock and line."""
     return Skin(clock_hz=CLOCK_HZ, baud=BAUD, **DESIGNS[design])
 
 
 def luts(design: str) -> int:
-    """LUT4 of the design on a UP5K, at the reference Skin's clock."""
     return size.luts(lambda: Top(Skin(**DESIGNS[design])), sizes.UP5K)
 
 
@@ -47,8 +45,6 @@ BLOCK = 25
 
 
 class Row(NamedTuple):
-    """A flip of a design."""
-
     design: str
     found: FlipOutcome
 

@@ -27,8 +27,6 @@ Outcome = Literal["masked", "told", "silent"]
 
 
 class Flip(NamedTuple):
-    """Place and time of a flip."""
-
     bit: Bit
     cycle: int
 
@@ -51,7 +49,6 @@ class FlipOutcome(NamedTuple):
 
 
 def module(name: str) -> str:
-    """Stage of a register or memory."""
     parts = name.split(".")
     inner = parts[2:] if parts[0] == "dual" and len(parts) > 2 else parts
     return "comparison" if parts[0] == "dual" and len(parts) <= 2 else inner[0].split("$")[0]
@@ -106,7 +103,6 @@ def _silent(
 
 
 def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[DeliveredFrame], float]:
-    """The host afterwards, all frames since, and how long the board differed."""
     board, skin, clocks = reference.board, reference.skin, reference.step_clocks
     number = flip.cycle // clocks
     board.go_to(reference.steps[number].moment)

@@ -26,8 +26,6 @@ AFTER_S = 0.5
 
 
 class DeliveredFrame(NamedTuple):
-    """A frame that the driver delivered."""
-
     time_s: float
     said: touches.Said
     late_s: float

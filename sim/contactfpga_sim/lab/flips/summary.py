@@ -17,8 +17,6 @@ from contactfpga_sim.model.board.state import StateBoard
 
 
 class Design(NamedTuple):
-    """Name and size of a design."""
-
     name: str
     luts: int
     registers: int
@@ -27,8 +25,6 @@ class Design(NamedTuple):
 
 
 class Share(NamedTuple):
-    """Share of flips with an outcome."""
-
     hits: int
     of: int
 
@@ -75,7 +71,6 @@ def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
 
 
 def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
-    """Share of rows with this outcome."""
     return Share(sum(row.found.outcome == outcome for row in rows), len(rows))
 
 
@@ -94,5 +89,4 @@ def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
 
 
 def stage(row: Row) -> str:
-    """Module of a flip."""
     return module(row.found.name)

@@ -32,8 +32,6 @@ OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 
 
 class FlipResults(NamedTuple):
-    """Results shared by the sections."""
-
     rows: Sequence[Row]
     designs: Sequence[Design]
 
@@ -94,7 +92,6 @@ def _worst(rows: Sequence[Row]) -> str:
 
 
 def designs_table(found: FlipResults) -> str:
-    """A row per design for registers, one for memories."""
     lines = []
     for design in found.designs:
         for memory, bits in ((False, design.registers), (True, design.memories)):
@@ -125,7 +122,6 @@ def _interval(share: summary.Share) -> str:
 
 
 def modules_table(found: FlipResults) -> str:
-    """Registers of plain designs, by module."""
     plain = [row for row in found.rows if not row.design.endswith("dual") and not row.found.memory]
     lines = []
     for module, some in summary.by(plain, summary.stage).items():
@@ -137,7 +133,6 @@ def modules_table(found: FlipResults) -> str:
 
 
 def ways_table(found: FlipResults) -> str:
-    """Errors and reports by design."""
     lines = []
     for design in found.designs:
         some = [row for row in found.rows if row.design == design.name and row.found.outcome != "masked"]

@@ -38,7 +38,6 @@ def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
 
 
 def said(zones: Zones) -> Said:
-    """Content of a frame."""
     moments = tuple(sorted((int(area), int(x), int(y)) for area, x, y in zones.frame.moments.tolist()))
     return zones.pressed, zones.total_zones, moments
 

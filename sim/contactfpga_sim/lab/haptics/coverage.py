@@ -66,8 +66,6 @@ class CoverageCase:
 
 @dataclasses.dataclass(frozen=True)
 class Coverage:
-    """Results over contacts that closed a switch."""
-
     count: int
     rms_m: float
     barycenter_m: float
@@ -82,8 +80,6 @@ class Coverage:
 
 @dataclasses.dataclass(frozen=True)
 class Pressed:
-    """A simulated contact."""
-
     x_m: float
     y_m: float
     push_n: float
@@ -110,7 +106,6 @@ def locator(case: CoverageCase) -> Locator:
 
 
 def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
-    """Press ``count`` times and judge the estimates."""
     rng, finder = np.random.default_rng(seed), locator(case)
     find: Callable[[Pressed], tuple[Place, float]] = functools.partial(METHODS[case.method], case, finder, rng)
     errors, coarse, radii, theory, agrees = [], [], [], [], []

@@ -53,7 +53,6 @@ def _layout(rating: Rating, before: str = "") -> list[str]:
 
 
 def places_table() -> str:
-    """Places by method under true assumptions."""
     rows = [["method", "pitch", "error", "the barycenter's", "stated radius", "over theory", "covers"]]
     for case in coverage.RIGHT:
         found = coverage.run(case, CONTACTS)
@@ -64,7 +63,6 @@ def places_table() -> str:
 
 
 def wrong_table() -> str:
-    """Places by method under violated assumptions."""
     rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "reports it"]]
     for case in coverage.WRONG:
         found = coverage.run(case, CONTACTS)
@@ -82,7 +80,6 @@ def _percent(share: float) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """Arrangements of units, and results."""
     return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *draw_felt(folder)]
 
 
@@ -122,7 +119,6 @@ def felt_table() -> str:
 
 
 def pairs_table() -> str:
-    """Forces of two contacts."""
     rows = [["contacts", "apart", "error of a push", "95 % interval"]]
     for kind in felt.KINDS:
         for apart in APART_MM:
@@ -134,7 +130,6 @@ def pairs_table() -> str:
 
 
 def limits_table() -> str:
-    """Limits of two fingers' forces."""
     rows = [["how fingers are located", "error of a push", "95 % interval"]]
     for method, errors in pairs.errors(60.0, LIMITS).items():
         middle, low, high = interval(errors)
@@ -144,12 +139,10 @@ def limits_table() -> str:
 
 @functools.cache
 def swept() -> dict[str, dict[str, Sweep]]:
-    """Sweeps of all breaks."""
     return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
 
 
 def breaks_table() -> str:
-    """Where each method breaks."""
     lines = [line for name, methods in swept().items() for line in tables.rows(breaks.KNOBS[name], methods)]
     return writer.table(tables.HEAD, lines)
 

@@ -33,15 +33,12 @@ ARM_PAPER = "| flush, point force | 10 | 1 | 5 |"
 
 
 class KitFigures(NamedTuple):
-    """Computed figures of a kit."""
-
     kit: Kit
     finger: Finger
     built: tuple[placed.Report, ...]
 
 
 def compute() -> list[KitFigures]:
-    """Both kits, measured and built."""
     return [_figures(kits.kit(name)) for name in NAMES]
 
 
@@ -104,7 +101,6 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
 
 
 def _of_page(page: str, start: str, column: int) -> str:
-    """Cell of the row with this beginning, up to a semicolon."""
     text = Path("docs", page).read_text(encoding="utf-8")
     found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
     return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
@@ -118,7 +114,6 @@ def _worst_force(start: str) -> str:
 
 
 def times_table(found: list[KitFigures]) -> str:
-    """Stages of each kit."""
     return writer.table(
         ("kit", "stage", "median, us", "99 %, us", "worst, us"),
         (writer.line(row) for one in found for row in _stages(one)),
@@ -198,7 +193,6 @@ def _reversal(skin: Skin) -> Skin:
 
 
 def parts_table() -> str:
-    """Parts of each kit."""
     lines = []
     for name in NAMES:
         kit = kits.kit(name)
@@ -214,7 +208,6 @@ def parts_table() -> str:
 
 
 def predictions_table() -> str:
-    """The kits' newest predictions."""
     both = {name: predictions.load(kits.kit(name)) for name in NAMES}
     lines = []
     for key in dict.fromkeys(key for found in both.values() for key in found):

@@ -14,7 +14,6 @@ WIRE = {"color": style.INK, "lw": 1.2, "solid_capstyle": "round"}
 
 
 def draw(path: Path) -> Path:
-    """Write the picture."""
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):

@@ -20,7 +20,6 @@ PIN_OHM = 2 * Circuit().pin_ohm
 
 
 def diodes_table() -> str:
-    """Levels by kind of diode."""
     rows = [["diode", "pressed column", "left to VIL", "touched row (reversal)", "left to VIH", "`settle_us`"]]
     rows[0].append("`release_us` without precharge")
     for name, diode in DIODES.items():
@@ -74,5 +73,4 @@ def _kilo(ohm: float) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """The schematic."""
     return schematic.draw(folder / "schematic.svg")

@@ -52,8 +52,6 @@ def paced(found: SimulatedSource) -> Asked:
 
 @dataclasses.dataclass(frozen=True)
 class Met:
-    """Result of an arm's motion into the bar."""
-
     late_s: float
     """Time from the touch to the reflex's command; nan: none."""
     peak_n: float
@@ -101,7 +99,6 @@ def _ranged(values: np.ndarray) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """Make a clip of the view."""
     named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
     clip = folder / "arms.webp"
     with opening.opened(named, http_port=0) as shown, browser.visit(shown, WIDTH, TALL, dark=True) as visitor:

@@ -102,8 +102,6 @@ class Collision:
 
 @dataclasses.dataclass(frozen=True)
 class Heard:
-    """Result of a collision."""
-
     late_s: float | None
     """Time from MuJoCo's first contact to its detection; None: not within :data:`AFTER_S`."""
     early: bool
@@ -169,7 +167,7 @@ Detector = Callable[[Any], tuple[bool, float | None, float]]
 def collide(
     arm: Arm, case: Collision, data: Any, step: Callable[[], None], says: Detector, reacts: bool = True
 ) -> Heard:
-    """Run a collision; if ``reacts``, the arm reverses 1 ms after ``says`` reports it."""
+    """If ``reacts``, the arm reverses 1 ms after ``says`` reports the collision."""
     ahead = np.array(case.speeds)
     wanted, touched_s, known_s, off_m, best, peak, place = ahead, None, None, None, -1.0, 0.0, 0.0
     while data.time < LEAD_S + AFTER_S:
@@ -250,8 +248,6 @@ def tuned(arm: Arm, free_runs: int, cases: Sequence[Collision]) -> tuple[float, 
 
 @dataclasses.dataclass(frozen=True)
 class Compared:
-    """Results of a campaign."""
-
     gain: float
     limits_nm: np.ndarray
     alarms: int

@@ -138,7 +138,7 @@ class Sheets(Mapping[str, WornSheet]):
                 yield number, side == 1, int(owners[number, side])
 
     def _point(self, owner: int, pushed: Floats) -> list[SheetTouch]:
-        """Let fingers push a link's body; adds to (nv,) ``pushed``."""
+        """Adds the fingers' pushes to (nv,) ``pushed``."""
         worn, number, found = list(self._worn.values())[owner], self._bodies[owner], []
         position, rotation = self.data.xpos[number], self.data.xmat[number].reshape(3, 3)
         for one in worn.fingers:
@@ -149,7 +149,7 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _push(self, pushed: Floats) -> dict[tuple[int, int], Floats]:
-        """Let the foam push bodies apart; adds to (nv,) ``pushed``. Returns N by contact and link."""
+        """Adds the foam's push to (nv,) ``pushed``; returns N by contact and link."""
         model, data = self.model, self.data
         found: dict[tuple[int, int], Floats] = {}
         for number, second, owner in self._contacts():

@@ -25,22 +25,18 @@ CACHE = "CONTACTFPGA_CACHE"
 
 
 def compute() -> dict[str, list[Result]]:
-    """Results of all Skins by name."""
     return run([name for group in GROUPS.values() for name in group], EACH, 0, proof.LONG_S, pool.usual_jobs or JOBS)
 
 
 def mutants_table(found: Mapping[str, Sequence[Result]]) -> str:
-    """Mutants anywhere on the board."""
     return table(_all(found, SKINS))
 
 
 def options_table(found: Mapping[str, Sequence[Result]]) -> str:
-    """Mutants in the logic of options."""
     return table(_all(found, OPTIONS))
 
 
 def several_table(found: Mapping[str, Sequence[Result]]) -> str:
-    """Mutants in logic shared by several sheets."""
     return table(_all(found, SEVERAL))
 
 

@@ -27,7 +27,6 @@ def measured(links: int, batch_ms: float, *, full: bool) -> load.NetworkRun:
 
 
 def batch_table() -> str:
-    """Load of one link, by batch."""
     head = ("batch", "messages per second", "latency p50 / p99", "of a bare pair", "ratio p50 / p99")
     rows: list[tuple[str, ...]] = [(*head, "CPU, all ends")]
     for batch_ms in BATCHES_MS:
@@ -38,7 +37,6 @@ def batch_table() -> str:
 
 
 def links_table() -> str:
-    """Load from one link to many."""
     head = ("links", "frames per second", "of those sent", "lost", "CPU per link: publisher", "router", "reader")
     rows: list[tuple[str, ...]] = [(*head, "latency p50 / p99", "in times of a bare pair's")]
     for links, full in (*((count, False) for count in LINKS), (LINKS[-1], True)):
@@ -56,7 +54,6 @@ def _ends(found: load.NetworkRun) -> tuple[float, float, float]:
 
 
 def thousand_table() -> str:
-    """Estimate for a thousand links."""
     found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
     frame = len(load.frames(1)[0])

@@ -40,13 +40,11 @@ def rows() -> list[BridgeRow]:
 
 
 def bridge_table() -> str:
-    """Last byte to host, and touch to host."""
     head = ("bridge", "timer, event character", "sheet", "last byte to host, us", "touch to host, us")
     return writer.table(head, map(bridge_row, rows()))
 
 
 def bridge_row(row: BridgeRow) -> str:
-    """A row of :func:`bridge_table`."""
     chip = BRIDGES[row.speed]
     settings = BridgeSettings(chip, **SET[row.settings])  # type: ignore[arg-type]
     found = stages.measure(row.skin, settings, touches=TOUCHES, host_touches=0)
@@ -59,7 +57,6 @@ def bridge_row(row: BridgeRow) -> str:
 
 
 def bridge_sample() -> str:
-    """First row of :func:`bridge_table`."""
     return bridge_row(rows()[0])
 
 

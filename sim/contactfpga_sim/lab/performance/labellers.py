@@ -41,7 +41,6 @@ def labeller_table() -> str:
 
 
 def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
-    """A line of :func:`labeller_table`; ``places``: of :func:`every_place`."""
     worst = worst_last_record_clocks(skin)
     found = f"{spread(*places, skin.connectivity, skin.labeller)} clocks"
     most = str(bound(skin.columns, skin.connectivity, skin.labeller))
@@ -128,6 +127,5 @@ def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: Lab
 
 
 def labeller_sample() -> str:
-    """First row of :func:`labeller_table`."""
     skin = Skin(labeller="run", settle_us=15.0)
     return labeller_row(skin, every_place(touches(skin)))

@@ -114,7 +114,6 @@ def reference_table() -> str:
 
 
 def reference_row(name: str, skin: Skin) -> str:
-    """A row of :func:`reference_table`."""
     latency = touch_latencies(skin)
     rate, size = frame_rate(skin)
     scan = skin.derived.frame_clocks / (skin.clock_hz / 1e6)
@@ -132,7 +131,6 @@ def report_table() -> str:
 
 
 def report_row(name: str, skin: Skin) -> str:
-    """A row of :func:`report_table`."""
     scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
     times = [f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes]
     return writer.line((name, f"`{skin.report}`", str(skin.derived.record_bytes), *times))
@@ -187,22 +185,18 @@ def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
 
 
 def scenes_gain_table() -> str:
-    """:func:`gain_table` of built-in scenes."""
     return gain_table(built_in_scenes())
 
 
 def recorded_gain_table() -> str:
-    """:func:`gain_table` of the recordings."""
     return gain_table(recorded_scenes())
 
 
 def reference_sample() -> str:
-    """Row of the reference Skin."""
     return reference_row("reference", Skin())
 
 
 def report_sample() -> str:
-    """First row of :func:`report_table`."""
     return report_row("reference", Skin(report="moments"))
 
 
@@ -231,7 +225,6 @@ def latency_table() -> str:
 
 
 def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
-    """A row of :func:`latency_table`."""
     found = latency.measure(skin, cells, TOUCHES)
     last = found.touch_to_last_byte_us
     return writer.line(
@@ -258,5 +251,4 @@ def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
 
 
 def latency_sample() -> str:
-    """First row of :func:`latency_table`."""
     return latency_row("16x16", *FAST_SKINS["16x16"])

@@ -29,8 +29,6 @@ READERS = ("native", "thread")
 
 
 class Found(NamedTuple):
-    """Result of one stream."""
-
     us: np.ndarray
     """Delay from the last byte's write to user code, by returned call."""
     calls: float
@@ -60,7 +58,6 @@ def _times(numbers: np.ndarray, seconds: np.ndarray, feeder: Feeder) -> Found:
 
 
 def bare(program: Path, pace: Pace) -> Found:
-    """Result of the C program."""
     with contextlib.closing(Feeder(1, pace)) as feeder, tempfile.NamedTemporaryFile() as file:
         command = [str(program), feeder.ports[0], str(pace.step_us), file.name]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:

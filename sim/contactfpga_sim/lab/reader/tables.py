@@ -25,12 +25,10 @@ def times(streams: list[Found]) -> tuple[float, float]:
 
 
 def shown(streams: list[Found]) -> str:
-    """Median and 99 % as table cells."""
     return " / ".join(f"{value:.3g}" for value in times(streams)) + " ms"
 
 
 def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
-    """Last byte to user code in an otherwise idle process."""
     rows = [
         [
             "frames per second",
@@ -54,7 +52,6 @@ def rest_table(rounds: int = ROUNDS, paces: tuple[Pace, ...] = PACES) -> str:
 
 
 def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
-    """Last byte to user code beside a computing thread."""
     rows = [["frames per second", "call", *(f'`reader="{reader}"`' for reader in READERS), "calls per second"]]
     for pace in paces:
         for call in ("latest", "next") if pace is paces[0] else ("latest",):
@@ -68,7 +65,6 @@ def busy_table(rounds: int = 1, paces: tuple[Pace, ...] = PACES) -> str:
 
 
 def loop_table() -> str:
-    """Deadlines of a 1 kHz loop."""
     rows = [["beside it", "switch interval", "reader", "deadlines missed", "stops on silence that was none"]]
     for busy, switch_s in ((False, 0.005), (True, 0.005), (True, 0.0005)):
         for reader in READERS:
@@ -91,6 +87,5 @@ def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
 
 
 def conditions() -> str:
-    """Other load on the machine."""
     load = os.getloadavg()[0]
     return f"Measured with {os.cpu_count()} cores and a load of {load:.1f} at the end of this table."

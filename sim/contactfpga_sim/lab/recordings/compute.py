@@ -40,7 +40,6 @@ def finger(seconds: float) -> np.ndarray:
 
 @contextlib.contextmanager
 def folder() -> Iterator[Path]:
-    """A temporary folder."""
     with tempfile.TemporaryDirectory() as name:
         yield Path(name)
 
@@ -57,8 +56,6 @@ def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class Cost:
-    """Cost of a rate and way to record."""
-
     frames_per_s: float
     bytes_per_frame: float
     frames_per_cpu_s: float
@@ -103,8 +100,6 @@ def reading(path: Path, into: Path) -> Reading:
 
 @dataclasses.dataclass(frozen=True)
 class Loss:
-    """Loss after a kill -9."""
-
     came: int
     lost: int
     lost_s: float

@@ -63,7 +63,6 @@ def reading_table() -> str:
 
 
 def loss_table() -> str:
-    """Loss by moment of the kill."""
     with compute.folder() as place:
         found = [compute.loss(stream(10_000), 0.5 + 0.237 * kill, place / str(kill)) for kill in range(KILLS)]
     rows = [

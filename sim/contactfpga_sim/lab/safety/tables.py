@@ -20,7 +20,6 @@ NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` 
 
 
 def faults_table() -> str:
-    """Each fault with its reports, their times, and earlier errors."""
     head = [
         "fault",
         "effect if undetected",
@@ -119,7 +118,6 @@ def _after(places: list[Place], channels: tuple[str, ...]) -> str:
 
 
 def times_table() -> str:
-    """Timeouts of the study."""
     rows = [["wait", "for"]]
     rows.append([f"{trial.LONGEST_US:,} µs", "a fault that is not reported until then counts as not reported"])
     rows.append([f"{trial.QUIET_US:,} µs", "the watchdog's time without an edge of `alive`"])

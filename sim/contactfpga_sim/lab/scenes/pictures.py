@@ -59,7 +59,6 @@ def _square(size: int, pitch_mm: float) -> Skin:
 
 
 def svg(drawn: Sequence[Panel]) -> str:
-    """All panels as SVG."""
     down, step = -(-len(drawn) // ACROSS), HEAD + PANEL + FOOT + MARGIN
     width, height = style.WIDTH_PX, down * step + MARGIN
     lines = [
@@ -129,6 +128,5 @@ def _outline(part: Part, left_mm: float, top_mm: float, scale: float) -> str:
 
 
 def draw(folder: Path) -> Path:
-    """Write ``scenes.svg``."""
     write_text(folder / "scenes.svg", svg(panels()))
     return folder / "scenes.svg"

@@ -18,7 +18,6 @@ COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
 
 
 def draw(folder: Path) -> list[Path]:
-    """Write all pictures."""
     import matplotlib as mpl
 
     with mpl.rc_context(style.SETTINGS):

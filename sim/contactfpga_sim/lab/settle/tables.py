@@ -98,7 +98,6 @@ SHEETS = {
 
 
 def needs_table() -> str:
-    """Times that sheets need."""
     rows = [["16x16 unless said", "precharge", "settle", "release", "project rows", "columns", "without precharge"]]
     for name, (size, circuit) in SHEETS.items():
         needs = needed(circuit, size, size)
@@ -115,12 +114,10 @@ def _us(time: Time) -> str:
 
 @functools.cache
 def compared() -> tuple[SpiceComparison, ...]:
-    """Every circuit of the comparison."""
     return tuple(map(agreement.compared, agreement.cases()))
 
 
 def agreement_table() -> str:
-    """Each circuit in both models."""
     rows = [["phase", "sheet", "pattern", "pF: line, crossing, neighbor", "Ω: drive, switch, column, row", "diode"]]
     rows[0] += ["ours, ns", "ngspice, ns", "off by"]
     for one in compared():
@@ -155,7 +152,6 @@ def summary_table() -> str:
 
 
 def breaks_table() -> str:
-    """Where each knob breaks."""
     rows = [["knob", "circuit", "holds until", "breaks at", "what breaks", "what helps"]]
     for name, knob in breaks.KNOBS.items():
         for number, (run, sweep) in enumerate(breaks.sweeps(name).items()):
@@ -174,7 +170,6 @@ def breaks_table() -> str:
 
 
 def shorted_table() -> str:
-    """Currents through shorted diodes."""
     head = ["shorted diodes in the column", "level of the column", "out of each of their rows' pins"]
     rows = [[*head, "into the selected row's pin", "for, per scan of 16 rows"]]
     row = patterns.middle(breaks.SIZE)

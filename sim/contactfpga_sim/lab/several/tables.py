@@ -25,7 +25,6 @@ SECONDS = 0.05
 
 
 def size_table() -> str:
-    """LUT4 on an iCE40UP5K."""
     cores = {1: functools.partial(Top, SKIN)} | {
         count: functools.partial(SeveralTop, Several((SKIN,) * count)) for count in (2, 3)
     }
@@ -70,5 +69,4 @@ def _longest_wait(trace: Trace, begins: list[int]) -> int:
 
 
 def line_sample() -> str:
-    """First row of :func:`line_table`."""
     return writer.line(_row(COUNTS[0], BAUDS[0]))

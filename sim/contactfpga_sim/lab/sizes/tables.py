@@ -86,7 +86,6 @@ def units_table() -> str:
 
 
 def boards_table() -> str:
-    """Sheets of the boards page, built for their boards."""
     head = ("board", "FPGA", "clock", "sheet", "LUT4", "flip-flops", "block RAMs", "logic cells", "Fmax")
     lines = []
     for board in BOARDS.values():
@@ -97,7 +96,6 @@ def boards_table() -> str:
 
 
 def board_row(board: BoardSpec, skin: Skin) -> str:
-    """FPGA resources of a Skin's bitstream."""
     print(f"{board.title}, {skin.rows}x{skin.columns}: bitstream", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as folder:  # these tools do not see /tmp
         found = build.build(skin, board, Path(folder))

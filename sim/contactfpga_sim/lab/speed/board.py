@@ -39,13 +39,11 @@ def _seconds(board: VirtualBoard, cycles: int) -> float:
 
 
 def row(name: str, skin: Skin) -> str:
-    """One line of the table."""
     found = cycles_per_second(skin)
     return f"| {name} | {skin.clock_hz / 1e6:g} MHz | {found / 1e6:.1f} million | {100 * found / skin.clock_hz:.0f} % |"
 
 
 def main() -> int:
-    """Print the table, of native code."""
     os.environ[webassembly.NATIVE] = "1"
     print("| Skin | clock | cycles per second | of real time |")
     print("|---|---|---|---|")

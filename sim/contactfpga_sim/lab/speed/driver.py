@@ -180,7 +180,6 @@ def latencies_us() -> list[float]:
 
 
 def main() -> int:
-    """Print the table."""
     old = decoded(Conversation.receive)  # type: ignore[arg-type]
     new = decoded(Conversation.receive_runs)
     print("| one zone per frame | frames per second of one core |")

@@ -43,7 +43,6 @@ class ReactionTimes(NamedTuple):
 
 
 def example() -> ModuleType:
-    """The module ``examples/reflex.py``."""
     spec = importlib.util.spec_from_file_location("reflex", contactfpga.examples() / "reflex.py")
     assert spec is not None
     assert spec.loader is not None
@@ -77,7 +76,6 @@ def measured(rounds: int = ROUNDS) -> ReactionTimes:
 
 
 def main() -> int:
-    """Print the results."""
     started = time.monotonic()
     for name, value in zip(HEAD, measured().cells):
         print(f"{name}: {value}")

@@ -114,7 +114,6 @@ def ours() -> Update:
 
 
 def constant_velocity() -> Update:
-    """The constant-velocity baseline."""
     return ConstantVelocity().update
 
 
@@ -149,8 +148,6 @@ TRACKERS: dict[str, Callable[[], Update]] = {
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """Scores of a tracker."""
-
     frames: int
     mota: float
     idf1: float
@@ -267,8 +264,6 @@ def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[FrameTru
 
 
 class _Linker:
-    """Names zones by shared cells."""
-
     def __init__(self, size: tuple[int, ...]):
         self._before = np.zeros(size, int)
         self._names: dict[int, int] = {}
@@ -277,8 +272,8 @@ class _Linker:
         self._fresh = 0
 
     def take(self, labels: np.ndarray) -> dict[int, int]:
-        """Name of each label: the previous zone with most shared cells, largest share first; a merged zone's name
-        when it reappears in place; else a new one."""
+        """Name of each label: the previous zone with most shared cells, largest share first. A merged zone gets its
+        name back in place."""
         before, both = self._before, (self._before > 0) & (labels > 0)
         shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
         ranked = shares.T[np.argsort(-counts, kind="stable")].tolist()

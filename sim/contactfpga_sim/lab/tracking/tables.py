@@ -76,7 +76,6 @@ LOOKS = {
 
 
 def scores_table() -> str:
-    """Scores on random scenes."""
     found = scores.all_scenes()
     heads = tuple(f"{name}: IDF1, %" for name in scores.TRACKERS)
     rows = [("scenes", "frames per second", *heads, "`Tracker`: MOTA, %", "id switches per 1,000 frames")]
@@ -106,7 +105,6 @@ def ahead_table() -> str:
 
 
 def recorded_table() -> str:
-    """Scores on recordings."""
     rows = [("recording", "frames taken", *HEAD)]
     for path in sorted(RECORDINGS.glob("*.npz")):
         for every in scores.EVERY:
@@ -121,7 +119,6 @@ BREAKS = ("knob", "method", "right in 95 % up to", "right there", "right at the 
 
 
 def breaks_table() -> str:
-    """Where ids are lost."""
     found = breaks.sweeps()
     return writer.table_of([BREAKS, *(row for name in found for row in break_rows(breaks.KNOBS[name], found[name]))])
 
@@ -139,7 +136,6 @@ def break_rows(knob: breaks.Knob, found: Mapping[str, breaks.Rates]) -> Iterator
 
 
 def speed_table() -> str:
-    """Speed on this machine."""
     rows = [("contacts", "tracked per second", "decoded per second", "tracking takes, in times of decoding")]
     for contacts in (1, 2):
         found = measure(contacts)
@@ -148,7 +144,6 @@ def speed_table() -> str:
 
 
 def reflex_table() -> str:
-    """Reaction times on this machine."""
     return writer.table_of([reflex.HEAD, reflex.measured().cells])
 
 

@@ -62,8 +62,6 @@ def program() -> str | None:
 
 
 class Visitor:
-    """A page that shows a view."""
-
     def __init__(self, page: Any, shown: ServedView):
         self.page, self._shown = page, shown
         page.goto(shown.url, timeout=1e3 * PATIENCE_S)
@@ -160,7 +158,6 @@ def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = 
 
 @contextlib.contextmanager
 def running(shown: ServedView) -> Iterator[None]:
-    """Draw frames in a thread."""
     ending = threading.Event()
     failed: list[BaseException] = []
 

@@ -127,7 +127,6 @@ def _method(noted: Any, kept: Any) -> Any:
 
 
 def sheet_of(shown: ServedView) -> Sheet:
-    """The shown sheet."""
     assert isinstance(shown.view, View)
     return shown.view.stage.tiles.sheet
 
@@ -154,7 +153,6 @@ def clicks(shown: ServedView, visitor: browser.Visitor, count: int = CLICKS) -> 
 
 
 def click_table(found: list[Click]) -> str:
-    """Median and worst of each part."""
     rows = [["from the click to the drawn zone", "median", "worst"]]
     for name in found[0].parts_s:
         values = [click.parts_s[name] * 1e3 for click in found]
@@ -284,8 +282,6 @@ PLOTTED_S = 2.0
 
 
 class ViewTimes(NamedTuple):
-    """Measurements shared by the tables."""
-
     loads: str
     found: list[Click]
 
@@ -300,12 +296,10 @@ def compute() -> ViewTimes:
 
 
 def loads_table(times: ViewTimes) -> str:
-    """Measurements without a browser."""
     return times.loads
 
 
 def clicks_table(times: ViewTimes) -> str:
-    """Measurements with a browser."""
     return click_table(times.found)
 
 

@@ -25,7 +25,6 @@ LANES = (
 
 
 def draw(folder: Path) -> list[Path]:
-    """One touch, from a scan before it until its frame is sent."""
     skin = Skin()
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as work:
         touch = wave.simulate(skin, wave.finger(skin), Path(work) / "touch.vcd")

@@ -199,7 +199,6 @@ def compile_with(
 
 
 def _write(design: Any, folder: Path) -> str:
-    """Write the design into a folder; returns the Yosys commands to read it."""
     if isinstance(design, Netlist):
         for name, text in design.files.items():
             (folder / name).write_text(text)

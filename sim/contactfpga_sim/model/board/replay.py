@@ -181,7 +181,6 @@ class _Collector:
         return _Events(*(self._board.take(name) for name in ("rows", "records", "received")))
 
     def collect(self, events: _Events) -> Iterator[ReplayedFrame]:
-        """Results of input frames whose last byte is among the events."""
         self._note_times(events)
         stream = zip(events.received["cycle"].tolist(), events.received["data"].tolist())
         for got in self._receiver.take(stream):

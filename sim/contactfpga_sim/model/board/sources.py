@@ -27,7 +27,6 @@ _WORD = re.compile(r"\bimport\b")
 _PLACE = re.compile(r"""\b(contactfpga\w*(?:\.\w+)+):\w+["']""")
 
 _taken: dict[tuple[str, tuple[str, ...], bool], str] = {}
-"""Digests by arguments: a process reads each module once."""
 _read: dict[Path, object] = {}
 """Modules of the project read so far, with stamps that reveal later writes."""
 
@@ -106,7 +105,6 @@ def _folders(packages: Iterable[str]) -> dict[str, Path]:
 
 
 def _beside(files: Iterable[Path]) -> dict[str, Path]:
-    """Folders of packages that users' files reach, including uninstalled neighbors."""
     installed = {Path(path).resolve() for path in sysconfig.get_paths().values()}
     found = {}
     for file in files:

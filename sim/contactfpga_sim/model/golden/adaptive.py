@@ -231,7 +231,7 @@ class AdaptiveScanModel:
             self.contact.append((cycle, 1))
 
     def _end(self, cycle: int, pressed: bool) -> None:
-        """End a frame. If idle rows stay driven, readings count a clock earlier."""
+        """If idle rows stay driven, readings count a clock earlier."""
         slot = self.slots[-1]
         if self._watched() and (self._columns(cycle - 3, slot.rows) & self._clean).any():
             self._rise(cycle, True)

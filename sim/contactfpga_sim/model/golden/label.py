@@ -160,7 +160,7 @@ def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labell
 
 
 def _runs(line: np.ndarray) -> list[tuple[int, int]]:
-    """(first, past the last) of the runs of ones."""
+    """(first, past the last) of each run of ones."""
     edges = np.flatnonzero(np.diff(np.pad(line.astype(int), 1)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 

@@ -52,7 +52,6 @@ class SharedLine:
             self._reach(number, math.inf)
 
     def _reach(self, number: int, cycle: float) -> None:
-        """Advance this sheet alone; all links stand still meanwhile."""
         before, self._reached[number] = min(self._reached), cycle
         known = min(self._reached)
         if known > before or self._sheets == 1:

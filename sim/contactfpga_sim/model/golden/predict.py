@@ -307,7 +307,7 @@ def _rises(changes: scan.Changes, begin: int, end: int) -> bool:
 
 
 def _changes(levels: Iterable[tuple[int, int]]) -> scan.Changes:
-    """The effective (cycle, level) changes, the last of each cycle; initially low."""
+    """The last change of each cycle counts; the level is low at first."""
     found: scan.Changes = []
     for cycle, level in dict(levels).items():
         if level != (found[-1][1] if found else 0):

@@ -125,8 +125,7 @@ def _line(facts: Facts, slot: int) -> int:
 
 
 def _read(facts: Facts, timeline: Timeline, slot: int, ahead: int = 0) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed in a slot, sampled ``ahead`` clocks before the settle time's
-    end."""
+    """(column lines,) bool: columns read as pressed ``ahead`` clocks before the settle time's end."""
     cycle = sampled(facts, slot) - ahead
     return np.asarray(closed(facts, timeline, cycle)[_row(facts, slot)] | stuck(facts, timeline, cycle))
 

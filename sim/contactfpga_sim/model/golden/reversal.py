@@ -121,8 +121,6 @@ class ReversalScanModel:
     # ---- when a frame begins
 
     def _begin(self) -> int:
-        """Start of the next frame: rows were released long enough, and the last frame is packed; an untouched sheet
-        waits for a touch or request."""
         project = self._facts.project
         if not self._rests:
             return self._after_tests(max(self._listens + project + 1, self._packed))

@@ -144,7 +144,6 @@ class _Settings:
                 self._set.setdefault((what, place), []).append((one.cycle + 1, kept, number > 0))
 
     def at(self, what: int, place: int, cycle: int) -> tuple[int, bool]:
-        """Number at a place, and whether it is not 0."""
         given = self._set.get((what, place), [])
         index = bisect.bisect_right(given, cycle, key=lambda one: one[0])
         return given[index - 1][1:] if index else (0, False)
@@ -154,7 +153,6 @@ class _Settings:
         return is_set and amount >= threshold
 
     def armed(self) -> Changes:
-        """Whether any threshold is set."""
         marks = sorted(
             (cycle, key, is_set) for key, given in self._set.items() if key[0] != SET_ZERO for cycle, _, is_set in given
         )

@@ -62,7 +62,7 @@ class UnitReadings(LoadedUnits):
         return sum((self._of(one, seconds) for one in contacts), np.zeros(6))
 
     def _of(self, contact: Contact, seconds: float) -> Floats:
-        """Wrench of a contact; each part pushes along the normal at its middle."""
+        """Each part of a contact pushes along the normal at its middle."""
         total, load = np.zeros(6), contact.load(seconds)
         if load is None:
             return total

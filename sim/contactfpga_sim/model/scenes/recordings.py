@@ -19,7 +19,6 @@ DEFAULT_HZ = 100.0
 
 
 _RANGES = {"rate_hz": (1e-3, 1e6), "pitch_mm": (MIN_PITCH_MM, MAX_PITCH_MM)}
-"""Limits of numbers in a .npz file."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -183,7 +183,7 @@ def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: floa
 
 
 def _parts(network: Network) -> Iterator[str]:
-    """Circuit elements; node 1 is the first column, rows follow the columns."""
+    """Node 1 is the first column; rows follow the columns."""
     circuit, rows, columns = network.circuit, network.rows, network.columns
     for line in range(1, rows + columns + 1):
         yield f"Cg{line} {line} 0 {circuit.line_pf}p"

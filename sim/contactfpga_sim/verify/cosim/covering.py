@@ -101,7 +101,6 @@ class _Open:
         self._partners = [every & ~own[place] for place, count in enumerate(counts) for _ in range(count)]
 
     def pairs(self) -> list[Pair]:
-        """Open pairs in order."""
         return [
             (a, i, b, j)
             for a, count in enumerate(self.counts)
@@ -116,7 +115,6 @@ class _Open:
         return sum(1 << (self._first[place] + value) for place, value in row.items())
 
     def closed_with(self, bits: int, place: int, value: int) -> int:
-        """Pairs that a value would close with those of ``bits``."""
         return (self._partners[self._first[place] + value] & bits).bit_count()
 
     def closed_by(self, row: Mapping[int, int]) -> int:
@@ -125,7 +123,6 @@ class _Open:
         return sum(self.closed_with(bits, place, value) for place, value in row.items())
 
     def close(self, row: Mapping[int, int]) -> None:
-        """Close the pairs of a chosen row."""
         bits = self.bits(row)
         for place, value in row.items():
             self._partners[self._first[place] + value] &= ~bits

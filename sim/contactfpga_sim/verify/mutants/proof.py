@@ -121,7 +121,7 @@ class Prover:
         return {i: self._graph.differ(one, other) for i, (one, other) in pairs if one != other and i not in twins}
 
     def _seen(self, driven: Sequence[int]) -> Iterable[int]:
-        """Differences of observed outputs: payloads only during a transfer."""
+        """Payloads count only during a transfer."""
         names = self._circuit.outputs
         for name, one, other in zip(names, self._driven, driven):
             when = _HANDED.get(name.partition("[")[0])

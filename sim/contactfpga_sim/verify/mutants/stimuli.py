@@ -24,7 +24,6 @@ from contactfpga_sim.verify.cosim import covering
 _TIME_WRAPS_US = 1 << 24
 _AT_REST = 400_000
 _ALL_FRAMES = 16
-"""Cells of a sheet whose every frame is tried."""
 _FEW_CELLS = 64
 """Cells of a sheet of which more frames are tried, as each has fewer meetings of zones."""
 
